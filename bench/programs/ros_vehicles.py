@@ -11,10 +11,12 @@ number, the verb, and when the callback was called.
 
 import sys
 import time
+from functools import partial
 
 import rclpy
 from m2pem_interfaces.msg import BehaviorCommand, BehaviorStatus, VehicleStatus
 from nav_msgs.msg import Odometry
+from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
@@ -40,10 +42,21 @@ class Vehicle:
         self._seen: set[str] = set()
         depth = QoSProfile(depth=10)
         latched, latched_10 = (QoSProfile(depth=each, durability=LATCHED) for each in (1, 10))
-        self._odom = node.create_publisher(Odometry, f"/{name}/odom", depth)
-        self._states = node.create_publisher(VehicleStatus, f"/{name}/vehicle_status", latched)
-        self._said = node.create_publisher(BehaviorStatus, f"/{name}/behavior_status", latched_10)
-        node.create_subscription(BehaviorCommand, f"/{name}/command", self._hear, depth)
+        # Without events, of which rclpy looks at every one whenever a message or timer comes.
+        publisher = partial(
+            node.create_publisher,
+            event_callbacks=PublisherEventCallbacks(use_default_callbacks=False),
+        )
+        self._odom = publisher(Odometry, f"/{name}/odom", depth)
+        self._states = publisher(VehicleStatus, f"/{name}/vehicle_status", latched)
+        self._said = publisher(BehaviorStatus, f"/{name}/behavior_status", latched_10)
+        node.create_subscription(
+            BehaviorCommand,
+            f"/{name}/command",
+            self._hear,
+            depth,
+            event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
+        )
 
     def tell(self, node: Node) -> None:
         """Say where and how it is."""

@@ -279,7 +279,7 @@ class DdsConnections:
         if domain not in self._runtimes:
             # The name of the journal distinguishes executives on one network.
             name = f"m2pem_{self._setup.context.journal.hex[:8]}"
-            ros = self._runtimes[domain] = RosRuntime(name, domain_id=domain)
+            ros = self._runtimes[domain] = RosRuntime(name, domain_id=domain, spreads=True)
             if ros.uses_sim_time:
                 self._watch_clock(ros)
         return self._runtimes[domain]
@@ -346,7 +346,7 @@ class TargetPublisher:
 
         self._messages = require_interfaces("m2pem_interfaces").msg
         self._stamp_us = ros.stamp_us
-        self._publisher = ros.node.create_publisher(
+        self._publisher = ros.publisher(
             self._messages.TargetState, settings.topic(TOPIC), qos.TELEMETRY
         )
 

@@ -12,7 +12,9 @@ import pytest
 from m2pem_interfaces.action import ExecuteBehavior
 from m2pem_interfaces.msg import BehaviorCommand, BehaviorStatus
 from m2pem_interfaces.srv import AnswerPrompt, ListRuns
-from m2pem_plugin_ros.runtime import RosError, RosRuntime, RosTimeoutError, calls, qos
+from m2pem_plugin_ros.runtime import RosError, RosRuntime, RosTimeoutError, calls, own_nodes, qos
+from m2pem_plugin_ros.runtime.arguments import VARIABLE
+from m2pem_plugin_ros.runtime.ros_runtime import SUBSCRIPTIONS
 from m2pem_plugin_ros.testing import Peer, reserved_domain
 from rclpy.action import ActionClient
 from rclpy.service import Service
@@ -276,6 +278,31 @@ def resources() -> tuple[int, int]:
         except FileNotFoundError:  # that of this listing
             continue
     return len(list(Path("/proc/self/task").iterdir())), sockets
+
+
+async def test_many_subscriptions_have_threads_of_their_own(
+    domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(VARIABLE, "--ros-args -r __node:=renamed -r __ns:=/fleet")
+    count = 2 * SUBSCRIPTIONS + 1
+    received: asyncio.Queue[tuple[int, str]] = asyncio.Queue()
+    async with RosRuntime("many", domain_id=domain, spreads=True) as ros:
+        for number in range(count):
+
+            def take(message: String, number: int = number) -> None:
+                received.put_nowait((number, message.data))
+
+            ros.subscribe(String, f"word{number}", take, qos.EVENTS)
+        assert set(ros.node_names) == {"/fleet/renamed", "/fleet/_many_1", "/fleet/_many_2"}
+        assert own_nodes() >= set(ros.node_names)
+        publishers = [ros.publisher(String, f"word{number}", qos.EVENTS) for number in range(count)]
+        for number, publisher in enumerate(publishers):
+            await connected(publisher.get_subscription_count)
+            publisher.publish(String(data=f"{number}"))
+        async with asyncio.timeout(AMPLE_S):
+            came = {await received.get() for _ in publishers}
+    assert came == {(number, f"{number}") for number in range(count)}
+    assert not [each.name for each in threading.enumerate() if "many" in each.name]
 
 
 async def test_closing_leaves_no_thread_and_no_socket(domain: int, echo: Peer) -> None:

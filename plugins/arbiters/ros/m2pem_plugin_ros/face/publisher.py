@@ -5,21 +5,17 @@ import logging
 from collections.abc import Callable
 from typing import Any, Generic, TypeVar
 
-from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from m2pem_plugin_ros.face.rate_limiter import RateLimiter
+from m2pem_plugin_ros.runtime.qos import NO_PUBLISHER_EVENTS
 from m2pem_plugin_ros.sensors.graph import UNKNOWN_NODE, node_of
 
 TELEMETRY = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 """Reliable, as the displays of RViz and the nodes of Nav2 subscribe by default; a subscriber of
 sensor data, which is best-effort, gets it, too. It never waits for a reader: the oldest message is
 dropped."""
-
-NO_EVENTS = PublisherEventCallbacks(use_default_callbacks=False)
-"""rclpy looks at every event of every publisher whenever a message comes: hundreds of vehicles have
-thousands of them. All that these events do is to log what the subscribing node logs, too."""
 
 T = TypeVar("T")
 
@@ -52,7 +48,7 @@ class TelemetryPublisher(Generic[T]):
         self._node = node
         self._make = make
         self._publisher: Any = node.create_publisher(
-            message_type, topic, TELEMETRY, event_callbacks=NO_EVENTS
+            message_type, topic, TELEMETRY, event_callbacks=NO_PUBLISHER_EVENTS
         )
         self.topic: str = self._publisher.topic_name
         """Its name after remapping."""

@@ -38,8 +38,8 @@ SLOW_EVERY = 2
 WAITING = 10_000
 """States that may wait to be published; the oldest are dropped."""
 
-STATES_IN_A_ROW = 10
-"""States that are taken before other tasks run: each may be several messages."""
+STATES_AT_ONCE_S = 0.005
+"""For so long states are taken before other tasks run."""
 
 log = logging.getLogger("m2pem.face.ros")
 
@@ -120,12 +120,13 @@ class Serving:
 
     async def _listen(self) -> None:
         """Receive telemetry of the fleet."""
-        taken = 0
+        now_s = asyncio.get_running_loop().time
+        until_s = now_s() + STATES_AT_ONCE_S
         async for state in self._control.telemetry(WAITING):
             self._receive(state)
-            taken += 1
-            if taken % STATES_IN_A_ROW == 0:
+            if now_s() > until_s:
                 await asyncio.sleep(0)
+                until_s = now_s() + STATES_AT_ONCE_S
 
     def _receive(self, state: Telemetry) -> None:
         if self._ros.uses_sim_time:

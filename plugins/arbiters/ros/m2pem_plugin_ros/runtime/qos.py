@@ -1,5 +1,6 @@
 """The quality of service of all topics and services (docs/ros.md)."""
 
+from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 STATUS = QoSProfile(
@@ -41,3 +42,8 @@ STATIC_TRANSFORMS = QoSProfile(
 SERVICES = QoSProfile(depth=2000, reliability=ReliabilityPolicy.RELIABLE)
 """For clients and servers. Of more simultaneous calls, DDS loses the oldest silently. Waiting calls
 are refused in turn, so that only a client's own flood comes this far."""
+
+NO_PUBLISHER_EVENTS = PublisherEventCallbacks(use_default_callbacks=False)
+NO_SUBSCRIPTION_EVENTS = SubscriptionEventCallbacks(use_default_callbacks=False)
+"""rclpy looks at every event of every endpoint of an executor whenever a message comes. All that
+these events do is to log that types or QoS differ, which `sensors.endpoints` says by name."""

@@ -1,9 +1,8 @@
-"""rclpy within an asyncio program: one thread for ROS, all else on the event loop."""
+"""rclpy within an asyncio program: threads that receive, all else on the event loop."""
 
 import asyncio
 import logging
 import os
-import threading
 from collections import deque
 from collections.abc import Awaitable, Callable, Collection, Coroutine, Sequence
 from typing import Any, Generic, Self, TypeVar
@@ -14,9 +13,7 @@ import rclpy
 from rclpy.action import ActionClient, ActionServer
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.context import Context
-from rclpy.event_handler import SubscriptionEventCallbacks
-from rclpy.exceptions import InvalidHandle
-from rclpy.executors import ExternalShutdownException, ShutdownException, SingleThreadedExecutor
+from rclpy.executors import Executor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
@@ -26,13 +23,14 @@ from m2pem_plugin_ros.installation import RosError
 from m2pem_plugin_ros.runtime import qos as qualities
 from m2pem_plugin_ros.runtime.arguments import process_arguments, refused
 from m2pem_plugin_ros.runtime.calls import Calls, Responses
+from m2pem_plugin_ros.runtime.executor_thread import ExecutorThread
 
-JOIN_S = 5.0
 WAITING = 1000
 
-NO_EVENTS = SubscriptionEventCallbacks(use_default_callbacks=False)
-"""rclpy looks at every event of every subscription whenever a message comes. All that these events
-do is to log that types or QoS differ, which `sensors.endpoints` says by name."""
+
+SUBSCRIPTIONS = 40
+"""How many subscriptions share a thread, of a runtime with several. For each message, rclpy looks
+twice at every entity of the executor."""
 
 SILENT = ("--ros-args", "--disable-stdout-logs", "--")
 """The console belongs to m2pem; what is logged with ROS is on /rosout."""
@@ -57,7 +55,8 @@ class RosRuntime:
     `domain_id` None takes ROS_DOMAIN_ID. `arguments` are those of ROS, such as `["--ros-args",
     "--remap", "a:=b"]`; those of the process (runtime/arguments.py) come before them. `kind` is the
     class of the first node, and `options` are its keywords. `console`: what is logged with ROS is
-    printed at standard error, too.
+    printed at standard error, too. `spreads`: many subscriptions are expected; beyond the first
+    SUBSCRIPTIONS, each so many get a hidden node and a thread of their own.
 
     Raises:
         RosError: ROS cannot be started like that, for example with DDS security and no keys.
@@ -72,6 +71,7 @@ class RosRuntime:
         arguments: Sequence[str] = (),
         kind: Callable[..., Node] = Node,
         console: bool = False,
+        spreads: bool = False,
         **options: Any,
     ) -> None:
         self._loop = asyncio.get_running_loop()
@@ -94,14 +94,19 @@ class RosRuntime:
             )
         except Exception as error:  # rclpy has no base class for what it raises
             raise RosError(f"ROS cannot be started: {refused(error)}{_security()}") from error
-        self.executor = SingleThreadedExecutor(context=self.context)
-        self._thread = threading.Thread(target=self._spin, name=f"ros-{name}", daemon=True)
+        self._name, self._spreads = name, spreads
+        first = ExecutorThread(self.context, name, lambda: self._closing is not None)
+        self._threads = [first]
+        self.executor = first.executor
+        self._subscriptions = 0
+        """Those without a node of their caller."""
         try:
             self.node = self.make_node(name, namespace, kind=kind, **options)
         except RosError:
             self._let_go()
             raise
-        self._thread.start()
+        self._subscriber = self.node
+        first.start()
         _live.add(self)
 
     @property
@@ -125,12 +130,22 @@ class RosRuntime:
         Raises:
             RosError: the name is not valid in ROS, or DDS refuses.
         """
+        return self._add_node(self.executor, name, namespace, kind, **options)
+
+    def _add_node(
+        self,
+        executor: Executor,
+        name: str,
+        namespace: str = "",
+        kind: Callable[..., Node] = Node,
+        **options: Any,
+    ) -> Node:
         try:
             node = kind(name, context=self.context, namespace=namespace, **options)
         except Exception as error:  # rclpy has no base class for what it raises
             what = f"the node '{namespace}/{name}' cannot be created"
             raise RosError(f"{what}: {refused(error)}{_security()}") from error
-        self.executor.add_node(node)
+        executor.add_node(node)
         self._nodes[node] = node.get_fully_qualified_name()
         return node
 
@@ -173,6 +188,12 @@ class RosRuntime:
         """Whether the time of the first node is that of /clock."""
         return bool(self.node.get_clock().ros_time_is_active)
 
+    def publisher(self, message_type: Any, topic: str, qos: QoSProfile) -> Any:
+        """A publisher of the first node."""
+        return self.node.create_publisher(
+            message_type, topic, qos, event_callbacks=qualities.NO_PUBLISHER_EVENTS
+        )
+
     def subscribe(
         self,
         message_type: Any,
@@ -186,9 +207,28 @@ class RosRuntime:
         """Subscribe with a callback on the loop. Of more than `waiting` messages, the oldest are
         dropped."""
         inbox = Inbox(self._loop, callback, waiting)
-        return (node or self.node).create_subscription(
-            message_type, topic, inbox.put, qos, event_callbacks=NO_EVENTS
+        return (node or self._next_subscriber()).create_subscription(
+            message_type, topic, inbox.put, qos, event_callbacks=qualities.NO_SUBSCRIPTION_EVENTS
         )
+
+    def _next_subscriber(self) -> Node:
+        """Return the node of the next subscription."""
+        if self._spreads and self._subscriptions and self._subscriptions % SUBSCRIPTIONS == 0:
+            name = f"_{self._name}_{self._subscriptions // SUBSCRIPTIONS}"
+            thread = ExecutorThread(self.context, name, lambda: self._closing is not None)
+            self._threads.append(thread)
+            # Its own arguments, as those of the process may rename every node, and have each
+            # subscribe to /clock.
+            self._subscriber = self._add_node(
+                thread.executor,
+                name,
+                cli_args=["--ros-args", "-r", f"__node:={name}", "-p", "use_sim_time:=false"],
+                enable_rosout=False,
+                start_parameter_services=False,
+            )
+            thread.start()
+        self._subscriptions += 1
+        return self._subscriber
 
     # --- services and actions that others offer -------------------------------------------------
 
@@ -331,9 +371,10 @@ class RosRuntime:
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
-        # End the thread first: it may wait for entities that are destroyed below.
+        # End the threads first: they may wait for entities that are destroyed below.
         rclpy.try_shutdown(context=self.context)
-        await asyncio.to_thread(self._thread.join, JOIN_S)
+        for thread in self._threads:
+            await asyncio.to_thread(thread.join)
         # In a thread, too: it takes milliseconds for each entity.
         await asyncio.to_thread(self._let_go)
 
@@ -341,21 +382,10 @@ class RosRuntime:
         for node in list(self._nodes):
             _destroy(node)
         self._nodes.clear()
-        self.executor.shutdown(timeout_sec=0)
+        for thread in self._threads:
+            thread.executor.shutdown(timeout_sec=0)
         rclpy.try_shutdown(context=self.context)
         self.context.destroy()
-
-    def _spin(self) -> None:
-        while self.context.ok():
-            try:
-                self.executor.spin_once()
-            except (ExternalShutdownException, ShutdownException):
-                return
-            except InvalidHandle:  # the entity was destroyed on the loop meanwhile
-                continue
-            except Exception:  # one invalid message must not end the executor
-                if self._closing is None:
-                    logger.exception("a callback of ROS failed")
 
 
 def _destroy(node: Node) -> None:

@@ -23,7 +23,7 @@ class CommandTopic:
         self._node = ros.node
         self._stamped = settings.stamped
         name = settings.topic(settings.topics.cmd_vel)
-        self._publisher = self._node.create_publisher(_message_type(settings), name, qos.VELOCITIES)
+        self._publisher = ros.publisher(_message_type(settings), name, qos.VELOCITIES)
 
     @property
     def name(self) -> str:

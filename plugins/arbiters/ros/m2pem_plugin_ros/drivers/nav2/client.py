@@ -64,7 +64,7 @@ class Nav2:
         self.waypoints = self._client(actions.FollowWaypoints, "follow_waypoints")
         self.back_up = self._client(actions.BackUp, "backup")
         self._get_state = ros.client(GetState, f"{self._name}/bt_navigator/get_state")
-        self._speed_limit = ros.node.create_publisher(
+        self._speed_limit = ros.publisher(
             self.messages.msg.SpeedLimit, f"{self._name}/speed_limit", qos.COMMANDS
         )
 

@@ -43,7 +43,7 @@ class NodeDriver:
 
     async def open(self) -> None:
         ros = self._setup.ros
-        self._publisher = ros.node.create_publisher(
+        self._publisher = ros.publisher(
             interfaces.BehaviorCommand, self._name("command"), qos.COMMANDS
         )
         if self._setup.settings.via is Via.ACTION:
