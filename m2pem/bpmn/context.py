@@ -30,6 +30,7 @@ from m2pem.mission.elements import (
 )
 from m2pem.mission.events import Error, Escalation, Message, MessageEventDefinition, Signal
 from m2pem.mission.expression import Expression, parse, template
+from m2pem.mission.geometry import Geometry
 from m2pem.mission.mission import Lane, MessageFlow, Participant
 
 KEY = re.compile(r"[^\W\d]\w*(?:\.\w+)*")
@@ -159,6 +160,8 @@ class ReadingContext:
     message_flows: list[tuple[MessageFlow, str]] = field(default_factory=list)
     lanes: list[Lane] = field(default_factory=list)
     processes: list[Process] = field(default_factory=list)
+    geometries: dict[str, Geometry] = field(default_factory=dict)
+    """Those that the file has itself, by name."""
     nodes: list[FlowNode] = field(default_factory=list)
     containers: list[Container] = field(default_factory=list)
     """The container of each of `nodes`, in the same order."""

@@ -203,6 +203,14 @@ _TABLE = (
         ),
         prefixed=False,
     ),
+    OwnElement(
+        "geometry",
+        "A route, area or point of the mission, which parameters name.",
+        (Attribute("name", Type.NAME, "its name, instead of the fleet's of that name"),),
+        text="GeoJSON, as in a [fleet's files](fleets.md#routes-areas-and-points)",
+        places=("process",),
+        prefixed=False,
+    ),
 )
 
 ELEMENTS = {element.name: element for element in _TABLE}

@@ -377,6 +377,7 @@ def _look(files: Files, part: Part, name: str, namespace: str) -> Part | None:
 
 
 Root = TypeVar("Root", bound=RootElement)
+T = TypeVar("T")
 Operated = TypeVar("Operated", Signal, Message)
 
 _set = object.__setattr__
@@ -421,6 +422,7 @@ def merge(files: Files, reached: set[Process]) -> Mission:
             context.data_key(store) for context in contexts for store in context.data_stores
         ),
         correlation_properties=_correlation(parts),
+        geometries=_first([context.geometries for context in contexts]),
         library=files.sources(),
     )
 
@@ -465,8 +467,8 @@ def _elements(
     return {element.id: element for element in everything}
 
 
-def _first(tables: list[dict[str, Root]]) -> dict[str, Root]:
-    found: dict[str, Root] = {}
+def _first(tables: list[dict[str, T]]) -> dict[str, T]:
+    found: dict[str, T] = {}
     for table in tables:
         for identifier, root in table.items():
             found.setdefault(identifier, root)

@@ -16,6 +16,7 @@ from m2pem.bpmn.context import ReadingContext, text_of
 from m2pem.bpmn.data import read_data, read_data_flow
 from m2pem.bpmn.events import read_event
 from m2pem.bpmn.gateways import GATEWAYS, read_gateway
+from m2pem.bpmn.geometries import read_geometries
 from m2pem.bpmn.loops import LOOPS, read_loop
 from m2pem.bpmn.rules.attributes import BAD_VALUE, UNKNOWN_ELEMENT
 from m2pem.bpmn.rules.files import NOT_EXECUTED, TOO_DEEP
@@ -174,6 +175,7 @@ def read_process(context: ReadingContext, element: etree._Element) -> None:
         incident_role=(element.get(M2PEM + "incidentRole") or "").strip(),
     )
     context.processes.append(process)
+    read_geometries(context, element, identifier)
     stack = [_frame(context, process, element)]
     while stack:
         frame = stack[-1]

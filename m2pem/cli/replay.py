@@ -170,7 +170,7 @@ def replay_counterexample(
     violation = _violation(file, report, number)
     mission = _mission(file, report, mission_file)
     fleet = fleet_of(fleet_file or DEFAULT_FLEET, mission)
-    ways = known_ways(fleet)
+    ways = known_ways(fleet, mission)
     player = ConformanceRun(mission, fleet, report["process"], report["data"], ways)
     lines = LineFormatter(lambda _: mission, colour=wants_colour(sys.stdout))
     _say(output, f"{violation['property']}: {violation['text']}")

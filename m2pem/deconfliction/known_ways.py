@@ -30,7 +30,7 @@ from m2pem.geo.positions import is_local, local_point
 from m2pem.mission.behavior import Behavior, BehaviorType
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.expression import Expression
-from m2pem.mission.geometry import Point
+from m2pem.mission.geometry import Geometry, Point
 from m2pem.verify.translate.ways import Way
 
 _ON_THE_SPOT = frozenset({"takeoff", "change_altitude", "land"})
@@ -61,8 +61,11 @@ class FleetWays:
 
     anywhere = Stand(None, flies=True)
 
-    def __init__(self, fleet: Fleet) -> None:
+    def __init__(self, fleet: Fleet, geometries: Mapping[str, Geometry] = {}) -> None:
+        """`geometries`: those of the mission."""
         self._fleet = fleet
+        self._geometries = {**fleet.geometries, **geometries}
+        self._changeable = {*fleet.handed_over} - geometries.keys()
         self._frame = LocalFrame(fleet.origin)
         self._regions = regions_of(fleet, self._frame)
         self._known: dict[tuple[object, ...], Way] = {}
@@ -239,10 +242,10 @@ class FleetWays:
             return None
         fleet = self._fleet
         raw = {name: value for name, value in given.items() if not isinstance(value, Expression)}
-        if any(isinstance(value, str) and value in fleet.handed_over for value in raw.values()):
+        if any(isinstance(value, str) and value in self._changeable for value in raw.values()):
             return None
         values, problems = examine(
-            spec, raw, fleet.geometries.get, fleet.vehicles, deferred, fleet.origin
+            spec, raw, self._geometries.get, fleet.vehicles, deferred, fleet.origin
         )
         return None if problems else values
 

@@ -240,7 +240,7 @@ class RunStarter:
         begun = runner.submit(
             StartRun(process_id, dict(data or {}), by, supervisor.handover.by_name(lent))
         )
-        for geometry in supervisor.geometries_given():
+        for geometry in supervisor.geometries_given(loaded):
             runner.post(geometry)
         supervisor.drive(runner)
         try:

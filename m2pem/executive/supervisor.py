@@ -69,6 +69,7 @@ from m2pem.journal.base import Journal
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.geometry import Geometry
 from m2pem.mission.losses import LINK_LOST
+from m2pem.mission.mission import Mission
 from m2pem.mission.values import Value
 from m2pem.plugins import Plugins
 from m2pem.telemetry.bus import Bus
@@ -285,10 +286,17 @@ class Supervisor:
         given = {name: parse_geojson(each.geometry) for name, each in self.handed_over.items()}
         return replace(self.fleet, geometries={**self.fleet.geometries, **given})
 
-    def geometries_given(self) -> list[GeometrySet]:
-        """Return the inputs that hand over what operators have handed over for all runs."""
+    def geometries_given(self, mission: Mission) -> list[GeometrySet]:
+        """Return the inputs that hand over what operators have handed over for all runs.
+
+        A geometry of the mission's own is not replaced by that.
+        """
         given = self.handed_over.items()
-        return [GeometrySet(name, dict(each.geometry), each.by) for name, each in given]
+        return [
+            GeometrySet(name, dict(each.geometry), each.by)
+            for name, each in given
+            if name not in mission.geometries
+        ]
 
     def add(self, run: MissionRun, epoch: int) -> Runner:
         """Return the runner of a run that is to be driven. `epoch`: that of its claim."""
@@ -498,7 +506,12 @@ class Supervisor:
         item = GeometrySet(name, dict(geometry), by)
         if run is None:
             self.handed_over[name] = HandedOver(dict(geometry), by, self.clock.now_us())
-        for runner in self.runners.values() if run is None else [self.runner(run)]:
+        if run is not None:
+            runners = [self.runner(run)]
+        else:
+            every = self.runners.values()
+            runners = [each for each in every if name not in each.run.state.mission.geometries]
+        for runner in runners:
             if not runner.done.is_set():
                 runner.post(item)
 
@@ -544,7 +557,11 @@ class Supervisor:
 
     def _geometry(self, run: str, name: str) -> Geometry | None:
         runner = self.runners.get(run)
-        given = runner.run.state.geometries.get(name) if runner is not None else None
-        if given is None and name in self.handed_over:
-            given = dict(self.handed_over[name].geometry)
-        return self.fleet.geometries.get(name) if given is None else parse_geojson(given)
+        if runner is not None:
+            if name in runner.run.state.geometries:
+                return parse_geojson(runner.run.state.geometries[name])
+            if name in runner.run.state.mission.geometries:
+                return runner.run.state.mission.geometries[name]
+        if name in self.handed_over:
+            return parse_geojson(self.handed_over[name].geometry)
+        return self.fleet.geometries.get(name)

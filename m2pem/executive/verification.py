@@ -42,14 +42,14 @@ PREEMPTED_AT_ANY_TIME = (
 """The note in reports of missions whose tasks may be preempted."""
 
 
-def known_ways(fleet: Fleet) -> KnownWays | None:
-    """Return where the vehicles of a fleet go; None: it has no shared space."""
+def known_ways(fleet: Fleet, mission: Mission) -> KnownWays | None:
+    """Return where the vehicles of a fleet go in a mission; None: it has no shared space."""
     if not fleet.shared_space:
         return None
     # Few fleets need it.
     from m2pem.deconfliction.known_ways import FleetWays  # noqa: PLC0415
 
-    return FleetWays(fleet)
+    return FleetWays(fleet, mission.geometries)
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +101,7 @@ def search_request(
         service_writes=writes,
         timers_in_order=timers_in_order,
         catalogue=arbiters.offered if arbiters is not None else None,
-        ways=known_ways(fleet),
+        ways=known_ways(fleet, mission),
     )
     requirements = collect(Names(mission, fleet, writes, data), spec)
     return SearchRequest(mission, fleet, process, data, options, requirements)

@@ -14,6 +14,7 @@ from m2pem.fleet.parameters import ParameterProblem, examine
 from m2pem.fleet.shortage import Demand, check_shortages
 from m2pem.fleet.space_check import check_space
 from m2pem.fleet.task_findings import TaskFindings
+from m2pem.geo.positions import NO_ORIGIN, geometry_out_of_reach
 from m2pem.mission.behavior import Behavior, BehaviorType, Role, RoleKind, ServiceCall
 from m2pem.mission.catalogue import BehaviorSpec, ParameterKind, ResourceId
 from m2pem.mission.elements import (
@@ -185,7 +186,16 @@ def check_mission(
     findings = [finding for task in mission.activities() for finding in check.task(task)]
     shortages = check_shortages(mission, check.demands)
     roles = check_operator_roles(mission, fleet)
-    return [*findings, *shortages, *_returned(mission, fleet), *roles]
+    drawn = _out_of_reach(mission, fleet)
+    return [*findings, *shortages, *_returned(mission, fleet), *roles, *drawn]
+
+
+def _out_of_reach(mission: Mission, fleet: Fleet) -> Iterator[Finding]:
+    """Geometries of the mission's own that are too far from the fleet's origin."""
+    for name, geometry in mission.geometries.items():
+        if fleet.origin != NO_ORIGIN and (wrong := geometry_out_of_reach(geometry, fleet.origin)):
+            message = f"geometry '{name}': {wrong[0]}"
+            yield Finding(Severity.ERROR, mission.file, 0, "", "out-of-reach", message, wrong[1])
 
 
 def _returned(mission: Mission, fleet: Fleet) -> Iterator[Finding]:
@@ -278,7 +288,7 @@ class _Check:
         filled = check_roles(named, self.fleet, findings)
         matching = [role for role in filled if role.kind.value == behavior.type.value]
         possible = check_needs(behavior, self.mission, self.fleet, self.graph, findings, self.known)
-        check_space(behavior, self.fleet, findings)
+        check_space(behavior, self.fleet, self.mission.geometries, findings)
         if len(named) == len(behavior.roles):
             self._check_role_kinds(behavior, filled, findings)
         takers: list[_Taker] = []
@@ -405,7 +415,7 @@ class _Check:
         lines = {parameter.name: parameter.line for parameter in behavior.parameters}
         literal = {p.name: p.value for p in behavior.parameters if isinstance(p.value, str)}
         deferred = [p.name for p in behavior.parameters if not isinstance(p.value, str)]
-        geometry = self.fleet.geometries.get
+        geometry = {**self.fleet.geometries, **self.mission.geometries}.get
         _, problems = examine(
             taker.spec, literal, geometry, self.fleet.vehicles, deferred, self.fleet.origin
         )
@@ -428,7 +438,8 @@ class _Check:
             remedy = "an operator must hand it over before the task starts"
             severity = Severity.WARNING
         else:
-            hint = problem.remedy or did_you_mean(name, self.fleet.geometries)
+            known = [*self.mission.geometries, *self.fleet.geometries]
+            hint = problem.remedy or did_you_mean(name, known)
             listed = "if an operator hands it over, list it in the fleet's 'handed_over'"
             remedy = f"{hint} {listed}" if hint else listed
             severity = Severity.ERROR

@@ -6,7 +6,7 @@ mission always gives the same fleet.
 
 import math
 from collections import Counter, defaultdict
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from dataclasses import dataclass, field
 
 from m2pem.fleet.behaviors import SHARED
@@ -60,7 +60,7 @@ def fleet_for(mission: Mission) -> Fleet:
             draft.add_targets(task)
     for task in tasks:
         if isinstance(task, Behavior):
-            draft.add_geometries(task)
+            draft.add_geometries(task, mission.geometries)
         elif task.service == DETECTOR_SERVICE and not task.roles:
             draft.add_any_detector()
     return draft.fleet()
@@ -153,9 +153,9 @@ class _Draft:
             if kind is ParameterKind.VEHICLE:
                 self.domains.setdefault(name, Domain.GROUND)
 
-    def add_geometries(self, behavior: Behavior) -> None:
+    def add_geometries(self, behavior: Behavior, known: Container[str]) -> None:
         for name, kind in _names(behavior):
-            if name in self.geometries:
+            if name in self.geometries or name in known:
                 continue
             if kind is ParameterKind.ROUTE:
                 self.geometries[name] = Route(self._route())

@@ -1,5 +1,6 @@
 """The static check of shared space: a team that needs more places than there are can never go."""
 
+from collections.abc import Mapping
 from itertools import pairwise
 
 from m2pem.findings import Severity
@@ -11,20 +12,27 @@ from m2pem.geo.local_frame import LocalFrame
 from m2pem.geo.polygon import convex_hull
 from m2pem.geo.region import region_of
 from m2pem.mission.behavior import Behavior, BehaviorType
-from m2pem.mission.geometry import Area, Route
+from m2pem.mission.geometry import Area, Geometry, Route
 
 COLUMNS = frozenset({"road_following_formation"})
 """Team behaviors whose members follow one another, if no shape is given."""
 
 
-def check_space(behavior: Behavior, fleet: Fleet, findings: TaskFindings) -> None:
+def check_space(
+    behavior: Behavior,
+    fleet: Fleet,
+    geometries: Mapping[str, Geometry],
+    findings: TaskFindings,
+) -> None:
     """Check that a team has a place for each member in the shared spaces of its route or area.
+
+    `geometries`: those of the mission.
 
     The way from where the vehicles are is not known before they start.
     """
     if behavior.type is not BehaviorType.TEAM or behavior.name in ONE_BY_ONE:
         return
-    if not fleet.shared_space or not (ways := _ways(behavior, fleet)):
+    if not fleet.shared_space or not (ways := _ways(behavior, {**fleet.geometries, **geometries})):
         return
     frame = LocalFrame(fleet.origin)
     hulls = [convex_hull(frame.to_local(place) for place in way) for way in ways]
@@ -47,12 +55,14 @@ def check_space(behavior: Behavior, fleet: Fleet, findings: TaskFindings) -> Non
             )
 
 
-def _ways(behavior: Behavior, fleet: Fleet) -> list[tuple[tuple[float, float], ...]]:
+def _ways(
+    behavior: Behavior, geometries: Mapping[str, Geometry]
+) -> list[tuple[tuple[float, float], ...]]:
     """Return the legs of its route, or its area, as (latitude, longitude); [] if not known."""
     for parameter in behavior.parameters:
         if not isinstance(parameter.value, str):
             continue
-        geometry = fleet.geometries.get(parameter.value)
+        geometry = geometries.get(parameter.value)
         if parameter.name == "route" and isinstance(geometry, Route):
             places = [each[:2] for each in geometry.waypoints]
             return list(pairwise(places)) if len(places) > 1 else [tuple(places)]

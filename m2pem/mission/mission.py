@@ -13,6 +13,7 @@ from m2pem.mission.events import (
     RootElement,
     Signal,
 )
+from m2pem.mission.geometry import Geometry
 from m2pem.mission.library import MissionFile, Source
 
 
@@ -69,6 +70,8 @@ class Mission:
     data_stores: frozenset[str] = frozenset()
     """Keys of the data stores, which all processes of a run share (clause 10.4.1)."""
     correlation_properties: tuple[CorrelationProperty, ...] = ()
+    geometries: Mapping[str, Geometry] = field(default_factory=dict, repr=False)
+    """Routes, areas and points that the files have themselves, in place of the fleet's."""
     library: tuple[Source, ...] = field(repr=False, default=())
 
     def process(self, process_id: str | None = None) -> Process:

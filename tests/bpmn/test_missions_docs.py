@@ -72,6 +72,12 @@ def test_the_event_subprocess_has_no_warning() -> None:
     assert [each.id for each in mission.processes[0].event_subprocesses] == ["TooManyFinds"]
 
 
+def test_the_example_of_a_geometry_has_no_warning() -> None:
+    mission = load(definitions(f"{example('<process')}<task id='t'/></process>"))
+    assert mission.warnings == ()
+    assert [*mission.geometries] == ["lane"]
+
+
 def test_the_examples_of_loops_have_no_warning() -> None:
     instances = example('<subProcess id="SurveyField"').replace("...", '<task id="t"/>')
     body = f"{example('<userTask')}{instances}"
@@ -86,7 +92,7 @@ def test_the_examples_of_loops_have_no_warning() -> None:
 
 
 def test_every_example_is_tested() -> None:
-    assert len(EXAMPLES) == 9
+    assert len(EXAMPLES) == 10
 
 
 def test_every_error_that_the_program_throws_is_documented() -> None:

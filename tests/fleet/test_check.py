@@ -22,6 +22,7 @@ from m2pem.mission.behavior import (
 )
 from m2pem.mission.catalogue import BehaviorSpec, ResourceId
 from m2pem.mission.expression import parse
+from m2pem.mission.geometry import Point, Route
 
 from .fleets import PATROL, everything, patrol
 from .missions import READ_LATER, behavior, drive, mission, payload, team, vehicle
@@ -238,6 +239,29 @@ def test_a_geometry_that_operators_hand_over_is_a_warning_until_they_have(fleet:
     assert (finding.rule, finding.severity) == ("unknown-geometry", Severity.WARNING)
     assert finding.remedy == "an operator must hand it over before the task starts"
     assert not check(fleet, task, handed_over=("moon",))
+
+
+def test_a_geometry_of_the_missions_own_is_known_and_stands_in_place_of_the_fleets(
+    fleet: Fleet,
+) -> None:
+    near = (fleet.origin[0], fleet.origin[1], None)
+    own = {"moon": Point(near), "field": Route((near,))}
+    drawn = replace(
+        mission(
+            behavior("goto", vehicle("evsg1"), target="moon"),
+            drive(vehicle("evsg1"), route="field"),
+        ),
+        geometries=own,
+    )
+    assert check_mission(drawn, fleet, everything) == []
+
+
+def test_a_geometry_of_the_missions_own_that_is_too_far_away_is_an_error(fleet: Fleet) -> None:
+    far = {"moon": Point((-fleet.origin[0], fleet.origin[1], None))}
+    drawn = replace(mission(behavior("goto", vehicle("evsg1"), target="moon")), geometries=far)
+    finding = only(check_mission(drawn, fleet, everything))
+    assert finding.rule == "out-of-reach"
+    assert finding.message.startswith("geometry 'moon': ")
 
 
 def test_a_vehicle_that_is_held_and_not_commanded_is_a_warning(fleet: Fleet) -> None:

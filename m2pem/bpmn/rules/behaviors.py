@@ -106,6 +106,14 @@ DUPLICATE_PARAMETER = Rule(
     "a behavior has a parameter twice",
     "keep one of the two",
 )
+BAD_GEOMETRY = Rule(
+    224,
+    "bad-geometry",
+    "missions.md",
+    E,
+    "a route, area or point of the mission has no name of its own, or is no GeoJSON",
+    "the message says what is expected",
+)
 DUPLICATE_PROPERTY = Rule(
     221,
     "duplicate-property",

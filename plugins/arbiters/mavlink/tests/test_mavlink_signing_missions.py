@@ -257,7 +257,10 @@ def test_setup_asks_and_warns_of_a_network(tmp_path: Path) -> None:
     key = write_key(tmp_path)
     file = fleet(tmp_path, more=f", signing: {{key: {key}}}")
     done = invoke(command_line.setup, "--fleet", file, "uav1", input="n\n")
-    assert "Warning: every program that reads what is sent over udpout://192.0.2.1:14550" in done.output
+    assert (
+        "Warning: every program that reads what is sent over udpout://192.0.2.1:14550"
+        in done.output
+    )
     assert f"Send the key of {key} to uav1? [y/N]" in done.output
     assert done.exit_code == 1
     done = invoke(command_line.remove, "--fleet", file, "uav1", input="n\n")

@@ -79,6 +79,7 @@ export const m2pemDescriptor = {
       ],
     },
     { name: "Arg", superClass: ["Element"], properties: ["name", "value"].map(attribute) },
+    { name: "Geometry", superClass: ["Element"], properties: [attribute("name"), text] },
     { name: "AskingTask", extends: ["bpmn:UserTask", "bpmn:GlobalUserTask"], properties: task },
     {
       name: "ServingTask",

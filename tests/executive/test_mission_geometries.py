@@ -1,0 +1,65 @@
+"""Whose geometry of a name a task gets: the run's, the mission's, an operator's, or the fleet's."""
+
+from dataclasses import replace
+
+import pytest
+
+from m2pem.api import BehaviorState
+from m2pem.mission.geometry import Point
+from tests.executive.conftest import World, behavior, fleet, mission, sequence
+
+GATE = '{"type": "Point", "coordinates": [7.002, 50]}'
+OWN = f'<extensionElements><m2pem:geometry name="gate">{GATE}</m2pem:geometry></extensionElements>'
+TO_GATE = '<m2pem:property name="target" value="gate"/>'
+GO = sequence(("Go", behavior("Go", "goto", "ugv1", parameters=TO_GATE)))
+PLAIN = mission(GO)
+DRAWN = mission(GO.replace("<startEvent", f"{OWN}<startEvent", 1))
+FLEET = replace(fleet("ugv1"), geometries={"gate": Point((50.0, 7.001, None))})
+
+
+def given(longitude: float) -> dict[str, object]:
+    return {"type": "Point", "coordinates": [longitude, 50]}
+
+
+async def target_of(world: World, source: bytes) -> float:
+    """The longitude to which a run goes at once, in degrees."""
+    run = await world.executive.control.start(source)
+    await world.fake.until_called("start", f"{run}.b1")
+    world.fake.report(f"{run}.b1", BehaviorState.SUCCEEDED)
+    await world.executive.control.wait(run)
+    target = world.fake.requests[f"{run}.b1"].parameters["target"]
+    assert isinstance(target, Point)
+    return target.position[1]
+
+
+def test_the_missions_own_stands_in_place_of_the_fleets_and_the_operators(play):
+    async def story(world: World):
+        before = await target_of(world, PLAIN), await target_of(world, DRAWN)
+        await world.executive.control.set_geometry("gate", given(7.003), by="anna")
+        return before, (await target_of(world, PLAIN), await target_of(world, DRAWN))
+
+    before, after = play(story, fleet=FLEET)
+    assert before == (7.001, 7.002)
+    assert after == (7.003, 7.002)
+
+
+@pytest.mark.parametrize(("to_the_run", "longitude"), [(True, 7.003), (False, 7.002)])
+def test_one_that_is_handed_over_to_the_run_itself_replaces_it(play, to_the_run, longitude):
+    first = '<m2pem:property name="target" value="[50, 7]"/>'
+    there = behavior("There", "goto", "ugv1", parameters=first)
+    inside = sequence(("There", there), ("Go", behavior("Go", "goto", "ugv1", parameters=TO_GATE)))
+    source = mission(inside.replace("<startEvent", f"{OWN}<startEvent", 1))
+
+    async def story(world: World):
+        control = world.executive.control
+        run = await control.start(source)
+        await world.fake.until_called("start", f"{run}.b1")
+        whose = run if to_the_run else None
+        await control.set_geometry("gate", given(7.003), run=whose, by="anna")
+        world.fake.report(f"{run}.b1", BehaviorState.SUCCEEDED)
+        await world.fake.until_called("start", f"{run}.b2")
+        world.fake.report(f"{run}.b2", BehaviorState.SUCCEEDED)
+        await control.wait(run)
+        return world.fake.requests[f"{run}.b2"].parameters["target"]
+
+    assert play(story, fleet=FLEET).position == (50.0, longitude, None)
