@@ -143,7 +143,16 @@ if TYPE_CHECKING:
     from m2pem.fleet.behaviors import SHARED
     from m2pem.fleet.fleet import Fleet
     from m2pem.geo.fence import Fence
-    from m2pem.geo.geojson import as_geojson, parse_geojson
+    from m2pem.geo.geojson import GeometryError, as_geojson, kind_of, parse_geojson
+    from m2pem.geo.geometry_files import (
+        READ_SUFFIXES,
+        FileFormat,
+        FileProblem,
+        GeometryFile,
+        NamedGeometry,
+        read_geometry_file,
+        write_geometry_file,
+    )
     from m2pem.geo.lawn_mower import lawn_mower, longest_edge_yaw, strip_width_m
     from m2pem.geo.local_frame import EastNorth, LatLon, LocalFrame, distance_m, offset
     from m2pem.geo.polygon import convex_hull, edges_enclose, middle_of
@@ -236,7 +245,11 @@ _MODULES = {
     "m2pem.fleet.behaviors": "SHARED",
     "m2pem.geo.fence": "Fence",
     "m2pem.fleet.fleet": "Fleet",
-    "m2pem.geo.geojson": "as_geojson parse_geojson",
+    "m2pem.geo.geojson": "GeometryError as_geojson kind_of parse_geojson",
+    "m2pem.geo.geometry_files": (
+        "FileFormat FileProblem GeometryFile NamedGeometry READ_SUFFIXES read_geometry_file"
+        " write_geometry_file"
+    ),
     "m2pem.geo.lawn_mower": "lawn_mower longest_edge_yaw strip_width_m",
     "m2pem.geo.local_frame": "EastNorth LatLon LocalFrame distance_m offset",
     "m2pem.geo.polygon": "convex_hull edges_enclose middle_of",
@@ -318,11 +331,20 @@ __all__ = [
     "ExecutiveAddress",
     "ExecutiveStatistics",
     "FencingArbiter",
+    "FileFormat",
+    "FileProblem",
     "Finding",
     "Fleet",
     "FleetBus",
     "Follower",
     "GeoPosition",
+    "GeometryError",
+    "GeometryFile",
+    "NamedGeometry",
+    "READ_SUFFIXES",
+    "kind_of",
+    "read_geometry_file",
+    "write_geometry_file",
     "GoalArbiter",
     "HandedOver",
     "HealthCheck",

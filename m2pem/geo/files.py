@@ -1,12 +1,11 @@
 """Reads the file of a route, area or point: GeoJSON, CSV, QGroundControl `.plan`, `.waypoints`."""
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NoReturn
 
 from m2pem.findings import unreadable_remedy
 from m2pem.geo.csv_waypoints import parse_csv
+from m2pem.geo.file_text import decoded, parsed_json
 from m2pem.geo.geojson import GeometryError, kind_of, parse_geojson
 from m2pem.geo.qgroundcontrol import parse_plan, parse_waypoints
 from m2pem.mission.geometry import Area, Point, Route
@@ -47,34 +46,14 @@ def _read(path: Path, kind: str) -> Point | Route | Area:
         raise GeometryError(f"cannot be read: {error.strerror}; {remedy}") from None
     if len(content) > MAX_BYTES:
         raise GeometryError(f"is larger than {MAX_BYTES:,} bytes")
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise GeometryError("is not UTF-8 text") from None
+    text = decoded(content)
     if path.suffix.lower() == ".waypoints":
         return parse_waypoints(text)
     if path.suffix.lower() == ".csv":
         return parse_csv(text, kind)
-    value = _json(text)
+    value = parsed_json(text)
     if not isinstance(value, Mapping):
         raise GeometryError("a JSON object is expected")
     if path.suffix.lower() == ".plan":
         return parse_plan(value, area=kind == "area")
     return parse_geojson(value)
-
-
-def _json(text: str) -> Any:
-    try:
-        return json.loads(text, parse_constant=_refuse_constant)
-    except json.JSONDecodeError as error:
-        raise GeometryError(f"line {error.lineno}: is not JSON: {error.msg}") from None
-    except RecursionError:
-        raise GeometryError("is nested too deep") from None
-    except GeometryError:
-        raise
-    except ValueError as error:  # a whole number of thousands of digits
-        raise GeometryError(f"is not JSON: {error}") from None
-
-
-def _refuse_constant(name: str) -> NoReturn:
-    raise GeometryError(f"holds {name}, which is not a finite number")

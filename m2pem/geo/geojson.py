@@ -61,7 +61,7 @@ def _written(place: Coordinate) -> list[Any]:
 def _parse(value: object, altitude_frame: str, depth: int) -> Point | Route | Area:
     if not isinstance(value, Mapping):
         raise GeometryError("is not GeoJSON: an object with 'type' is expected")
-    _check_crs(value)
+    check_crs(value)
     kind = value.get("type")
     if kind == "FeatureCollection" and depth == 0:
         features = value.get("features")
@@ -86,7 +86,12 @@ def _parse(value: object, altitude_frame: str, depth: int) -> Point | Route | Ar
     raise GeometryError(f"GeoJSON type {kind!r} is not a route, area or point; {hint}")
 
 
-def _check_crs(value: Mapping[str, Any]) -> None:
+def check_crs(value: Mapping[str, Any]) -> None:
+    """Refuse the old member 'crs' of an object where it names another system than WGS-84.
+
+    Raises:
+        GeometryError: it does.
+    """
     crs = value.get("crs")
     if crs is not None and not any(name in str(crs) for name in ("CRS84", "4326", "4979")):
         raise GeometryError("its 'crs' is not WGS-84; export it as WGS-84 longitude and latitude")

@@ -109,6 +109,9 @@ def refuse_late(connection: HTTPConnection) -> None:
         )
 
 
+FILES = frozenset({"/api/geometries/read"})
+"""Routes that take the bytes of a file; all others take JSON alone."""
+
 LARGEST_BYTES = 10_000_000
 BODY_WITHIN_S = 30.0
 
@@ -129,7 +132,7 @@ class BoundedBodies:
             await self._app(scope, receive, send)
             return
         headers = Headers(scope=scope)
-        refused = self._refused(scope["method"], headers)
+        refused = self._refused(scope["method"], scope["path"], headers)
         if refused is not None:
             # The rest of the body stays unread, so the connection cannot be used again.
             status, why = refused
@@ -137,7 +140,7 @@ class BoundedBodies:
             return
         await self._app(scope, self._bounded(receive), send)
 
-    def _refused(self, method: str, headers: Headers) -> tuple[int, str] | None:
+    def _refused(self, method: str, path: str, headers: Headers) -> tuple[int, str] | None:
         said = headers.get("content-length", "")
         if said and not (said.isascii() and said.isdigit()):
             return 400, "Content-Length must be a number"
@@ -147,8 +150,9 @@ class BoundedBodies:
         if not comes or method in SAFE_METHODS:
             return None
         kind = headers.get("content-type", "").partition(";")[0].strip().lower()
-        if kind != "application/json":
-            return 415, "send application/json"
+        right = "application/octet-stream" if path in FILES else "application/json"
+        if kind not in ("application/json", right):
+            return 415, f"send {right}"
         return None
 
     def _bounded(self, receive: Receive) -> Receive:

@@ -1,0 +1,24 @@
+"""Files of many geometries, as other programs read and write them.
+
+`read_geometry_file` reads any of `READ_SUFFIXES`; `write_geometry_file` writes any `FileFormat`.
+"""
+
+from m2pem.geo.geometry_files.contents import FileProblem, GeometryFile, NamedGeometry
+from m2pem.geo.geometry_files.formats import (
+    MAX_BYTES,
+    READ_SUFFIXES,
+    FileFormat,
+    read_geometry_file,
+    write_geometry_file,
+)
+
+__all__ = [
+    "MAX_BYTES",
+    "READ_SUFFIXES",
+    "FileFormat",
+    "FileProblem",
+    "GeometryFile",
+    "NamedGeometry",
+    "read_geometry_file",
+    "write_geometry_file",
+]

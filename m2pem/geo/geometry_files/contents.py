@@ -1,0 +1,143 @@
+"""What a file of geometries holds: named routes, areas and points, and what is wrong with it."""
+
+import re
+import unicodedata
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from m2pem.findings import Severity
+from m2pem.geo.geojson import GeometryError, kind_of
+from m2pem.mission.geometry import Area, Point, Route
+
+MAX_FEATURES = 1_000
+MAX_POSITIONS = 200_000
+MAX_NAME_CHARACTERS = 100
+
+_NO_NAME = re.compile(r"[^\w.\-]+")
+
+
+@dataclass(frozen=True, slots=True)
+class NamedGeometry:
+    """A geometry with the name by which missions may call it."""
+
+    name: str
+    geometry: Point | Route | Area
+
+
+@dataclass(frozen=True, slots=True)
+class FileProblem:
+    """What is wrong with a file, or with one feature of it, and what would be right.
+
+    ERROR: the feature was left out. WARNING: it was read, and something of it was not kept.
+    `feature`: how people find it in the file; "" means the whole file.
+    """
+
+    severity: Severity
+    feature: str
+    message: str
+    remedy: str = ""
+
+    def __str__(self) -> str:
+        where = f"{self.feature}: " if self.feature else ""
+        remedy = f"; {self.remedy}" if self.remedy else ""
+        return f"{where}{self.message}{remedy}"
+
+
+@dataclass(frozen=True, slots=True)
+class GeometryFile:
+    """What was read of a file. Each geometry is whole, and has a name of its own."""
+
+    geometries: tuple[NamedGeometry, ...]
+    problems: tuple[FileProblem, ...]
+
+
+class FeatureProblemError(GeometryError):
+    """A `GeometryError` with what would be right."""
+
+    def __init__(self, message: str, remedy: str) -> None:
+        super().__init__(message)
+        self.remedy = remedy
+
+
+class Contents:
+    """Collects the geometries and problems of one file. `stem`: the file's name without suffix."""
+
+    def __init__(self, stem: str) -> None:
+        self._stem = stem
+        self._geometries: list[NamedGeometry] = []
+        self._names: set[str] = set()
+        self._problems: list[FileProblem] = []
+        self._positions = 0
+
+    @contextmanager
+    def feature(self, name: str) -> Iterator[None]:
+        """Turn a `GeometryError` of the block into a problem of the feature with that name."""
+        try:
+            yield
+        except FeatureProblemError as error:
+            self._problems.append(FileProblem(Severity.ERROR, name, str(error), error.remedy))
+        except GeometryError as error:
+            self._problems.append(FileProblem(Severity.ERROR, name, str(error)))
+
+    def add(self, name: str, geometry: Point | Route | Area) -> None:
+        """Add a geometry under a valid and unique form of its name.
+
+        Raises:
+            GeometryError: the file has too many features or positions.
+        """
+        if len(self._geometries) >= MAX_FEATURES:
+            raise FeatureProblemError(
+                f"is beyond the first {MAX_FEATURES} features", "split the file"
+            )
+        count = _count(geometry)
+        if self._positions + count > MAX_POSITIONS:
+            raise FeatureProblemError(
+                f"the file has more than {MAX_POSITIONS:,} positions", "simplify its lines"
+            )
+        self._positions += count
+        self._geometries.append(NamedGeometry(self._unique(name, geometry), geometry))
+
+    def warn(self, feature: str, message: str, remedy: str = "") -> None:
+        """Add a warning: the feature was read, and something of it was not kept."""
+        self._problems.append(FileProblem(Severity.WARNING, feature, message, remedy))
+
+    def whole(self) -> GeometryFile:
+        """Return what was collected. A file without geometry and problem is a problem."""
+        if not self._geometries and not self._problems:
+            self._problems.append(
+                FileProblem(
+                    Severity.ERROR,
+                    "",
+                    "has no route, area or point",
+                    "export the features themselves, not links to them or styles",
+                )
+            )
+        return GeometryFile(tuple(self._geometries), tuple(self._problems))
+
+    def _unique(self, name: str, geometry: Point | Route | Area) -> str:
+        valid = valid_name(name) or valid_name(self._stem) or kind_of(geometry)
+        unique, number = valid, 1
+        while unique in self._names:
+            number += 1
+            suffix = f"_{number}"
+            unique = valid[: MAX_NAME_CHARACTERS - len(suffix)] + suffix
+        self._names.add(unique)
+        return unique
+
+
+def valid_name(text: str) -> str:
+    """Return a text as a name of fleets and missions: letters, digits, `-`, `_` and points.
+
+    It is "" if nothing of the text can be kept.
+    """
+    name = _NO_NAME.sub("_", unicodedata.normalize("NFC", text))
+    return name.strip("._")[:MAX_NAME_CHARACTERS].rstrip(".")
+
+
+def _count(geometry: Point | Route | Area) -> int:
+    if isinstance(geometry, Route):
+        return len(geometry.waypoints)
+    if isinstance(geometry, Area):
+        return sum(len(ring) for ring in geometry.rings)
+    return 1

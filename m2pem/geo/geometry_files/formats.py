@@ -1,0 +1,83 @@
+"""The formats of geometry files: which suffix is read by what, and what writes each format."""
+
+from collections.abc import Callable, Mapping, Sequence
+from enum import StrEnum
+from pathlib import PurePath
+from typing import TypeAlias
+
+from m2pem.geo.geojson import GeometryError
+from m2pem.geo.geometry_files.contents import (
+    Contents,
+    FeatureProblemError,
+    GeometryFile,
+    NamedGeometry,
+)
+from m2pem.geo.geometry_files.geojson_file import read_geojson, write_geojson
+
+MAX_BYTES = 10_000_000
+
+Reader: TypeAlias = Callable[[bytes, Contents], None]
+
+_READERS: Mapping[str, Reader] = {
+    ".geojson": read_geojson,
+    ".json": read_geojson,
+}
+
+READ_SUFFIXES = tuple(_READERS)
+
+
+class FileFormat(StrEnum):
+    """A format that is written; each is the suffix of its files without the point."""
+
+    GEOJSON = "geojson"
+    KML = "kml"
+    CSV = "csv"
+    PLAN = "plan"
+    WAYPOINTS = "waypoints"
+
+
+_HINTS = {
+    ".shp": "put it into one .zip with its .dbf, .shx and .prj",
+    ".gpx": "convert it to .kml or .geojson",
+    ".gpkg": "export the layer as .geojson",
+}
+
+
+def read_geometry_file(name: str, content: bytes) -> GeometryFile:
+    """Read all routes, areas and points of a file. `name`: of the file; its suffix says what it is.
+
+    A feature that cannot be read is left out whole, and is a problem. Nothing is raised for bad
+    input.
+    """
+    path = PurePath(name)
+    contents = Contents(path.stem)
+    with contents.feature(""):
+        suffix = path.suffix.lower()
+        reader = _READERS.get(suffix)
+        if reader is None:
+            known = ", ".join(READ_SUFFIXES)
+            raise FeatureProblemError(
+                f"has the suffix {suffix!r}" if suffix else "its name has no suffix",
+                _HINTS.get(suffix, f"one of {known} is read"),
+            )
+        if len(content) > MAX_BYTES:
+            raise FeatureProblemError(
+                f"is larger than {MAX_BYTES / 1_000_000:g} MB", "split it, or simplify its lines"
+            )
+        reader(content, contents)
+    return contents.whole()
+
+
+def write_geometry_file(
+    file_format: FileFormat, geometries: Sequence[NamedGeometry], altitude_m: float | None = None
+) -> bytes:
+    """Return geometries as a file.
+
+    `altitude_m`: of waypoints that have none, for the formats whose waypoints need one.
+
+    Raises:
+        GeometryError: the format cannot hold these geometries; the message says why.
+    """
+    if file_format is FileFormat.GEOJSON:
+        return write_geojson(geometries)
+    raise GeometryError(f"{file_format} is not written yet")
