@@ -93,7 +93,7 @@ async def test_a_role_says_what_it_needs(desk: Desk) -> None:
     await page.get_by_label("Who", exact=False).first.select_option("Chosen when the task starts")
     await page.get_by_label("What it must be or have").fill("vehicle.domain == 'ground'")
     await page.get_by_text("More about the choice").click()
-    await page.get_by_label("Wait for at most").fill("PT10M")
+    await page.get_by_label("Wait for at most").fill("10 min")
     await page.get_by_label("Wait for at most").blur()
     await Drawing(page).save()
     mission = load_mission(desk.executive.missions / "vignette1.bpmn")

@@ -96,6 +96,10 @@ export const editor = {
     general: "General",
   },
   fields: { required: "Required" },
+  durations: {
+    example: "5 min",
+    wrong: "Write how long, for example 30 s, 5 min or 1 h 30 min.",
+  },
   rows: { up: "Move {row} up", down: "Move {row} down", remove: "Remove {row}" },
   general: {
     name: "Name",
@@ -175,7 +179,7 @@ export const editor = {
       store: { label: "Store the choice as", hint: "Later tasks read it: ${surveyor}." },
       wait: {
         label: "Wait for at most",
-        hint: "For example PT10M, or unlimited. Else the task does not wait.",
+        hint: "For example 10 min, or unlimited. Else the task does not wait.",
       },
       priority: { label: "Priority", hint: "The greatest number is served first. Else 0." },
       onLoss: {
@@ -221,7 +225,6 @@ export const editor = {
     anybody: "anybody",
     timeout: "Timeout",
     timeoutHint: "Then the task ends with error PROMPT_TIMEOUT",
-    noDuration: "Write a duration such as PT5M.",
   },
   call: {
     called: "Process",
@@ -303,10 +306,15 @@ export const editor = {
     kind: "Fires",
     kinds: { timeDuration: "After", timeDate: "At", timeCycle: "Again and again" },
     examples: { timeDuration: "PT30S", timeDate: "2026-01-31T12:00:00Z", timeCycle: "R3/PT10S" },
+    shown: {
+      timeDuration: "30 s",
+      timeDate: "2026-01-31T12:00:00Z",
+      timeCycle: "3 times every 10 s",
+    },
     hints: {
-      timeDuration: "PT30S is 30 seconds, PT5M five minutes, PT1H an hour",
+      timeDuration: "For example 30 s, 5 min or 1 h 30 min",
       timeDate: "A date and time with its zone; Z is UTC",
-      timeCycle: "R3/PT10S: three times, every 10 seconds; or a cron text",
+      timeCycle: "For example 3 times every 10 s, or every 5 min; or a cron text",
     },
     missing: "Say when it fires.",
   },

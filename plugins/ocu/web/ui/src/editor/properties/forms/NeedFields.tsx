@@ -1,6 +1,7 @@
 // What a role needs of the vehicle or payload that is chosen for it, and how long its task waits.
 import { strings } from "../../../strings";
 import { isByNeed, NEEDS, WAITS, type Need, type NeedName, type Role } from "../../moddle/behavior";
+import { DurationField } from "../fields/DurationField";
 import { TextField } from "../fields/TextField";
 import type { FormProps } from "../form";
 import { ExpressionField } from "./ExpressionField";
@@ -30,6 +31,7 @@ export function NeedFields({ form, index, role, write }: NeedFieldsProps) {
       value: need[name] ?? "",
       write: (value: string) => change(name, value),
     };
+    if (name === "wait") return <DurationField key={name} {...common} others={["unlimited"]} />;
     return name === "requires" || name === "prefer" ? (
       <ExpressionField key={name} form={form} {...common} />
     ) : (

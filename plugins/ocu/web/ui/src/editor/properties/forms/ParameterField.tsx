@@ -4,6 +4,7 @@ import { fill, strings } from "../../../strings";
 import { titleOf } from "../../blocks/blocks";
 import type { EditorContext } from "../../panels/panel";
 import type { Catalogue } from "../../session/catalogue";
+import { quantityOf } from "../../session/durations";
 import { defaultOf, examine, unitsOf, written, type Wrong } from "../../session/quantities";
 import { ComboField } from "../fields/ComboField";
 import type { Suggestion } from "../fields/Listbox";
@@ -29,7 +30,7 @@ export function ParameterField({ editor, parameter, value, write, error }: Param
     required: parameter.required,
     unit: unitsOf(parameter.kind)[0],
     value,
-    write,
+    write: parameter.kind === "duration" ? (said: string) => write(quantityOf(said)) : write,
     placeholder: defaultOf(parameter) || exampleOf(parameter),
     hint: hintOf(parameter),
     error: error ?? (wrong && describe(wrong)),

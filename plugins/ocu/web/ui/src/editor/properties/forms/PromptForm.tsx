@@ -9,13 +9,13 @@ import {
   type PromptUse,
 } from "../../moddle/prompts";
 import { ComboField } from "../fields/ComboField";
+import { DurationField } from "../fields/DurationField";
 import { TextField } from "../fields/TextField";
 import { apply, factoryOf, objectOf, type FormProps } from "../form";
 import { Rows } from "./Rows";
 
 const words = strings.editor.prompt;
 const ROLES = ["viewer", "operator", "commander"];
-const DURATION = /^P(?!$)(\d+Y)?(\d+M)?(\d+W)?(\d+D)?(T(?!$)(\d+H)?(\d+M)?([\d.]+S)?)?$/;
 
 export function PromptForm(form: FormProps) {
   const task = objectOf(form);
@@ -75,15 +75,12 @@ export function PromptForm(form: FormProps) {
         suggestions={ROLES.slice(1).map((value) => ({ value }))}
         write={(role) => write({ role: role.trim() })}
       />
-      <TextField
+      <DurationField
         id="m2-prompt-timeout"
         label={words.timeout}
-        mono
         value={prompt.timeout}
-        placeholder="PT5M"
         hint={words.timeoutHint}
-        error={isDuration(prompt.timeout) ? undefined : words.noDuration}
-        write={(timeout) => write({ timeout: timeout.trim() })}
+        write={(timeout) => write({ timeout })}
       />
     </>
   );
@@ -137,8 +134,4 @@ export function valueFrom(label: string): string {
     .toLowerCase()
     .replace(/[^\p{L}\p{N}]+/gu, "_");
   return joined.replace(/^_+|_+$/g, "");
-}
-
-function isDuration(value: string): boolean {
-  return value === "" || /[$#]\{|^\s*=/.test(value) || DURATION.test(value);
 }

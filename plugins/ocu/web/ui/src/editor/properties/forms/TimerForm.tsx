@@ -2,6 +2,8 @@
 import { strings } from "../../../strings";
 import { isA, list, type ModdleElement } from "../../moddle/moddle";
 import { expressionProperties, expressionText } from "../expressions";
+import { isoCycleOf, shownCycle } from "../../session/durations";
+import { DurationField } from "../fields/DurationField";
 import { SelectField } from "../fields/SelectField";
 import { TextField } from "../fields/TextField";
 import { factoryOf, objectOf, set, type FormProps } from "../form";
@@ -24,6 +26,17 @@ export function TimerForm(form: FormProps) {
     const written = expressionProperties(factoryOf(form), timer, next, said || " ");
     set(form, timer, { ...cleared, ...(said === "" && next === kind ? {} : written) });
   };
+  const isCycle = kind === "timeCycle";
+  const field = {
+    id: "m2-timer-value",
+    label: words.kinds[kind],
+    required: true,
+    value: isCycle ? shownCycle(body) : body,
+    placeholder: words.shown[kind],
+    hint: words.hints[kind],
+    error: body === "" ? words.missing : undefined,
+    write: (said: string) => write(kind, isCycle ? isoCycleOf(said) : said.trim()),
+  };
   return (
     <>
       <SelectField
@@ -33,17 +46,7 @@ export function TimerForm(form: FormProps) {
         options={KINDS.map((value) => ({ value, label: words.kinds[value] }))}
         write={(next) => write(next as Kind, words.examples[next as Kind])}
       />
-      <TextField
-        id="m2-timer-value"
-        label={words.kinds[kind]}
-        required
-        mono
-        value={body}
-        placeholder={words.examples[kind]}
-        hint={words.hints[kind]}
-        error={body === "" ? words.missing : undefined}
-        write={(said) => write(kind, said.trim())}
-      />
+      {kind === "timeDuration" ? <DurationField {...field} /> : <TextField {...field} mono />}
     </>
   );
 }
