@@ -20,6 +20,7 @@ from m2pem_plugin_web.problems import ProblemModel, handle_problems
 from m2pem_plugin_web.rest import (
     catalogue,
     checks,
+    fleet_commands,
     geometries,
     incidents,
     missions,
@@ -54,6 +55,7 @@ def routers_of(
         steering.router(control, hub),
         steering.prompt_router(control, hub),
         steering.resource_router(control),
+        fleet_commands.router(control, hub),
         incidents.router(control),
         missions.router(control, folder),
         missions.template_router(),

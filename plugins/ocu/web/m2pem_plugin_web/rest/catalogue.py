@@ -40,12 +40,15 @@ class OriginModel(BaseModel):
 
 
 class VehicleModel(BaseModel):
-    """A vehicle."""
+    """A vehicle. `host`: of its arbiter, "" for the executive's own. `failsafe`: what the fleet
+    file says that the vehicle does by itself when its link is lost; "": nothing."""
 
     id: str
     domain: str
     manned: bool
     arbiter: str
+    host: str
+    failsafe: str
     payloads: list[str]
 
 
@@ -149,6 +152,8 @@ def _fleet(fleet: Fleet) -> FleetModel:
                 domain=each.domain.value,
                 manned=each.manned,
                 arbiter=each.arbiter,
+                host=each.host,
+                failsafe=each.failsafe,
                 payloads=list(each.payloads),
             )
             for each in fleet.vehicles.values()
