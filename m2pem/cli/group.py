@@ -44,6 +44,8 @@ COMMANDS = {
     "answer": "Answer a prompt of a run that is running on this host.",
     "incidents": "List the errors about which operators must decide.",
     "resolve": "Decide about an incident of a run that is running on this host.",
+    "take": "Take a vehicle or payload from the missions, to steer it by hand.",
+    "give-back": "Give a vehicle or payload that an operator has taken back to the missions.",
     "signal": "Send a signal to a run that is running on this host.",
     "stop": "Stop a run that is running on this host, or all of them.",
     "pause": "Pause a run that is running on this host.",
@@ -60,7 +62,7 @@ COMMANDS = {
 
 
 _RUN_CONTROL = frozenset({"answer", "continue", "pause", "signal", "stop"})
-_MODULES = {**dict.fromkeys(_RUN_CONTROL, "run_control"), "resolve": "incidents"}
+_MODULES = {**dict.fromkeys(_RUN_CONTROL, "run_control"), "resolve": "incidents", "give-back": "take"}
 
 
 def built_in(name: str) -> click.Command:
