@@ -9,6 +9,7 @@ from starlette.types import ASGIApp
 
 from m2pem_plugin_web import pages, probes
 from m2pem_plugin_web import tiles as map_tiles
+from m2pem_plugin_web.access.compression import CompressedAnswers
 from m2pem_plugin_web.access.guard import Guard
 from m2pem_plugin_web.access.requests import BoundedBodies, SafeHeaders
 from m2pem_plugin_web.access.sign_in import Entry
@@ -85,7 +86,7 @@ def create_app(
     handle_problems(app, settings.missions)
     app.openapi = lambda: _described(app)  # type: ignore[method-assign]
     guard = Guard(
-        BoundedBodies(app),
+        BoundedBodies(CompressedAnswers(app)),
         entry=entry,
         names=settings.names,
         scheme=settings.scheme,

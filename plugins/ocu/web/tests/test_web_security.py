@@ -301,6 +301,7 @@ async def test_a_body_that_does_not_come_is_given_up() -> None:
     scope = {
         "type": "http",
         "method": "POST",
+        "path": "/api/stop",
         "headers": [(b"content-type", b"application/json"), (b"content-length", b"2")],
     }
     told = iter([{"type": "http.request", "body": b"{", "more_body": True}])

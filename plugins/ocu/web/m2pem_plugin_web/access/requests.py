@@ -1,6 +1,6 @@
 """Checks of every request before its route: host and origin, age, size, session; and safe headers.
 
-The order: `SafeHeaders` outside, then `Guard`, then `BoundedBodies`.
+The order: `SafeHeaders` outside, then `Guard`, then `BoundedBodies`, then `CompressedAnswers`.
 """
 
 import asyncio
