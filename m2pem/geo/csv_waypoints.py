@@ -5,7 +5,7 @@ lat_deg,lon_deg,alt_m
 """
 
 import csv
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from io import StringIO
 
@@ -16,7 +16,7 @@ from m2pem.units import UNITS, Dimension
 
 _EXAMPLE = "lat_deg,lon_deg,alt_m"
 _QUANTITIES = {"lat": "deg", "lon": "deg", "alt": "m"}
-_OTHER_NAMES = {
+OTHER_NAMES = {
     "latitude": "lat",
     "longitude": "lon",
     "lng": "lon",
@@ -24,7 +24,7 @@ _OTHER_NAMES = {
     "altitude": "alt",
     "height": "alt",
 }
-_METRES = UNITS[Dimension.DISTANCE]
+METRES = UNITS[Dimension.DISTANCE]
 _RADIANS = UNITS[Dimension.ANGLE]
 
 
@@ -39,7 +39,7 @@ def parse_csv(text: str, kind: str) -> Point | Route | Area:
     Raises:
         GeometryError: a column without its unit, or of another; a row that cannot be read.
     """
-    rows = _rows(text)
+    rows = csv_rows(text)
     columns = _columns(*next(rows, (1, [""])))
     positions: list[Coordinate] = []
     frames: dict[str, int] = {}
@@ -49,25 +49,29 @@ def parse_csv(text: str, kind: str) -> Point | Route | Area:
                 f"line {line}: has {len(row)} columns where the header has {len(columns)}"
             )
         cells = {column.name: (cell, column) for cell, column in zip(row, columns, strict=True)}
-        positions.append(_position(cells, f"line {line}"))
-        frames.setdefault(_frame(cells, f"line {line}"), line)
+        positions.append(csv_position(cells, f"line {line}"))
+        frames.setdefault(csv_frame(cells, f"line {line}"), line)
     if len(frames) > 1:
         (first, _), (second, line) = list(frames.items())[:2]
         raise GeometryError(f"line {line}: altitude_frame is {second!r}, but {first!r} before")
-    return _geometry(positions, next(iter(frames), "relative"), kind)
+    return positions_as(positions, next(iter(frames), "relative"), kind)
 
 
 @dataclass(frozen=True, slots=True)
-class _Column:
+class Column:
     """A column's name ("lat", "lon", "alt" or "altitude_frame") and what makes its values SI."""
 
     name: str
     scale: float = 1.0
 
 
-def _rows(text: str) -> Iterator[tuple[int, list[str]]]:
-    """The rows with their lines, without spaces around their cells."""
-    reader = csv.reader(StringIO(text), strict=True, skipinitialspace=True)
+def csv_rows(text: str, delimiter: str = ",") -> Iterator[tuple[int, list[str]]]:
+    """Yield the rows with their lines, without spaces around their cells.
+
+    Raises:
+        GeometryError: it is not CSV.
+    """
+    reader = csv.reader(StringIO(text), strict=True, skipinitialspace=True, delimiter=delimiter)
     try:
         for row in reader:
             cells = [cell.strip() for cell in row]
@@ -77,7 +81,7 @@ def _rows(text: str) -> Iterator[tuple[int, list[str]]]:
         raise GeometryError(f"line {reader.line_num}: is not CSV: {error}") from None
 
 
-def _columns(line: int, header: Sequence[str]) -> list[_Column]:
+def _columns(line: int, header: Sequence[str]) -> list[Column]:
     if len(header) == 1 and any(separator in header[0] for separator in ";\t|"):
         raise GeometryError(f"line {line}: columns are separated by commas: {_EXAMPLE}")
     columns = [_column(name, f"line {line}") for name in header]
@@ -94,13 +98,13 @@ def _columns(line: int, header: Sequence[str]) -> list[_Column]:
     return columns
 
 
-def _column(header: str, where: str) -> _Column:
+def _column(header: str, where: str) -> Column:
     if header == "altitude_frame":
-        return _Column(header)
+        return Column(header)
     quantity, _, unit = header.partition("_")
     if quantity not in _QUANTITIES:
         known = [f"{name}_{unit}" for name, unit in _QUANTITIES.items()] + ["altitude_frame"]
-        other = _OTHER_NAMES.get(quantity.lower(), quantity.lower())
+        other = OTHER_NAMES.get(quantity.lower(), quantity.lower())
         right = f"{other}_{_QUANTITIES[other]}" if other in _QUANTITIES else ""
         hint = f"did you mean '{right}'?" if right else suggest(header, known, "columns")
         raise GeometryError(f"{where}: column '{header}' is not known; {hint}")
@@ -108,19 +112,24 @@ def _column(header: str, where: str) -> _Column:
     if not unit:
         raise GeometryError(f"{where}: column '{header}' has no unit; write '{header}_{expected}'")
     if quantity == "alt":
-        if unit not in _METRES:
-            hint = suggest(unit, _METRES, "units of length")
+        if unit not in METRES:
+            hint = suggest(unit, METRES, "units of length")
             raise GeometryError(f"{where}: column '{header}': {unit!r} is no length; {hint}")
-        return _Column(quantity, _METRES[unit])
+        return Column(quantity, METRES[unit])
     if unit != expected:
         also = ": convert it" if unit in _RADIANS else ""
         raise GeometryError(
             f"{where}: column '{header}': positions are in degrees, '{quantity}_deg'{also}"
         )
-    return _Column(quantity)
+    return Column(quantity)
 
 
-def _position(cells: dict[str, tuple[str, _Column]], where: str) -> Coordinate:
+def csv_position(cells: Mapping[str, tuple[str, Column]], where: str) -> Coordinate:
+    """Return the position of a row. `cells`: by the names of their columns.
+
+    Raises:
+        GeometryError: latitude, longitude or altitude is not a number, or is out of range.
+    """
     numbers: dict[str, float | None] = {"alt": None}
     for name in ("lat", "lon", "alt"):
         text, column = cells.get(name, ("", None))
@@ -134,7 +143,12 @@ def _position(cells: dict[str, tuple[str, _Column]], where: str) -> Coordinate:
     return coordinate(numbers["lat"], numbers["lon"], numbers["alt"], where)
 
 
-def _frame(cells: dict[str, tuple[str, _Column]], where: str) -> str:
+def csv_frame(cells: Mapping[str, tuple[str, Column]], where: str) -> str:
+    """Return the altitude frame of a row; "relative" if it names none.
+
+    Raises:
+        GeometryError: the frame is not known.
+    """
     frame = cells["altitude_frame"][0] if "altitude_frame" in cells else ""
     if frame and frame not in ALTITUDE_FRAMES:
         hint = suggest(frame, ALTITUDE_FRAMES, "frames")
@@ -142,7 +156,12 @@ def _frame(cells: dict[str, tuple[str, _Column]], where: str) -> str:
     return frame or "relative"
 
 
-def _geometry(positions: list[Coordinate], frame: str, kind: str) -> Point | Route | Area:
+def positions_as(positions: Sequence[Coordinate], frame: str, kind: str) -> Point | Route | Area:
+    """Return positions as a geometry of `kind`: "route", "area" or "point".
+
+    Raises:
+        GeometryError: too few positions, too many of a point, or the ring bounds no area.
+    """
     if not positions:
         raise GeometryError("has no position below its header")
     if kind == "point":

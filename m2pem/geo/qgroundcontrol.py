@@ -10,7 +10,7 @@ from typing import Any
 from m2pem.geo.geojson import GeometryError, checked, coordinate
 from m2pem.mission.geometry import Area, Coordinate, Route
 
-_PLACE_COMMANDS = frozenset({16, 17, 18, 19, 21, 22, 31, 82, 84, 85})
+PLACE_COMMANDS = frozenset({16, 17, 18, 19, 21, 22, 31, 82, 84, 85})
 """MAV_CMD_NAV_: waypoint, loiter (three kinds), land, takeoff, loiter to altitude, spline, VTOL."""
 
 _GROUND_COMMANDS = frozenset({21, 22, 84, 85})
@@ -18,7 +18,7 @@ _GROUND_COMMANDS = frozenset({21, 22, 84, 85})
 
 _FRAMES = {0: "amsl", 5: "amsl", 3: "relative", 6: "relative", 10: "terrain", 11: "terrain"}
 
-_WPL_HEADER = "QGC WPL 110"
+WPL_HEADER = "QGC WPL 110"
 _WPL_COLUMNS = 12
 
 
@@ -28,13 +28,23 @@ def parse_plan(plan: Mapping[str, Any], area: bool) -> Route | Area:
     Raises:
         GeometryError: not a plan, waypoints of different altitude frames, no or several polygons.
     """
+    items = plan_items(plan)
+    return _plan_area(plan, items) if area else _plan_route(items)
+
+
+def plan_items(plan: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
+    """Return the mission items of a `.plan`.
+
+    Raises:
+        GeometryError: it is not a plan.
+    """
     if plan.get("fileType") != "Plan":
         raise GeometryError("is not a QGroundControl plan: 'fileType' is not 'Plan'")
     mission = plan.get("mission")
     items = mission.get("items") if isinstance(mission, Mapping) else None
     if not isinstance(items, list) or not all(isinstance(item, Mapping) for item in items):
         raise GeometryError("mission.items: a list of items is expected")
-    return _plan_area(plan, items) if area else _plan_route(items)
+    return items
 
 
 def _plan_route(items: Sequence[Mapping[str, Any]]) -> Route:
@@ -44,13 +54,23 @@ def _plan_route(items: Sequence[Mapping[str, Any]]) -> Route:
         if item.get("type") != "SimpleItem":
             kind = item.get("complexItemType", item.get("type"))
             raise GeometryError(f"{where}: a {kind!r} item is no waypoint; use it as an area")
-        params = item.get("params")
-        if not isinstance(params, list) or len(params) != 7:
-            raise GeometryError(f"{where}.params: seven numbers are expected")
-        place = _place(item.get("command"), params[4], params[5], params[6], where)
+        place = simple_item_place(item, where)
         if place is not None:
-            places.append((_frame(item.get("frame"), where), place))
-    return _route(places)
+            places.append(place)
+    return route_of_items(places)
+
+
+def simple_item_place(item: Mapping[str, Any], where: str) -> tuple[int, Coordinate] | None:
+    """Return the MAV_FRAME and the place of a simple item; None if it commands no place.
+
+    Raises:
+        GeometryError: it has not seven numbers, or an unknown frame.
+    """
+    params = item.get("params")
+    if not isinstance(params, list) or len(params) != 7:
+        raise GeometryError(f"{where}.params: seven numbers are expected")
+    place = _place(item.get("command"), params[4], params[5], params[6], where)
+    return None if place is None else (_frame(item.get("frame"), where), place)
 
 
 def _plan_area(plan: Mapping[str, Any], items: Sequence[Mapping[str, Any]]) -> Area:
@@ -69,6 +89,15 @@ def _plan_area(plan: Mapping[str, Any], items: Sequence[Mapping[str, Any]]) -> A
             f"has {len(polygons)} survey and inclusion-fence polygons; exactly one is expected"
         )
     where, corners = polygons[0]
+    return plan_polygon(corners, where)
+
+
+def plan_polygon(corners: object, where: str) -> Area:
+    """Return a list of [latitude, longitude] as an area.
+
+    Raises:
+        GeometryError: there are less than three, or they bound no area.
+    """
     if not isinstance(corners, list) or len(corners) < 3:
         raise GeometryError(f"{where}: at least three corners are expected")
     ring = tuple(_corner(corner, f"{where}[{index}]") for index, corner in enumerate(corners))
@@ -90,8 +119,8 @@ def parse_waypoints(text: str) -> Route:
         GeometryError: another header, a row that cannot be read, rows of different frames.
     """
     lines = text.splitlines()
-    if not lines or lines[0].strip() != _WPL_HEADER:
-        raise GeometryError(f"is not a waypoint file: line 1 is not '{_WPL_HEADER}'")
+    if not lines or lines[0].strip() != WPL_HEADER:
+        raise GeometryError(f"is not a waypoint file: line 1 is not '{WPL_HEADER}'")
     places: list[tuple[int, Coordinate]] = []
     for number, line in enumerate(lines[1:], start=2):
         if not line.strip():
@@ -109,13 +138,13 @@ def parse_waypoints(text: str) -> Route:
         place = None if home else _place(command, latitude, longitude, altitude, where)
         if place is not None:
             places.append((_frame(frame, where), place))
-    return _route(places)
+    return route_of_items(places)
 
 
 def _place(
     command: object, latitude: object, longitude: object, altitude: object, where: str
 ) -> Coordinate | None:
-    if not isinstance(command, int) or command not in _PLACE_COMMANDS:
+    if not isinstance(command, int) or command not in PLACE_COMMANDS:
         return None
     if command in _GROUND_COMMANDS and not (latitude or longitude):
         return None
@@ -128,7 +157,12 @@ def _frame(frame: object, where: str) -> int:
     return frame
 
 
-def _route(places: Sequence[tuple[int, Coordinate]]) -> Route:
+def route_of_items(places: Sequence[tuple[int, Coordinate]]) -> Route:
+    """Return places with their MAV_FRAMEs as a route.
+
+    Raises:
+        GeometryError: there is none, or their altitude frames differ.
+    """
     if not places:
         raise GeometryError("has no waypoint")
     frames = sorted({_FRAMES[frame] for frame, _ in places})

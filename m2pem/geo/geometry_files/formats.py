@@ -12,15 +12,37 @@ from m2pem.geo.geometry_files.contents import (
     GeometryFile,
     NamedGeometry,
 )
+from m2pem.geo.geometry_files.csv_file import read_csv, write_csv
 from m2pem.geo.geometry_files.geojson_file import read_geojson, write_geojson
+from m2pem.geo.geometry_files.kml_file import read_kml, read_kmz, write_kml
+from m2pem.geo.geometry_files.mission_plans import (
+    read_plan,
+    read_waypoints,
+    write_plan,
+    write_waypoints,
+)
 
 MAX_BYTES = 10_000_000
 
 Reader: TypeAlias = Callable[[bytes, Contents], None]
 
+
+def _read_shapefiles(content: bytes, contents: Contents) -> None:
+    # Loaded when needed: few files are shapefiles, and every command line reads fleets.
+    from m2pem.geo.geometry_files.shapefile_zip import read_shapefiles  # noqa: PLC0415
+
+    read_shapefiles(content, contents)
+
+
 _READERS: Mapping[str, Reader] = {
     ".geojson": read_geojson,
     ".json": read_geojson,
+    ".kml": read_kml,
+    ".kmz": read_kmz,
+    ".csv": read_csv,
+    ".plan": read_plan,
+    ".waypoints": read_waypoints,
+    ".zip": _read_shapefiles,
 }
 
 READ_SUFFIXES = tuple(_READERS)
@@ -78,6 +100,14 @@ def write_geometry_file(
     Raises:
         GeometryError: the format cannot hold these geometries; the message says why.
     """
-    if file_format is FileFormat.GEOJSON:
-        return write_geojson(geometries)
-    raise GeometryError(f"{file_format} is not written yet")
+    if not geometries:
+        raise GeometryError("there is nothing to write: choose a route, area or point")
+    if file_format is FileFormat.KML:
+        return write_kml(geometries)
+    if file_format is FileFormat.CSV:
+        return write_csv(geometries)
+    if file_format is FileFormat.PLAN:
+        return write_plan(geometries, altitude_m)
+    if file_format is FileFormat.WAYPOINTS:
+        return write_waypoints(geometries, altitude_m)
+    return write_geojson(geometries)

@@ -1,0 +1,48 @@
+"""Archives (ZIP) of untrusted origin: bounded in members and in what is unpacked."""
+
+import zlib
+from io import BytesIO
+from zipfile import BadZipFile, ZipFile
+
+from m2pem.geo.geojson import GeometryError
+from m2pem.geo.geometry_files.contents import FeatureProblemError
+
+MAX_MEMBERS = 1_000
+MAX_UNPACKED_BYTES = 50_000_000
+"""Of one member: what is beyond is never unpacked, whatever the archive says of its size."""
+
+
+def archive_of(content: bytes) -> ZipFile:
+    """Return an archive.
+
+    Raises:
+        GeometryError: it is none, or has too many members.
+    """
+    try:
+        archive = ZipFile(BytesIO(content))
+    except (BadZipFile, ValueError, NotImplementedError, OSError) as error:
+        raise GeometryError(f"is no ZIP archive: {error}") from None
+    if len(archive.infolist()) > MAX_MEMBERS:
+        raise FeatureProblemError(
+            f"has more than {MAX_MEMBERS} members", "put only the geometries into it"
+        )
+    return archive
+
+
+def member(archive: ZipFile, name: str) -> bytes:
+    """Unpack a member.
+
+    Raises:
+        GeometryError: it is damaged, encrypted, or larger than `MAX_UNPACKED_BYTES`.
+    """
+    try:
+        with archive.open(name) as file:
+            content = file.read(MAX_UNPACKED_BYTES + 1)
+    except (BadZipFile, EOFError, OSError, ValueError, zlib.error) as error:
+        raise GeometryError(f"{name} is damaged: {error}") from None
+    except (RuntimeError, NotImplementedError) as error:  # encrypted; a method that is not known
+        raise GeometryError(f"{name} cannot be unpacked: {error}") from None
+    if len(content) > MAX_UNPACKED_BYTES:
+        limit = f"{MAX_UNPACKED_BYTES / 1_000_000:g} MB"
+        raise FeatureProblemError(f"{name} is larger than {limit} unpacked", "split it")
+    return content
