@@ -81,6 +81,19 @@ class BusyError(OperatorError):
         super().__init__(message)
 
 
+class NotApprovedError(OperatorError):
+    """A mission that is to start was not approved by as many persons as the fleet asks for.
+
+    `missing`: how many more must approve it.
+    """
+
+    exit_status = 2
+
+    def __init__(self, message: str, missing: int) -> None:
+        self.missing = missing
+        super().__init__(message)
+
+
 class ScheduleError(OperatorError):
     """A mission cannot be scheduled so; nothing was scheduled. The message says what would be
     right. `field`: of `When`, which is wrong; "": none alone."""

@@ -7,6 +7,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from m2pem.api.approval import EarlierApproval, GivenApproval, MissionApproval
     from m2pem.api.arbiter import (
         AddressedArbiter,
         AdjustingArbiter,
@@ -140,6 +141,7 @@ if TYPE_CHECKING:
     from m2pem.bpmn import parse_mission
     from m2pem.engine.records import Record
     from m2pem.findings import Finding, Severity
+    from m2pem.fleet.approval import file_digest
     from m2pem.fleet.behaviors import SHARED
     from m2pem.fleet.fleet import Fleet
     from m2pem.geo.fence import Fence
@@ -176,6 +178,7 @@ if TYPE_CHECKING:
 
 # Loaded when asked for: an arbiter's module need not pay for what an OCU imports.
 _MODULES = {
+    "m2pem.api.approval": "EarlierApproval GivenApproval MissionApproval",
     "m2pem.api.arbiter": (
         "AddressedArbiter AdjustingArbiter Arbiter ArbiterContext BehaviorId BehaviorReport"
         " BehaviorRequest Connection DetectingArbiter FencingArbiter Limits"
@@ -244,6 +247,7 @@ _MODULES = {
     "m2pem.mission.values": "Value",
     "m2pem.fleet.behaviors": "SHARED",
     "m2pem.geo.fence": "Fence",
+    "m2pem.fleet.approval": "file_digest",
     "m2pem.fleet.fleet": "Fleet",
     "m2pem.geo.geojson": "GeometryError as_geojson kind_of parse_geojson",
     "m2pem.geo.geometry_files": (
@@ -261,6 +265,10 @@ _MODULES = {
 _LAZY = {name: module for module, names in _MODULES.items() for name in names.split()}
 
 __all__ = [
+    "EarlierApproval",
+    "GivenApproval",
+    "MissionApproval",
+    "file_digest",
     "read_rules",
     "read_template",
     "Unknown",

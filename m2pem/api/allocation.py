@@ -35,8 +35,9 @@ class StartPreview:
     """What would begin with a mission: `file` as it was given, and its process with its name.
 
     `findings`: those of `MissionControl.check`; an error among them refuses the start. `busy`: the
-    reason why the start has to be confirmed, which says who has what; "" when all is free. `name`
-    and `process` are "" if the mission cannot be read.
+    reason why the start has to be confirmed, which says who has what; "" when all is free.
+    `unapproved`: who must approve the mission before it may start; "": nobody. `name` and `process`
+    are "" if the mission cannot be read.
     """
 
     file: str
@@ -45,11 +46,12 @@ class StartPreview:
     findings: tuple[Finding, ...] = ()
     roles: tuple[RoleAssignment, ...] = ()
     busy: str = ""
+    unapproved: str = ""
 
     @property
     def refused(self) -> bool:
         """Whether the mission cannot start."""
-        return has_errors(self.findings)
+        return has_errors(self.findings) or bool(self.unapproved)
 
 
 @dataclass(frozen=True, slots=True)

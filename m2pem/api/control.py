@@ -11,6 +11,7 @@ from m2pem.api.allocation import (
     TakeEffect,
     WaitingTask,
 )
+from m2pem.api.approval import MissionApproval
 from m2pem.api.authoring import (
     DEFAULT_LIMITS,
     Draft,
@@ -75,6 +76,44 @@ class MissionControl(Protocol):
         Raises:
             MissionError: with every finding, when it is not well or does not fit the fleet.
             BusyError: they have some, and that was not confirmed; it says who has what.
+            NotApprovedError: the fleet asks for approvals, and persons must give them before.
+        """
+        ...
+
+    async def approval(self, mission: MissionSource) -> MissionApproval:
+        """Who has approved a mission, and who must before it may start (docs/approval.md).
+
+        Raises:
+            MissionError: it cannot be read.
+        """
+        ...
+
+    async def approve(
+        self, mission: MissionSource, *, digest: str = "", by: str = ""
+    ) -> MissionApproval:
+        """Approve exactly this content of a mission: its file, those that it calls or imports, and
+        the routes, areas and points that they name. Returns how it stands then. `digest`: of the
+        content that `by` has looked at; another one is not approved.
+
+        Raises:
+            MissionError: it cannot be read.
+            OperatorError: the fleet asks for no approvals, or `by` may not approve this mission.
+        """
+        ...
+
+    async def withdraw_approval(self, mission: MissionSource, *, by: str = "") -> MissionApproval:
+        """Withdraw the approval of a mission that `by` has given. What runs goes on.
+
+        Raises:
+            MissionError: it cannot be read.
+            OperatorError: `by` has not approved it.
+        """
+        ...
+
+    async def note_edit(self, digest: str, *, by: str = "") -> None:
+        """Note who has made a file of a mission what it is, where the fleet asks for approvals.
+
+        `digest`: the SHA-256 of the file, in hexadecimal. Editors call it before they save.
         """
         ...
 

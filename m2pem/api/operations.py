@@ -22,6 +22,7 @@ from m2pem.api.allocation import (
     TakeEffect,
     WaitingTask,
 )
+from m2pem.api.approval import MissionApproval
 from m2pem.api.authoring import MissionFiles
 from m2pem.api.control import MissionControl
 from m2pem.api.health import ExecutiveAddress, HealthCheck
@@ -183,6 +184,32 @@ class Start(Params, frozen=True):
     even_if_busy: bool = False
 
 
+class OfMission(Params, frozen=True):
+    """As `MissionControl.approval`; the caller has read the mission's files."""
+
+    mission: MissionFiles
+
+
+class Approve(OfMission, frozen=True):
+    """As `MissionControl.approve`."""
+
+    digest: str = ""
+    by: str = ""
+
+
+class WithdrawApproval(OfMission, frozen=True):
+    """As `MissionControl.withdraw_approval`."""
+
+    by: str = ""
+
+
+class NoteEdit(Params, frozen=True):
+    """As `MissionControl.note_edit`."""
+
+    digest: str
+    by: str = ""
+
+
 class ExecuteBehavior(Params, frozen=True):
     """As `MissionControl.execute_behavior`."""
 
@@ -277,6 +304,10 @@ OPERATIONS: dict[str, Operation] = {
         Operation("start", Start, RunId, alone=True),
         Operation("check", Check, list[Finding], alone=True, slow=True),
         Operation("execute_behavior", ExecuteBehavior, RunId, alone=True),
+        Operation("approval", OfMission, MissionApproval, alone=True),
+        Operation("approve", Approve, MissionApproval, alone=True),
+        Operation("withdraw_approval", WithdrawApproval, MissionApproval, alone=True),
+        Operation("note_edit", NoteEdit),
         Operation("answer", Answer),
         Operation("incidents", Nothing, list[OpenIncident]),
         Operation("preview_incident", Choice, IncidentPreview, alone=True),

@@ -31,6 +31,7 @@ COMMANDS = {
     "gateway": "Show a fleet to programs of other protocols, without operators.",
     "arbiter-host": "Run the arbiters of vehicles on this host, for an executive elsewhere.",
     "start": "Start a mission in an executive that is running on this host.",
+    "approve": "Approve a mission: exactly the content that its files and drawings have now.",
     "schedule": "Show the missions that start later; cancel, hold or release them.",
     "check": "Check a mission file, alone or against a fleet.",
     "verify": "Prove properties and requirements of a mission, or show a run that violates them.",

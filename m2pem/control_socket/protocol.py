@@ -10,6 +10,7 @@ from m2pem.errors import (
     BusyError,
     M2pemError,
     MissionError,
+    NotApprovedError,
     NotDrivenError,
     OperatorError,
     StuckError,
@@ -38,14 +39,18 @@ class Code(IntEnum):
     """A `BusyError`; `data` has who has what."""
     STUCK = -32004
     """A `StuckError`: the choice must be confirmed."""
+    NOT_APPROVED = -32005
+    """A `NotApprovedError`; `data` has how many persons more must approve the mission."""
 
 
 class FaultData(msgspec.Struct, frozen=True, omit_defaults=True):
-    """The `data` of an error. `holders`: the run or the operator that has each resource."""
+    """The `data` of an error. `holders`: the run or the operator that has each resource.
+    `missing`: how many persons more must approve a mission."""
 
     what: str = ""
     findings: list[Finding] = msgspec.field(default_factory=list)
     holders: dict[str, str] = msgspec.field(default_factory=dict)
+    missing: int = 0
 
 
 class Fault(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -91,6 +96,8 @@ def fault_of(error: M2pemError) -> Fault:
             return Fault(Code.NOT_DRIVEN, str(error))
         case StuckError():
             return Fault(Code.STUCK, str(error))
+        case NotApprovedError():
+            return Fault(Code.NOT_APPROVED, str(error), FaultData(missing=error.missing))
     return Fault(Code.REFUSED, str(error))
 
 
@@ -105,6 +112,8 @@ def error_of(fault: Fault) -> M2pemError:
             return NotDrivenError(fault.message)
         case Code.STUCK:
             return StuckError(fault.message)
+        case Code.NOT_APPROVED:
+            return NotApprovedError(fault.message, fault.data.missing)
         case Code.REFUSED:
             return OperatorError(fault.message)
     return ControlSocketError(fault.message)

@@ -10,6 +10,7 @@ from typing import Any, cast
 import msgspec
 
 from m2pem.api.allocation import StartPreview
+from m2pem.api.approval import MissionApproval
 from m2pem.api.authoring import MissionFiles, MissionSource, file_of
 from m2pem.api.control import MissionControl
 from m2pem.api.operations import OPERATIONS, STREAMED, Operation, mission_files
@@ -88,6 +89,25 @@ class RemoteControl:
         files = await asyncio.to_thread(self._files, mission)
         run: RunId = await self._call(OPERATIONS["start"], mission=files, **options)
         return run
+
+    async def approval(self, mission: MissionSource) -> MissionApproval:
+        """Send a mission's files to the executive, which says who has approved it."""
+        files = await asyncio.to_thread(self._files, mission)
+        state: MissionApproval = await self._call(OPERATIONS["approval"], mission=files)
+        return state
+
+    async def approve(self, mission: MissionSource, **options: Any) -> MissionApproval:
+        """Send a mission's files to the executive, which notes the approval."""
+        files = await asyncio.to_thread(self._files, mission)
+        state: MissionApproval = await self._call(OPERATIONS["approve"], mission=files, **options)
+        return state
+
+    async def withdraw_approval(self, mission: MissionSource, *, by: str = "") -> MissionApproval:
+        """Send a mission's files to the executive, which withdraws the approval."""
+        files = await asyncio.to_thread(self._files, mission)
+        operation = OPERATIONS["withdraw_approval"]
+        state: MissionApproval = await self._call(operation, mission=files, by=by)
+        return state
 
     async def schedule(self, mission: MissionSource, **options: Any) -> EntryId:
         """Send a mission's files to the executive, which starts it later."""

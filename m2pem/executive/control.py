@@ -12,6 +12,7 @@ from m2pem.api.allocation import (
     TakeEffect,
     WaitingTask,
 )
+from m2pem.api.approval import MissionApproval
 from m2pem.api.authoring import (
     DEFAULT_LIMITS,
     Draft,
@@ -154,6 +155,33 @@ class Control:
     ) -> StartPreview:
         """What a start would begin with now, and what speaks against it."""
         return await self._starter.preview(mission, process, tuple(data))
+
+    # --- approvals ------------------------------------------------------------------------------
+
+    async def approval(self, mission: MissionSource) -> MissionApproval:
+        """Who has approved a mission, and who must before it may start."""
+        loaded = await self._starter.read(mission)
+        return await self._starter.approvals.state(loaded.file, loaded.source, loaded.library)
+
+    async def approve(
+        self, mission: MissionSource, *, digest: str = "", by: str = ""
+    ) -> MissionApproval:
+        """Approve a mission."""
+        loaded = await self._starter.read(mission)
+        approvals = self._starter.approvals
+        return await approvals.approve(loaded.file, loaded.source, loaded.library, by, digest)
+
+    async def withdraw_approval(self, mission: MissionSource, *, by: str = "") -> MissionApproval:
+        """Withdraw an approval of a mission."""
+        loaded = await self._starter.read(mission)
+        approvals = self._starter.approvals
+        return await approvals.withdraw(loaded.file, loaded.source, loaded.library, by)
+
+    async def note_edit(self, digest: str, *, by: str = "") -> None:
+        """Note who has made a file what it is."""
+        await self._starter.approvals.note_edit(digest, by)
+
+    # --- ending runs ----------------------------------------------------------------------------
 
     async def stop(self, run: RunId, *, by: str = "", reason: str = "") -> None:
         """End every token, cancel every behavior."""

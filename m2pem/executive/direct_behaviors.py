@@ -77,7 +77,7 @@ class DirectBehaviors:
             if request != commanded.latest:
                 raise OperatorError(f"{behavior} of {resource}: a later request came before it")
             return await self._starter.begin_if_free(
-                loaded, process, data, by, lent=(resource,) if own else ()
+                loaded, process, data, by, lent=(resource,) if own else (), direct=True
             )
 
     async def _end_earlier(self, resource: ResourceId, by: str) -> None:

@@ -19,6 +19,7 @@ from m2pem.api.arbiter import ArbiterContext, BehaviorId, BehaviorReport
 from m2pem.api.clock import Clock, SystemClock
 from m2pem.api.runs import RunId
 from m2pem.errors import FleetServedError, JournalError, M2pemError
+from m2pem.executive.approvals import Approvals
 from m2pem.executive.behavior_lifecycle import ExecutiveViews
 from m2pem.executive.control import Control, Rehearse
 from m2pem.executive.control_events import ControlEvents, LoggedAlerts, RecordObservers
@@ -364,6 +365,11 @@ class Executive:
             MissionError: with every finding.
         """
         return self._starter.admit(loaded, process, data)
+
+    @property
+    def approvals(self) -> Approvals:
+        """Who has approved which mission."""
+        return self._starter.approvals
 
     async def begin(
         self, loaded: Mission, process_id: str, data: Mapping[str, Value] | None, by: str

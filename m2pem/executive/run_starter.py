@@ -7,11 +7,12 @@ from collections.abc import Callable, Collection, Mapping
 from m2pem.allocation.assignment import load_solver
 from m2pem.api.allocation import RoleAssignment, StartPreview
 from m2pem.api.authoring import MissionSource, file_of
-from m2pem.api.runs import RunId
+from m2pem.api.runs import Alert, RunId
 from m2pem.engine.inputs import StartRun
 from m2pem.engine.run import MissionRun
 from m2pem.engine.state import RunStatus
 from m2pem.errors import BusyError, M2pemError, MissionError
+from m2pem.executive.approvals import Approvals
 from m2pem.executive.handover import refuse_busy_resources
 from m2pem.executive.loading import (
     findings_for,
@@ -32,12 +33,23 @@ from m2pem.mission.mission import Mission
 from m2pem.mission.values import Value
 from m2pem.scheduling.entry import EntryChange
 
+APPROVAL = "APPROVAL"
+"""The code of alerts about approvals."""
+
 
 class RunStarter:
     """Checks missions and begins their runs, which the supervisor drives then."""
 
     def __init__(self, supervisor: Supervisor) -> None:
         self._supervisor = supervisor
+        self.approvals = Approvals(
+            supervisor.fleet,
+            supervisor.journal,
+            lambda: supervisor.fleet_now.geometries,
+            lambda: {name: each.by for name, each in supervisor.handed_over.items()},
+            supervisor.clock.now_us,
+            lambda text: supervisor.events.publish(Alert("", APPROVAL, text)),
+        )
         # Of two starts at once the second must see what the first one takes.
         self._starting = asyncio.Lock()
 
@@ -87,7 +99,7 @@ class RunStarter:
         """Return what a start would begin with now, and what speaks against it."""
         supervisor = self._supervisor
         try:
-            loaded = await asyncio.to_thread(load_source, mission, supervisor.settings.search_path)
+            loaded = await self.read(mission)
         except MissionError as error:
             return StartPreview(file_of(mission), findings=error.findings)
         findings = await asyncio.to_thread(self.findings, loaded, process, names)
@@ -99,6 +111,7 @@ class RunStarter:
             self.refuse_busy(loaded)
         except BusyError as error:
             busy = str(error)
+        approval = await self.approvals.state(loaded.file, loaded.source, loaded.library)
         return StartPreview(
             loaded.file,
             processes.get(begun, ""),
@@ -109,7 +122,16 @@ class RunStarter:
                 for each in roles.values()
             ),
             busy,
+            "" if approval.may_start else str(approval),
         )
+
+    async def read(self, mission: MissionSource) -> Mission:
+        """Read a mission, not in the event loop.
+
+        Raises:
+            MissionError: with every finding.
+        """
+        return await asyncio.to_thread(load_source, mission, self._supervisor.settings.search_path)
 
     def load(
         self,
@@ -145,6 +167,7 @@ class RunStarter:
         Raises:
             MissionError: with every finding.
             BusyError: other runs or operators have what it names, unless `even_if_busy`.
+            NotApprovedError: persons must approve it before.
         """
         # Reading and checking take a while, and a URL may take longer: not in the event loop.
         loaded, process_id = await asyncio.to_thread(self.load, mission, process, data)
@@ -162,16 +185,25 @@ class RunStarter:
         started: EntryChange | None = None,
         still: Callable[[], bool] = lambda: True,
         lent: Collection[ResourceId] = (),
+        direct: bool = False,
     ) -> RunId:
         """Begin a run if all that its mission names is free; the rest as for `begin`.
 
         Raises:
             BusyError: other runs or operators have some of it.
+            NotApprovedError: persons must approve it before.
         """
         async with self._starting:
             self.refuse_busy(loaded, lent)
             return await self.begin(
-                loaded, process_id, data, by, started=started, still=still, lent=lent
+                loaded,
+                process_id,
+                data,
+                by,
+                started=started,
+                still=still,
+                lent=lent,
+                direct=direct,
             )
 
     def refuse_busy(self, loaded: Mission, lent: Collection[ResourceId] = ()) -> None:
@@ -201,14 +233,17 @@ class RunStarter:
         started: EntryChange | None = None,
         still: Callable[[], bool] = lambda: True,
         lent: Collection[ResourceId] = (),
+        direct: bool = False,
     ) -> RunId:
         """Begin a run of a mission that was admitted. Returns when its beginning is durable.
 
         `started`: the new state of the entry of the schedule that starts it. `still`: whether it
         may begin, asked when the journal has created it. `lent`: what the operator who starts it
-        has taken, and lets it command.
+        has taken, and lets it command. `direct`: it is one behavior that is commanded from outside
+        of a mission, which nobody approves.
 
         Raises:
+            NotApprovedError: persons must approve it before.
             OperatorError: the arbiters are not connected yet, or interrupted runs do not have their
                 vehicles yet.
             NotBegunError: a run that the schedule starts was created, and has not begun.
@@ -216,6 +251,8 @@ class RunStarter:
         supervisor = self._supervisor
         supervisor.refuse_unconnected()
         supervisor.interrupted.refuse_start()
+        if not direct:
+            await self.approvals.refuse_unapproved(loaded.file, loaded.source, loaded.library)
         header = RunHeader(
             loaded.file,
             loaded.source,

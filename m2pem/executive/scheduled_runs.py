@@ -56,6 +56,11 @@ class ScheduledRuns:
         process, _ = self._starter.admit(loaded, plan.process, plan.data)
         return loaded, process
 
+    async def unapproved(self, plan: SchedulePlan) -> str:
+        """Who must approve the mission of an entry before it may start; "": nobody."""
+        state = await self._starter.approvals.state(plan.mission_name, plan.mission, plan.library)
+        return "" if state.may_start else str(state)
+
     def has_others(self) -> bool:
         """Whether other executives are on the journal now; it blocks."""
         return self._supervisor.settings.has_others()

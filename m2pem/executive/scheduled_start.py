@@ -70,6 +70,14 @@ class Starter(Protocol):
         """
         ...
 
+    async def unapproved(self, plan: SchedulePlan) -> str:
+        """Who must approve the mission of an entry before it may start; "": nobody.
+
+        Raises:
+            JournalError: the journal cannot be read.
+        """
+        ...
+
     async def begin_scheduled(
         self,
         loaded: Mission,

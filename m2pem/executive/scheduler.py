@@ -24,7 +24,14 @@ import msgspec
 from m2pem.api.clock import SystemClock
 from m2pem.api.runs import NOT_STARTED, STARTS_SOON, RunId
 from m2pem.api.schedule import time_in
-from m2pem.errors import BusyError, JournalError, M2pemError, OperatorError, StaleEntryError
+from m2pem.errors import (
+    BusyError,
+    JournalError,
+    M2pemError,
+    NotApprovedError,
+    OperatorError,
+    StaleEntryError,
+)
 from m2pem.executive.schedule_entries import ScheduleEntries
 from m2pem.executive.scheduled_start import (
     ASK_AGAIN_S,
@@ -333,6 +340,8 @@ class Scheduler:
     ) -> Wait | None:
         """Warn operators, and start when the warning has been long enough."""
         assert found.due_us is not None
+        if why := await self._starter.unapproved(entry.plan):
+            return Wait(why, self._in(ASK_AGAIN_S))
         if look.warned_due_us != found.due_us:
             look.warned_due_us, look.warned_us = found.due_us, now_us
             look.starts_us = now_us + self._warning_us
@@ -367,6 +376,8 @@ class Scheduler:
             )
         except BusyError as error:
             return Wait(str(error), self._in(LOOK_AGAIN_S), for_resources=True)
+        except NotApprovedError as error:  # an approval was withdrawn just now
+            return Wait(str(error), self._in(ASK_AGAIN_S))
         return None
 
     async def start(self, number: EntryId, by: str) -> RunId:

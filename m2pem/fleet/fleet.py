@@ -135,8 +135,11 @@ class Fleet:
     start operators are warned of it. `preemption`: whether a task may take vehicles from tasks of
     other runs with a lower priority. `incident_role`: which operators decide about incidents, where
     the mission does not say; "": all. `operators`: the names of those who have each role; none:
-    every operator has every role. `hosts`: the other computers that arbiters run on, by name.
-    `faces`: the settings of each face; no run depends on them, and no journal has them.
+    every operator has every role. `approval_persons`: how many persons other than its last editor
+    must have approved a mission before it starts; 0: none. `approval_role`: which operators may
+    approve; "": all. `hosts`: the other computers that arbiters run
+    on, by name. `faces`: the settings of each face; no run depends on them, and no journal has
+    them.
     """
 
     name: str
@@ -165,6 +168,8 @@ class Fleet:
     preemption: bool = False
     incident_role: str = ""
     operators: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    approval_persons: int = 0
+    approval_role: str = ""
     hosts: Mapping[str, Host] = field(default_factory=dict)
     faces: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
@@ -199,10 +204,12 @@ def real_resources(fleet: Fleet) -> list[ResourceId]:
 
 def simulated_fleet(fleet: Fleet, settings: Mapping[str, Any] | None = None) -> Fleet:
     """The fleet with the simulated arbiter in place of every other; `settings` are added to the
-    connection of every resource, in place of its own of the same names."""
+    connection of every resource, in place of its own of the same names. Nothing moves, so that
+    missions need no approval."""
     extra = settings or {}
     return replace(
         fleet,
+        approval_persons=0,
         vehicles={
             id_: replace(each, arbiter=SIMULATED, settings={**each.settings, **extra}, host="")
             for id_, each in fleet.vehicles.items()

@@ -61,7 +61,7 @@ def load_fleet(path: str | Path) -> Fleet:
         _check_names(source)
         _check_teams(source)
         _check_hosts(source)
-        _check_incident_role(source)
+        _check_roles(source)
         geometries = _read_geometries(source, path.parent)
         _check_fence(source)
         _check_shared_space(source)
@@ -162,12 +162,16 @@ def _check_host(source: YamlSource, name: str) -> None:
                 source.error(path, "host-tls", "the files of TLS are not named", remedy)
 
 
-def _check_incident_role(source: YamlSource) -> None:
-    role, operators = source.mapping().get("incident_role"), source.mapping("operators")
-    if isinstance(role, str) and operators and role not in operators:
-        hint = suggest(role, operators, "roles")
-        message = f"'operators' names no operator with the role '{role}'"
-        source.error(("incident_role",), "no-operator", message, hint)
+def _check_roles(source: YamlSource) -> None:
+    operators = source.mapping("operators")
+    for path, role in (
+        (("incident_role",), source.mapping().get("incident_role")),
+        (("approval", "role"), source.mapping("approval").get("role")),
+    ):
+        if isinstance(role, str) and operators and role not in operators:
+            hint = suggest(role, operators, "roles")
+            message = f"'operators' names no operator with the role '{role}'"
+            source.error(path, "no-operator", message, hint)
 
 
 def _check_fence(source: YamlSource) -> None:
@@ -288,6 +292,8 @@ def _build(source: YamlSource, model: FleetModel, geometries: dict[str, Geometry
         preemption=costs.preemption,
         incident_role=model.incident_role or "",
         operators={role: tuple(names) for role, names in model.operators.items()},
+        approval_persons=model.approval.persons if model.approval else 0,
+        approval_role=(model.approval.role if model.approval else None) or "",
         hosts={name: _host(source, name, each) for name, each in model.hosts.items()},
         faces={name: settings or {} for name, settings in model.faces.items()},
     )

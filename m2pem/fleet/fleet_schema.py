@@ -315,6 +315,19 @@ class ScheduleModel(_Model):
     ] = 10.0
 
 
+class ApprovalModel(_Model):
+    """Who must approve a mission before it may start."""
+
+    persons: Annotated[
+        int,
+        Field(ge=1, le=10, description="How many others than who edited the mission last."),
+    ]
+    role: Annotated[
+        Text | None,
+        Field(description="The role of the operators who may approve; all if left out."),
+    ] = None
+
+
 class FleetModel(_Model):
     """A fleet of m2pem: vehicles, payloads, teams and named geometries."""
 
@@ -356,6 +369,10 @@ class FleetModel(_Model):
             "for her on every host, anna@gcs1 on one. If left out, every operator has every role."
         ),
     ] = {}
+    approval: Annotated[
+        ApprovalModel | None,
+        Field(description="Missions start only when persons have approved exactly their content."),
+    ] = None
     faces: Annotated[
         dict[Name, dict[str, Any] | None],
         Field(

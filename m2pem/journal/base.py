@@ -12,6 +12,7 @@ from uuid import UUID
 
 from m2pem.engine.inputs import Input
 from m2pem.engine.records import Record, RunOutcome
+from m2pem.fleet.approval import Approval, Edit
 from m2pem.journal.fleet_server import FleetServer
 from m2pem.mission.library import Source
 from m2pem.scheduling.entry import EntryChange, EntryState, Hold, ScheduleEntry, SchedulePlan
@@ -355,6 +356,40 @@ class Journal(Protocol):
 
     async def schedule_hold(self, fleet: str) -> Hold | None:
         """Return who holds the whole schedule of a fleet, and why; None: no operator."""
+        ...
+
+    # --- approvals ------------------------------------------------------------------------------
+
+    async def approve(self, approval: Approval) -> None:
+        """Note that a person has approved a content for a fleet; durable on return.
+
+        Raises:
+            JournalError: it cannot be written.
+        """
+        ...
+
+    async def withdraw_approval(self, approval: Approval) -> None:
+        """Note that a person's approval of a content does not count any more; durable on return.
+
+        Raises:
+            JournalError: it cannot be written.
+        """
+        ...
+
+    async def approvals(self, fleet: str) -> Sequence[Approval]:
+        """Return the approvals for a fleet, the oldest first."""
+        ...
+
+    async def note_edit(self, edit: Edit) -> None:
+        """Note who has made a file what it is; durable on return. The first one counts.
+
+        Raises:
+            JournalError: it cannot be written.
+        """
+        ...
+
+    async def edits(self, digests: Collection[str]) -> Mapping[str, Edit]:
+        """Return who has edited these files, by their hashes, as far as it is known."""
         ...
 
     async def close(self) -> None:

@@ -12,6 +12,7 @@ import msgspec
 from m2pem.engine.inputs import Input
 from m2pem.engine.records import Record
 from m2pem.errors import InternalError, JournalError
+from m2pem.fleet.approval import Approval, Edit
 from m2pem.journal.base import Entry
 from m2pem.mission.library import Source
 from m2pem.scheduling.entry import EntryState, Hold, SchedulePlan, entry_number
@@ -77,11 +78,11 @@ def decode_library(text: str) -> tuple[Source, ...]:
         raise JournalError(f"damaged, or written by a newer m2pem: {error}") from error
 
 
-Part = TypeVar("Part", SchedulePlan, EntryState, Hold)
+Part = TypeVar("Part", SchedulePlan, EntryState, Hold, Approval, Edit)
 
 
-def encode_part(part: SchedulePlan | EntryState | Hold) -> str:
-    """A part of an entry of the schedule as JSON.
+def encode_part(part: SchedulePlan | EntryState | Hold | Approval | Edit) -> str:
+    """A part of an entry of the schedule, an approval or an edit, as JSON.
 
     Raises:
         JournalError: JSON has no such value (NaN, infinity).
@@ -91,9 +92,9 @@ def encode_part(part: SchedulePlan | EntryState | Hold) -> str:
         # msgspec writes NaN and infinities as null.
         exact = b"null" not in text or msgspec.json.decode(text, type=type(part)) == part
     except (TypeError, ValueError, OverflowError, RecursionError) as error:
-        raise JournalError(f"the schedule cannot be written: {error}") from error
+        raise JournalError(f"{_what(type(part))} cannot be written: {error}") from error
     if not exact:
-        raise JournalError("the schedule cannot be written: a value is not a finite number")
+        raise JournalError(f"{_what(type(part))} cannot be written: a value is not a finite number")
     return text.decode()
 
 
@@ -107,8 +108,12 @@ def decode_part(text: str, kind: type[Part]) -> Part:
         return msgspec.json.decode(text, type=kind)
     except (msgspec.DecodeError, UnicodeError) as error:
         raise JournalError(
-            f"the schedule is damaged, or written by a newer m2pem: {error}"
+            f"{_what(kind)} is damaged, or written by a newer m2pem: {error}"
         ) from error
+
+
+def _what(kind: type) -> str:
+    return "an approval" if kind in (Approval, Edit) else "the schedule"
 
 
 def known_entry(entry: str) -> int:

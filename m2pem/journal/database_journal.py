@@ -13,6 +13,7 @@ from typing import Any, ClassVar, TypeVar
 from uuid import UUID
 
 from m2pem.errors import JournalError
+from m2pem.fleet.approval import Approval, Edit
 from m2pem.journal.base import Deletion, Entry, Loss, RunHeader, RunInfo
 from m2pem.journal.codec import (
     decode_body,
@@ -407,6 +408,46 @@ class DatabaseJournal(ABC):
             "SELECT hold FROM schedule_holds WHERE fleet = ?", (fleet,)
         ).fetchone()
         return None if row is None else decode_part(row[0], Hold)
+
+    # --- approvals ------------------------------------------------------------------------------
+
+    async def approve(self, approval: Approval) -> None:
+        """See `Journal.approve`."""
+        self._check_open()
+        await self._writer.submit(lambda transaction: transaction.approve(approval))
+
+    async def withdraw_approval(self, approval: Approval) -> None:
+        """See `Journal.withdraw_approval`."""
+        self._check_open()
+        await self._writer.submit(lambda transaction: transaction.withdraw_approval(approval))
+
+    async def approvals(self, fleet: str) -> Sequence[Approval]:
+        """See `Journal.approvals`."""
+        return await self._read(lambda: self._approvals(fleet))
+
+    def _approvals(self, fleet: str) -> list[Approval]:
+        rows = self._reading.execute("SELECT approval FROM approvals WHERE fleet = ?", (fleet,))
+        found = [decode_part(text, Approval) for (text,) in rows]
+        return sorted(found, key=lambda each: each.at_us)
+
+    async def note_edit(self, edit: Edit) -> None:
+        """See `Journal.note_edit`."""
+        self._check_open()
+        await self._writer.submit(lambda transaction: transaction.note_edit(edit))
+
+    async def edits(self, digests: Collection[str]) -> Mapping[str, Edit]:
+        """See `Journal.edits`."""
+        return await self._read(lambda: self._edits(digests))
+
+    def _edits(self, digests: Collection[str]) -> dict[str, Edit]:
+        found = {}
+        for digest in digests:
+            row = self._reading.execute(
+                "SELECT edit FROM edits WHERE digest = ?", (digest,)
+            ).fetchone()
+            if row is not None:
+                found[digest] = decode_part(row[0], Edit)
+        return found
 
     async def _read(self, work: Callable[[], T]) -> T:
         self._check_open()

@@ -11,6 +11,7 @@ from pathlib import Path
 from uuid import UUID, uuid4
 
 from m2pem.errors import InternalError, JournalError, StaleEntryError
+from m2pem.fleet.approval import Approval, Edit
 from m2pem.journal.base import Deletion, Entry, RunHeader, RunInfo
 from m2pem.journal.codec import encode_part, run_id, run_number, unknown_entry, unknown_run
 from m2pem.journal.fleet_server import FleetServer, this_process
@@ -52,6 +53,8 @@ class MemoryJournal:
         self._entries: dict[str, ScheduleEntry] = {}
         self._holds: dict[str, Hold | None] = {}
         self._last_entry = 0
+        self._approvals: dict[tuple[str, str, str], Approval] = {}
+        self._edits: dict[str, Edit] = {}
         self._fleets: dict[str, dict[str, FleetServer]] = {}
         self._closed = False
 
@@ -275,6 +278,34 @@ class MemoryJournal:
         """See `Journal.schedule_hold`."""
         self._check_open()
         return self._holds.get(fleet)
+
+    # --- approvals ------------------------------------------------------------------------------
+
+    async def approve(self, approval: Approval) -> None:
+        """See `Journal.approve`."""
+        self._check_open()
+        self._approvals[approval.fleet, approval.digest, approval.person] = approval
+
+    async def withdraw_approval(self, approval: Approval) -> None:
+        """See `Journal.withdraw_approval`."""
+        self._check_open()
+        self._approvals.pop((approval.fleet, approval.digest, approval.person), None)
+
+    async def approvals(self, fleet: str) -> Sequence[Approval]:
+        """See `Journal.approvals`."""
+        self._check_open()
+        found = [each for each in self._approvals.values() if each.fleet == fleet]
+        return sorted(found, key=lambda each: each.at_us)
+
+    async def note_edit(self, edit: Edit) -> None:
+        """See `Journal.note_edit`."""
+        self._check_open()
+        self._edits.setdefault(edit.digest, edit)
+
+    async def edits(self, digests: Collection[str]) -> Mapping[str, Edit]:
+        """See `Journal.edits`."""
+        self._check_open()
+        return {each: self._edits[each] for each in digests if each in self._edits}
 
     async def close(self) -> None:
         """See `Journal.close`."""

@@ -129,6 +129,23 @@ def origin_of_salvaged_runs(connection: sqlite3.Connection) -> None:
     )
 
 
+def approvals(connection: sqlite3.Connection) -> None:
+    """0.8: who has approved which content of a mission, and who has edited which file.
+
+    `approval` and `edit` are JSON (`m2pem.fleet.approval`). `digest`: of the content, or the file.
+    """
+    connection.execute(
+        """CREATE TABLE approvals (
+            fleet TEXT NOT NULL,
+            digest TEXT NOT NULL,
+            person TEXT NOT NULL,
+            approval TEXT NOT NULL,
+            PRIMARY KEY (fleet, digest, person)
+        )"""
+    )
+    connection.execute("CREATE TABLE edits (digest TEXT PRIMARY KEY, edit TEXT NOT NULL)")
+
+
 MIGRATIONS: tuple[Callable[[sqlite3.Connection], None], ...] = (
     runs_standings_and_entries,
     other_files_of_missions,
@@ -137,6 +154,7 @@ MIGRATIONS: tuple[Callable[[sqlite3.Connection], None], ...] = (
     deletions,
     schedule,
     origin_of_salvaged_runs,
+    approvals,
 )
 
 

@@ -3,6 +3,8 @@
 It is apart from the rest of the journal, which needs no parser of BPMN.
 """
 
+from dataclasses import replace
+
 from m2pem.bpmn import parse_mission
 from m2pem.errors import JournalError
 from m2pem.fleet.fleet import Fleet, restore, simulated_fleet
@@ -38,4 +40,6 @@ def fleet_of(header: RunHeader) -> Fleet:
             f"the fleet that the journal has of the run cannot be read: {error}. `m2pem journal "
             "check` says what is intact"
         ) from error
-    return simulated_fleet(fleet) if header.simulated else fleet
+    if not header.simulated:
+        return fleet
+    return replace(simulated_fleet(fleet), approval_persons=fleet.approval_persons)

@@ -276,12 +276,22 @@ def server_starts(connection: psycopg.Connection[Any]) -> None:
     )
 
 
+def approvals(connection: psycopg.Connection[Any]) -> None:
+    """0.4: who has approved which content of a mission, and who has edited which file."""
+    connection.execute(
+        "CREATE TABLE approvals (fleet TEXT NOT NULL, digest TEXT NOT NULL, person TEXT NOT NULL,"
+        " approval TEXT NOT NULL, PRIMARY KEY (fleet, digest, person))"
+    )
+    connection.execute("CREATE TABLE edits (digest TEXT PRIMARY KEY, edit TEXT NOT NULL)")
+
+
 MIGRATIONS: tuple[Callable[[psycopg.Connection[Any]], None], ...] = (
     first_tables,
     fleets,
     notifications,
     pages,
     server_starts,
+    approvals,
 )
 """A released step is never changed; a change becomes a new step at the end."""
 

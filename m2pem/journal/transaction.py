@@ -13,6 +13,7 @@ from typing import Any
 
 from m2pem.engine.records import RunOutcome
 from m2pem.errors import InternalError, JournalError, StaleEntryError
+from m2pem.fleet.approval import Approval, Edit
 from m2pem.journal.base import Deletion, Entry, RunHeader
 from m2pem.journal.codec import (
     decode_part,
@@ -322,6 +323,36 @@ class WriteTransaction:
                 " ON CONFLICT (fleet) DO UPDATE SET hold = excluded.hold",
                 (fleet, encode_part(hold)),
             )
+        self._wrote = True
+
+    # --- approvals ------------------------------------------------------------------------------
+
+    def approve(self, approval: Approval) -> None:
+        """Keep an approval, in place of an earlier one of the same person and content."""
+        self._storage.exclude_others()
+        self._connection.execute(
+            "INSERT INTO approvals VALUES (?, ?, ?, ?)"
+            " ON CONFLICT (fleet, digest, person) DO UPDATE SET approval = excluded.approval",
+            (approval.fleet, approval.digest, approval.person, encode_part(approval)),
+        )
+        self._wrote = True
+
+    def withdraw_approval(self, approval: Approval) -> None:
+        """Keep an approval no more."""
+        self._storage.exclude_others()
+        self._connection.execute(
+            "DELETE FROM approvals WHERE fleet = ? AND digest = ? AND person = ?",
+            (approval.fleet, approval.digest, approval.person),
+        )
+        self._wrote = True
+
+    def note_edit(self, edit: Edit) -> None:
+        """Keep who has edited a file first."""
+        self._storage.exclude_others()
+        self._connection.execute(
+            "INSERT INTO edits VALUES (?, ?) ON CONFLICT (digest) DO NOTHING",
+            (edit.digest, encode_part(edit)),
+        )
         self._wrote = True
 
     def append(self, rows: Sequence[EntryRow]) -> None:

@@ -26,6 +26,9 @@ CALLS = [
 ]
 
 OTHERWISE = {
+    "approval": "m2pem approve --show",
+    "approve": "m2pem approve, which tests/cli/test_approve.py tries",
+    "withdraw_approval": "m2pem approve --withdraw",
     "start": "m2pem start, which tests/e2e/test_start.py tries",
     "check": "m2pem check asks no executive",
     "missions": "missions in m2pem attach",
@@ -66,6 +69,7 @@ OTHERWISE = {
     "switch_over": "m2pem switchover, which tests/e2e/test_switchover.py tries",
 }
 NO_COMMAND = {
+    "note_edit": "editors note who saves a mission",
     "execute_behavior": "programs command vehicles through faces; an operator starts missions",
     "message": "programs send messages: over the control socket, REST or ROS",
     "simulated": "the fleet file says it, and m2pem run --simulate",

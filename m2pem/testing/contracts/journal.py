@@ -31,6 +31,7 @@ from m2pem.journal.base import Entry, RunInfo
 from m2pem.mission.catalogue import BehaviorState
 from m2pem.mission.values import Value
 from m2pem.testing.contracts.contract import needs
+from m2pem.testing.contracts.journal_approvals import JournalApprovals
 from m2pem.testing.contracts.journal_harness import (
     ENDED,
     HEADER,
@@ -45,7 +46,7 @@ from m2pem.testing.contracts.journal_schedule import JournalSchedule
 
 
 @pytest.mark.asyncio
-class JournalContract(JournalSchedule):
+class JournalContract(JournalSchedule, JournalApprovals):
     """The contract of a journal: override the fixture `open_journal`."""
 
     # --- who serves a fleet ---------------------------------------------------------------------

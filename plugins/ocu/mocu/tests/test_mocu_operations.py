@@ -71,6 +71,10 @@ SERVED_OTHERWISE = {
     "fleet": "/diagnostics names its vehicles and payloads",
 }
 NOT_SERVED = {
+    "approval": "start_mission answers with who must approve",
+    "approve": "persons approve on the page, or with m2pem approve",
+    "withdraw_approval": "persons do it on the page, or with m2pem approve --withdraw",
+    "note_edit": "editors note who saves",
     "execute_behavior": "the ROS face has an action for each vehicle",
     "preview_incident": "answer_prompt refuses a choice after which the mission cannot complete",
     "check": "start_mission answers with the findings",

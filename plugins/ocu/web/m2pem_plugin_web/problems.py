@@ -21,6 +21,7 @@ from m2pem.errors import (
     InternalError,
     JournalError,
     M2pemError,
+    NotApprovedError,
     NotDrivenError,
     OperatorError,
     PluginError,
@@ -101,6 +102,8 @@ def handle_problems(app: FastAPI, missions: Path = Path()) -> None:
             return problem(status, called.text(error.what), findings=findings)
         if isinstance(error, BusyError):
             return problem(status, str(error), busy=error.holders)
+        if isinstance(error, NotApprovedError):
+            return problem(status, str(error), missing=error.missing)
         if isinstance(error, ScheduleError):
             return problem(status, str(error), field=error.field)
         if isinstance(error, StuckError):

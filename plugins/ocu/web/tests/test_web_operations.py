@@ -92,6 +92,10 @@ QUERIES = {
     "standbys": "/api/standbys",
 }
 NOT_SERVED = {
+    "approval": "GET /api/missions/{name}/approval is of a mission of the server's folder",
+    "approve": "POST /api/missions/{name}/approval",
+    "withdraw_approval": "POST /api/missions/{name}/approval/withdraw",
+    "note_edit": "PUT /api/missions/{name} notes who saves",
     "execute_behavior": "programs command vehicles through faces; the page starts missions",
     "switch_over": "m2pem switchover asks for it on the executive's machine",
     "preview_incident": "POST .../incidents/{incident}/preview",

@@ -7,9 +7,10 @@ from fastapi import APIRouter, Response
 from fastapi import Path as InPath
 from pydantic import BaseModel
 
-from m2pem.api import MissionControl
+from m2pem.api import MissionControl, file_digest
 from m2pem_plugin_web.access.permissions import Commander, Viewer
 from m2pem_plugin_web.missions.folder import MissionFolder, Saved, Summaries
+from m2pem_plugin_web.missions.versions import version_of
 from m2pem_plugin_web.problems import RESPONSES, ProblemError
 from m2pem_plugin_web.rest.drafts import MissionName, of_folder, source_of
 from m2pem_plugin_web.rest.models import Body
@@ -110,6 +111,8 @@ def router(control: MissionControl, folder: MissionFolder) -> APIRouter:
         with what is there as `current`."""
         source = source_of(wanted.xml)
         await asyncio.to_thread(control.outline, source)
+        if version_of(source) != wanted.base:  # before it may be approved
+            await control.note_edit(file_digest(source), by=person.name)
         return _saved(await of_folder(folder.save, name, source, wanted.base, person.name))
 
     @routes.delete("/{name}", status_code=204)

@@ -1,0 +1,98 @@
+"""/api/missions/{name}/approval: who has approved a mission of the folder, and who must."""
+
+from fastapi import APIRouter
+from pydantic import BaseModel
+
+from m2pem.api import Draft, MissionApproval, MissionControl
+from m2pem_plugin_web.access.permissions import Operator, Viewer
+from m2pem_plugin_web.missions.folder import MissionFolder
+from m2pem_plugin_web.problems import RESPONSES
+from m2pem_plugin_web.rest.drafts import MissionName, of_folder
+from m2pem_plugin_web.rest.models import Body, Name
+
+
+class GivenApprovalModel(BaseModel):
+    """A person has approved it, at microseconds since the Unix epoch."""
+
+    by: str
+    at_us: int
+
+
+class EarlierApprovalModel(GivenApprovalModel):
+    """A person has approved an earlier content. `changed`: what is other now."""
+
+    changed: list[str]
+
+
+class ApprovalModel(BaseModel):
+    """`MissionApproval`. `digest`: of the content of its files and drawings. `persons`: how many
+    the fleet asks for, 0: none; `needed`: how many approvals must count; `missing`: how many more.
+    `who`: who must approve it, in words."""
+
+    mission: str
+    digest: str
+    persons: int
+    role: str
+    needed: int
+    missing: int
+    who: str
+    editors: list[str]
+    editor_unknown: bool
+    approvals: list[GivenApprovalModel]
+    not_counted: list[GivenApprovalModel]
+    earlier: list[EarlierApprovalModel]
+
+
+class ApproveModel(Body):
+    """`digest`: of the content that the person has looked at; another one is not approved."""
+
+    digest: Name
+
+
+def router(control: MissionControl, folder: MissionFolder) -> APIRouter:
+    """The routes of approvals."""
+    routes = APIRouter(prefix="/api/missions", tags=["missions"], responses=RESPONSES)
+
+    async def draft(name: str) -> Draft:
+        saved = await of_folder(folder.read, name)
+        return Draft(saved.path, saved.source)
+
+    @routes.get("/{name}/approval")
+    async def approval(_: Viewer, name: MissionName) -> ApprovalModel:
+        """Who has approved a mission, and who must before it may start."""
+        return _model(await control.approval(await draft(name)))
+
+    @routes.post("/{name}/approval")
+    async def approve(person: Operator, name: MissionName, wanted: ApproveModel) -> ApprovalModel:
+        """Approve it."""
+        found = await draft(name)
+        return _model(await control.approve(found, digest=wanted.digest, by=person.name))
+
+    @routes.post("/{name}/approval/withdraw")
+    async def withdraw(person: Operator, name: MissionName) -> ApprovalModel:
+        """Withdraw one's approval. What runs goes on."""
+        return _model(await control.withdraw_approval(await draft(name), by=person.name))
+
+    return routes
+
+
+def _model(state: MissionApproval) -> ApprovalModel:
+    return ApprovalModel(
+        mission=state.mission,
+        digest=state.digest,
+        persons=state.persons,
+        role=state.role,
+        needed=state.needed,
+        missing=state.missing,
+        who=state.who() if state.missing else "",
+        editors=list(state.editors),
+        editor_unknown=state.editor_unknown,
+        approvals=[GivenApprovalModel(by=each.by, at_us=each.at_us) for each in state.approvals],
+        not_counted=[
+            GivenApprovalModel(by=each.by, at_us=each.at_us) for each in state.not_counted
+        ],
+        earlier=[
+            EarlierApprovalModel(by=each.by, at_us=each.at_us, changed=list(each.changed))
+            for each in state.earlier
+        ],
+    )
