@@ -36,7 +36,8 @@ class RecordPages:
         """Return the records after `after`, about `limit` of them, as JSON."""
         page = await self._control.records(summary.run, after, limit)
         view = self._views.pop((summary.run, after), None) or await self._view(summary, after)
-        content = page_of(page, view, limit)
+        # In a thread, as thousands of records take longer than the executive may wait.
+        content = await asyncio.to_thread(page_of, page, view, limit)
         if page:
             self._views[summary.run, page[-1].seq] = view
         while len(self._views) > KEPT_VIEWS:
