@@ -114,13 +114,15 @@ def router(
     ) -> Response:
         """Its records after one of them: 0, or the `next` of the page before."""
         result = _result(jobs.get(identifier))
-        view = new_view(
-            result.summary, names=await asyncio.to_thread(_names, control, result.files)
-        )
-        for stamped in result.records[:after]:
-            view.apply(stamped)
-        content = page_of(result.records[after : after + limit], view, limit)
-        return Response(content, media_type="application/json")
+
+        def page() -> bytes:
+            view = new_view(result.summary, names=_names(control, result.files))
+            for stamped in result.records[:after]:
+                view.apply(stamped)
+            return page_of(result.records[after : after + limit], view, limit)
+
+        # In a thread, as thousands of records take longer than the executive may wait.
+        return Response(await asyncio.to_thread(page), media_type="application/json")
 
     @routes.get("/{identifier}/mission")
     async def mission(_: Viewer, identifier: str) -> RunMissionModel:
