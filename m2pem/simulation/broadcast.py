@@ -18,6 +18,7 @@ SLOWEST_HZ = 1.0
 """Of what stands, so that its link is seen to be up."""
 
 WAITING_STATES = 1000
+"""Of a small fleet; of a larger one, two of each resource."""
 
 
 class Broadcast:
@@ -33,7 +34,8 @@ class Broadcast:
     ) -> None:
         # A state that carries a detection must not be lost to a slow reader.
         self.states: AsyncQueue[VehicleState | PayloadState] = AsyncQueue(
-            WAITING_STATES, lambda state: isinstance(state, VehicleState) or not state.detections
+            max(WAITING_STATES, 2 * len(bodies)),
+            lambda state: isinstance(state, VehicleState) or not state.detections,
         )
         self._bodies = bodies
         self._rates_hz = rates_hz

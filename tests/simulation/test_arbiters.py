@@ -434,6 +434,16 @@ def test_telemetry_comes_at_its_rate_while_moving_and_once_a_second_while_standi
     simulate(UGV, main, telemetry_hz=5.0)
 
 
+def test_the_first_state_of_each_of_many_vehicles_is_published(simulate: Simulate) -> None:
+    many: Fleet = {f"ugv{number}": ("ground", {}) for number in range(1200)}
+
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
+        await bench.clock.sleep(0.1)
+        assert {each.resource for each in bench.states} == set(many)
+
+    simulate(many, main, telemetry_hz=5.0)
+
+
 async def test_states_that_were_missed_while_the_computer_was_suspended_are_skipped() -> None:
     now_ns = [0]
     clock = SystemClock(start_us=START_US, steady_ns=lambda: now_ns[0])

@@ -15,7 +15,8 @@ from m2pem.api import (
 )
 
 BACKLOG = 1000
-"""Most states that wait; of each resource only the last one counts."""
+"""Most states that wait, of a small fleet; of a larger one, two of each resource. Of each only the
+last one counts."""
 
 _encode = msgspec.json.Encoder().encode
 
@@ -56,7 +57,9 @@ class FleetStates:
         self.teams = LatestStates()
         """By the id of the team's behavior."""
         self._lost = lost
-        self._telemetry = control.telemetry(size=BACKLOG)
+        fleet = control.fleet()
+        size = max(BACKLOG, 2 * (len(fleet.vehicles) + len(fleet.payloads)))
+        self._telemetry = control.telemetry(size=size)
 
     async def follow(self) -> None:
         """Follow until the executive ends."""
