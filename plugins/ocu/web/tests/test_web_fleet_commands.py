@@ -142,6 +142,24 @@ async def test_each_resource_has_its_own_result(world: MakeWorld) -> None:
         assert await here.control.runs() == []
 
 
+async def test_a_lost_vehicle_is_refused_with_the_reason(
+    world: MakeWorld, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async with world() as here:
+        browser = await here.browser()
+
+        async def unavailable() -> dict[str, str]:
+            return {VEHICLE: "lost: no telemetry for 3.0 s"}
+
+        monkeypatch.setattr(here.control, "unavailable", unavailable)
+        said = f"{VEHICLE} cannot be commanded now: lost: no telemetry for 3.0 s"
+        assert (await give(browser, "preview"))[0]["problem"] == said
+        assert (await goto(browser))["problem"] == said
+        assert (await give(browser, "hold"))[0]["problem"] == said
+        assert (await status(browser))["unavailable"] == "lost: no telemetry for 3.0 s"
+        assert await here.control.runs() == []
+
+
 @pytest.mark.parametrize("command", COMMANDS)
 async def test_a_viewer_commands_nothing_and_a_late_command_is_refused(
     world: MakeWorld, command: str

@@ -34,6 +34,9 @@ AT_A_TIME = 4
 
 HOLD = "hold"
 
+RETURNED = "returned: held"
+"""Of `MissionControl.unavailable`: it was lost, and can be commanded again."""
+
 Resources = Annotated[list[Name], Field(min_length=1, max_length=MOST_RESOURCES)]
 
 
@@ -135,7 +138,7 @@ def router(control: MissionControl, hub: Hub) -> APIRouter:
     async def preview(person: Operator, wanted: ResourcesModel) -> PreviewModel:
         """Say what a command of this user would end, before it is given."""
         commanded, holders = _commanded(hub), await control.holders()
-        unavailable = await control.unavailable()
+        unavailable = await _out_of_reach(control)
         return PreviewModel(
             effects=[
                 await _effect(control, each, person.name, commanded, holders, unavailable)
@@ -166,9 +169,10 @@ def router(control: MissionControl, hub: Hub) -> APIRouter:
     @routes.post("/execute")
     async def execute(person: Operator, wanted: CommandModel) -> ResultsModel:
         """Command a behavior: a run for each, in the place of this user's last one."""
-        commanded = _commanded(hub)
+        commanded, unavailable = _commanded(hub), await _out_of_reach(control)
 
         async def command(resource: str) -> RunId:
+            _refuse_unavailable(resource, unavailable)
             if wanted.take:
                 await _take_if_needed(control, resource, person.name, commanded)
             return await control.execute_behavior(
@@ -180,7 +184,7 @@ def router(control: MissionControl, hub: Hub) -> APIRouter:
     @routes.post("/hold")
     async def hold(person: Operator, wanted: HoldModel) -> ResultsModel:
         """Hold what was commanded outside of missions; command `hold` to what is free."""
-        commanded = _commanded(hub)
+        commanded, unavailable = _commanded(hub), await _out_of_reach(control)
 
         async def command(resource: str) -> RunId:
             found = commanded.get(resource)
@@ -188,6 +192,7 @@ def router(control: MissionControl, hub: Hub) -> APIRouter:
                 if not found.is_held:
                     await control.pause(found.run, by=person.name)
                 return found.run
+            _refuse_unavailable(resource, unavailable)
             if wanted.take:
                 await _take_if_needed(control, resource, person.name, commanded)
             return await control.execute_behavior(resource, HOLD, by=person.name)
@@ -251,6 +256,26 @@ def _busy(resource: str, holder: str) -> str:
     return f"{holder} has {resource}: ask {holder} to give it back"
 
 
+async def _out_of_reach(control: MissionControl) -> dict[str, str]:
+    """Why resources that nobody has cannot be commanded, such as lost ones."""
+    holders = await control.holders()
+    return {
+        str(resource): why
+        for resource, why in (await control.unavailable()).items()
+        if not holders.get(resource) and why != RETURNED
+    }
+
+
+def _unavailable(resource: str, why: str) -> str:
+    return f"{resource} cannot be commanded now: {why}"
+
+
+def _refuse_unavailable(resource: str, unavailable: Mapping[str, str]) -> None:
+    """Refuse what would begin a run that fails at once."""
+    if why := unavailable.get(resource):
+        raise _RefusedError(_unavailable(resource, why))
+
+
 async def _take_if_needed(
     control: MissionControl, resource: str, by: str, commanded: Mapping[str, _Commanded]
 ) -> None:
@@ -270,7 +295,7 @@ async def _effect(
     by: str,
     commanded: Mapping[str, _Commanded],
     holders: Mapping[ResourceId, str],
-    unavailable: Mapping[ResourceId, str],
+    unavailable: Mapping[str, str],
 ) -> EffectModel:
     known = ResourceId(resource)
 
@@ -286,8 +311,8 @@ async def _effect(
     if holder == by:
         return effect()
     if found is None and not holder:
-        why = unavailable.get(known, "")
-        return effect(*([f"missions do not get it now: {why}"] if why else []))
+        why = unavailable.get(resource)
+        return effect(problem=_unavailable(resource, why) if why else "")
     if holder and holder != by and not _is_of_run(holder):
         return effect(problem=_busy(resource, holder))
     if found is not None and found.is_direct:
