@@ -7,6 +7,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from m2pem.api.alerts import AlertsChanged, AlertSeverity, OperatorAlert
     from m2pem.api.approval import EarlierApproval, GivenApproval, MissionApproval
     from m2pem.api.arbiter import (
         AddressedArbiter,
@@ -178,6 +179,7 @@ if TYPE_CHECKING:
 
 # Loaded when asked for: an arbiter's module need not pay for what an OCU imports.
 _MODULES = {
+    "m2pem.api.alerts": "AlertSeverity AlertsChanged OperatorAlert",
     "m2pem.api.approval": "EarlierApproval GivenApproval MissionApproval",
     "m2pem.api.arbiter": (
         "AddressedArbiter AdjustingArbiter Arbiter ArbiterContext BehaviorId BehaviorReport"
@@ -298,6 +300,8 @@ __all__ = [
     "AddressedArbiter",
     "AdjustingArbiter",
     "Alert",
+    "AlertSeverity",
+    "AlertsChanged",
     "Arbiter",
     "ArbiterCapabilities",
     "ArbiterContext",
@@ -385,6 +389,7 @@ __all__ = [
     "OpenIncident",
     "OpenPrompt",
     "Operation",
+    "OperatorAlert",
     "Outline",
     "OutlineElement",
     "OutlineProcess",

@@ -4,6 +4,7 @@ from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, Union
 
+from m2pem.api.alerts import AlertsChanged, OperatorAlert
 from m2pem.api.allocation import (
     SharedSpaceChanged,
     SharedSpaceState,
@@ -46,7 +47,13 @@ if TYPE_CHECKING:
     from m2pem.mission.mission import Mission
 
 ControlEvent: TypeAlias = Union[
-    StampedRecord, OpenPrompt, PromptClosed, Alert, ScheduleChanged, SharedSpaceChanged
+    StampedRecord,
+    OpenPrompt,
+    PromptClosed,
+    Alert,
+    AlertsChanged,
+    ScheduleChanged,
+    SharedSpaceChanged,
 ]
 """What a subscriber gets: records and prompts in order, after they were committed, alerts and
 changes of the schedule at once, those of shared space within a second."""
@@ -382,6 +389,33 @@ class MissionControl(Protocol):
             OperatorError: the choice is wrong or comes too late, or others decide about it; the
                 error says what would be right.
             StuckError: the mission cannot complete after it, and that was not confirmed.
+        """
+        ...
+
+    async def alerts(self, *, over: bool = False) -> Sequence[OperatorAlert]:
+        """What operators must know now (docs/operating.md): the alerts that are open, the most
+        severe first, the newest of each severity first.
+
+        `over`: then also the last ones that are over, the newest first.
+        """
+        ...
+
+    async def acknowledge_alert(self, alert: str, *, by: str = "") -> None:
+        """Note that an operator has seen an alert: it calls nobody any more. One that was said
+        once, and is no condition that ends by itself, is over then.
+
+        Raises:
+            OperatorError: there is no such alert, it is over, or somebody has acknowledged it; or
+                the journal has not written it within 1.5 s.
+        """
+        ...
+
+    async def own_alert(self, alert: str, *, owner: str | None = None, by: str = "") -> None:
+        """Note who takes care of an alert. None: `by` does; "": nobody any more.
+
+        Raises:
+            OperatorError: there is no such alert, or it is over; or the journal has not written it
+                within 1.5 s.
         """
         ...
 

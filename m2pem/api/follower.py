@@ -11,6 +11,7 @@ from collections.abc import AsyncIterator
 from dataclasses import replace
 
 from m2pem.api import records as r
+from m2pem.api.alerts import AlertsChanged
 from m2pem.api.allocation import SharedSpaceChanged
 from m2pem.api.control import ControlEvent, MissionControl
 from m2pem.api.run_view import RunView
@@ -70,6 +71,9 @@ class Listener:
 
     def alerted(self, alert: Alert) -> None:
         """The executive warns of something that is in no run's records."""
+
+    def alerts_changed(self) -> None:
+        """The list of alerts has changed; `MissionControl.alerts` has it."""
 
     def schedule_changed(self) -> None:
         """The schedule has changed; `MissionControl.scheduled` has it."""
@@ -212,6 +216,8 @@ class Follower:
                 self.listener.alerted(event)
             case ScheduleChanged():
                 self.listener.schedule_changed()
+            case AlertsChanged():
+                self.listener.alerts_changed()
             case SharedSpaceChanged():
                 self.listener.shared_space_changed()
 

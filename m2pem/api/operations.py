@@ -15,6 +15,7 @@ from typing import Any, get_args
 
 import msgspec
 
+from m2pem.api.alerts import AlertsChanged, OperatorAlert
 from m2pem.api.allocation import (
     SharedSpaceChanged,
     SharedSpaceState,
@@ -111,6 +112,25 @@ class Resolve(Choice, frozen=True):
 
     by: str = ""
     even_if_stuck: bool = False
+
+
+class Alerts(Params, frozen=True):
+    """As `MissionControl.alerts`."""
+
+    over: bool = False
+
+
+class OfAlert(Params, frozen=True):
+    """An alert, and who asks."""
+
+    alert: str
+    by: str = ""
+
+
+class OwnAlert(OfAlert, frozen=True):
+    """As `MissionControl.own_alert`."""
+
+    owner: str | None = None
 
 
 class Signal(Params, frozen=True):
@@ -293,7 +313,15 @@ class Operation:
         return method(**{name: getattr(params, name) for name in fields if name in accepted})
 
 
-Event = StampedRecord | OpenPrompt | PromptClosed | Alert | ScheduleChanged | SharedSpaceChanged
+Event = (
+    StampedRecord
+    | OpenPrompt
+    | PromptClosed
+    | Alert
+    | AlertsChanged
+    | ScheduleChanged
+    | SharedSpaceChanged
+)
 State = VehicleState | PayloadState | TeamState
 STREAMED: dict[str, type] = {kind.__name__: kind for kind in get_args(Event | State)}
 """What streams consist of, by the `kind` that a notification names."""
@@ -312,6 +340,9 @@ OPERATIONS: dict[str, Operation] = {
         Operation("incidents", Nothing, list[OpenIncident]),
         Operation("preview_incident", Choice, IncidentPreview, alone=True),
         Operation("resolve_incident", Resolve, alone=True),
+        Operation("alerts", Alerts, list[OperatorAlert]),
+        Operation("acknowledge_alert", OfAlert),
+        Operation("own_alert", OwnAlert),
         Operation("signal", Signal),
         Operation("message", Message),
         Operation("schedule", ToSchedule, EntryId, alone=True),

@@ -6,6 +6,7 @@ from enum import StrEnum
 from itertools import count, repeat
 from typing import NamedTuple, TypeAlias
 
+from m2pem.api.alerts import AlertSeverity
 from m2pem.api.telemetry import PayloadState, VehicleState
 from m2pem.engine.records import Record
 from m2pem.mission.behavior import Decision
@@ -180,11 +181,22 @@ NOT_STARTED = "NOT_STARTED"
 @dataclass(frozen=True, slots=True)
 class Alert:
     """A warning which no record has: a vehicle that did not take STOP, what an autopilot warns of,
-    a journal that does not write, a plugin that blocks. `run` "": it concerns all of them."""
+    a journal that does not write, a plugin that blocks. `run` "": it concerns all of them.
+
+    `resources`: whom it is about. `group`: those that are alike are one line of the list when they
+    come together; with the code as their group, also later. `listed`: whether the list gets it;
+    else a condition of the list says the same. `clears`: what alerts of the same code said before
+    is over.
+    """
 
     run: RunId
     code: str
     text: str
+    severity: AlertSeverity = AlertSeverity.WARNING
+    resources: tuple[str, ...] = ()
+    group: str = ""
+    listed: bool = True
+    clears: bool = False
 
 
 @dataclass(frozen=True, slots=True)

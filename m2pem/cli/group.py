@@ -47,6 +47,9 @@ COMMANDS = {
     "resolve": "Decide about an incident of a run that is running on this host.",
     "take": "Take a vehicle or payload from the missions, to steer it by hand.",
     "give-back": "Give a vehicle or payload that an operator has taken back to the missions.",
+    "alerts": "List what operators must know now.",
+    "acknowledge": "Note that you have seen alerts.",
+    "own": "Note who takes care of alerts.",
     "signal": "Send a signal to a run that is running on this host.",
     "stop": "Stop a run that is running on this host, or all of them.",
     "pause": "Pause a run that is running on this host.",
@@ -63,7 +66,13 @@ COMMANDS = {
 
 
 _RUN_CONTROL = frozenset({"answer", "continue", "pause", "signal", "stop"})
-_MODULES = {**dict.fromkeys(_RUN_CONTROL, "run_control"), "resolve": "incidents", "give-back": "take"}
+_MODULES = {
+    **dict.fromkeys(_RUN_CONTROL, "run_control"),
+    "resolve": "incidents",
+    "give-back": "take",
+    "acknowledge": "alerts",
+    "own": "alerts",
+}
 
 
 def built_in(name: str) -> click.Command:

@@ -21,6 +21,7 @@ from m2pem.allocation.assignment import Request, assign
 from m2pem.allocation.candidates import LatestState
 from m2pem.allocation.explanation import Lack, lack, reason, what_was_considered
 from m2pem.allocation.needs import ConsideredRole, Occupancy
+from m2pem.api.alerts import AlertSeverity
 from m2pem.api.clock import Clock
 from m2pem.api.runs import Alert, RunId
 from m2pem.engine import records as r
@@ -472,7 +473,9 @@ class Allocator:
             )
             holder.runner.post(BehaviorPreempted(holder.id, resource, each.request.id, reason))
             text = f"{holder.task} is preempted: {reason}"
-            self._publish(Alert(holder.runner.id, PREEMPTED, text))
+            self._publish(
+                Alert(holder.runner.id, PREEMPTED, text, AlertSeverity.NOTICE, (resource,))
+            )
 
     def _give_preempted(self) -> None:
         """Give requests what was taken for them if the behaviors that had it have ended."""

@@ -6,6 +6,7 @@ from contextlib import AbstractAsyncContextManager
 from pathlib import Path
 from typing import Any, Protocol
 
+from m2pem.api.alerts import OperatorAlert
 from m2pem.api.allocation import (
     SharedSpaceState,
     StartPreview,
@@ -50,6 +51,7 @@ from m2pem.errors import (
     OperatorError,
     StuckError,
 )
+from m2pem.executive.alert_list import AlertList
 from m2pem.executive.direct_behaviors import DirectBehaviors
 from m2pem.executive.ended_runs import explain_end, in_words, refuse_ended
 from m2pem.executive.health import ExecutiveHealth
@@ -101,6 +103,7 @@ class Control:
         schedule: ScheduleEntries,
         scheduler: Scheduler,
         switchover: Switchover,
+        alerts: AlertList,
         statistics: StatisticsReader,
         rehearse: Rehearse | None = None,
         foresee: Foresee | None = None,
@@ -110,6 +113,7 @@ class Control:
         self._schedule = schedule
         self._scheduler = scheduler
         self._switchover = switchover
+        self._alerts = alerts
         self._bus = bus
         self._health = health
         self._statistics = statistics
@@ -430,6 +434,18 @@ class Control:
             if preview.verdict is IncidentVerdict.CANNOT_COMPLETE:
                 raise StuckError(f"{run}: {choice} was not done: {preview}")
         await self._ask("resolve_incident", run, item)
+
+    async def alerts(self, *, over: bool = False) -> Sequence[OperatorAlert]:
+        """The alerts that are open; with `over`, also those that are over."""
+        return self._alerts.alerts(over=over)
+
+    async def acknowledge_alert(self, alert: str, *, by: str = "") -> None:
+        """Note that an operator has seen an alert."""
+        await self._alerts.acknowledge(alert, by)
+
+    async def own_alert(self, alert: str, *, owner: str | None = None, by: str = "") -> None:
+        """Note who takes care of an alert."""
+        await self._alerts.own(alert, by if owner is None else owner)
 
     def _refuse_others(self, what: str, role: str, by: str) -> None:
         """Check that an operator has the role of those who decide about something.

@@ -14,6 +14,7 @@ from queue import Full, Queue
 from types import TracebackType
 from typing import Self
 
+from m2pem.api.alerts import AlertSeverity
 from m2pem.api.control import ControlEvent
 from m2pem.api.runs import LOGGED, Alert, RunId
 from m2pem.engine.records import Record
@@ -83,6 +84,8 @@ class ControlEvents:
 
     def __init__(self) -> None:
         self.cut_off = 0
+        self.on_alert: Callable[[Alert], None] = lambda alert: None
+        """Takes each alert, also when nobody subscribes."""
         self._subscriptions: list[weakref.ref[Subscription]] = []
         self._ended = False
 
@@ -111,7 +114,9 @@ class ControlEvents:
         return subscription
 
     def publish(self, *events: ControlEvent) -> None:
-        """Send events to all subscriptions."""
+        """Send events to all subscriptions. An alert is published alone."""
+        if len(events) == 1 and isinstance(events[0], Alert):
+            self.on_alert(events[0])
         for reference in self._subscriptions:
             subscription = reference()
             if subscription is not None and subscription.put(events):
@@ -217,7 +222,11 @@ LOGGERS = (
 
 
 class LoggedAlerts(logging.Handler):
-    """Publish each warning and error of `LOGGERS` as an alert, between enter and exit."""
+    """Publish each warning and error of `LOGGERS` as an alert, between enter and exit.
+
+    Records may say more in `extra`: `resource`, whom it is about; `notice`, that it needs nobody;
+    `unlisted`, that the list of alerts has it by itself.
+    """
 
     def __init__(self, events: ControlEvents) -> None:
         super().__init__(logging.WARNING)
@@ -240,6 +249,18 @@ class LoggedAlerts(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         """Any thread may log."""
-        alert = Alert("", LOGGED, record.getMessage())
+        severity = AlertSeverity.ERROR if record.levelno >= logging.ERROR else AlertSeverity.WARNING
+        if getattr(record, "notice", False):
+            severity = AlertSeverity.NOTICE
+        about = getattr(record, "resource", "")
+        alert = Alert(
+            "",
+            LOGGED,
+            record.getMessage(),
+            severity,
+            (str(about),) if about else (),
+            group=str(record.msg),
+            listed=not getattr(record, "unlisted", False),
+        )
         if not self._loop.is_closed():
             self._loop.call_soon_threadsafe(self._events.publish, alert)

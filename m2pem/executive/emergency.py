@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from uuid import UUID
 
+from m2pem.api.alerts import AlertSeverity
 from m2pem.api.runs import Alert, RunId
 from m2pem.engine import inputs as i
 from m2pem.engine import records as r
@@ -119,9 +120,12 @@ class EmergencyCommands:
                 self._alert("STOP", runner.id, resources, record.reason or record.code)
 
     def _alert(self, what: str, run: RunId, resources: Iterable[str], why: str) -> None:
+        resources = tuple(resources)
         names = ", ".join(resources)
         text = f"{names} may not have received the {what} of {run}: {why}. Use its own stop"
-        self._events.publish(Alert(run, "NOT_RECEIVED", text))
+        self._events.publish(
+            Alert(run, "NOT_RECEIVED", text, AlertSeverity.CRITICAL, resources, group=what)
+        )
 
     def _watch(self, what: str, run: RunId, orders: Mapping[str, Order]) -> None:
         if orders:

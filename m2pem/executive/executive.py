@@ -19,6 +19,9 @@ from m2pem.api.arbiter import ArbiterContext, BehaviorId, BehaviorReport
 from m2pem.api.clock import Clock, SystemClock
 from m2pem.api.runs import RunId
 from m2pem.errors import FleetServedError, JournalError, M2pemError
+from m2pem.executive.alert_conditions import AlertConditions
+from m2pem.executive.alert_list import AlertList
+from m2pem.executive.alert_watch import keep_alerts, watch_alerts, write_alerts
 from m2pem.executive.approvals import Approvals
 from m2pem.executive.behavior_lifecycle import ExecutiveViews
 from m2pem.executive.control import Control, Rehearse
@@ -88,6 +91,8 @@ class Executive:
         self.clock = clock
         self.bus = Bus()
         self.events = ControlEvents()
+        self.alerts = AlertList(fleet.name, journal, clock.now_us)
+        self.events.on_alert = self.alerts.add
         self.arbiters = FleetArbiters(
             fleet,
             plugins,
@@ -116,6 +121,8 @@ class Executive:
             RunSettings(speed, tuple(search_path), limit, on_records, has_others),
             observers=self._observers,
         )
+        self._supervisor.on_alert = self.alerts.add
+        self._conditions = AlertConditions(self._supervisor, self.bus, lambda: self._links)
         self._connections = FleetConnections(
             self.arbiters, self._on_report, self._supervisor.on_telemetry
         )
@@ -144,6 +151,7 @@ class Executive:
             self._schedule,
             self._scheduler,
             self.switchover,
+            self.alerts,
             StatisticsReader(
                 self._supervisor, self.bus, self._observers, clock, lambda: self._links
             ),
@@ -170,6 +178,7 @@ class Executive:
             PluginError: an arbiter cannot connect.
         """
         await self._serve_fleet()
+        await self._load_alerts()
         try:
             self._locks.acquire()
             await self._connections.connect()
@@ -189,6 +198,10 @@ class Executive:
             self._listen(group, "watch of the runs' claims", self.ownership.watch)
             if self.journal.lease_s is not None and self._locks.resources:
                 self._listen(group, "watch of who serves the fleet", self._watch_fleet)
+        if isinstance(self.clock, SystemClock):
+            publish = self.events.publish
+            self._listen(group, "alerts", partial(watch_alerts, self.alerts, self.look, publish))
+            self._listen(group, "journal of alerts", partial(keep_alerts, self.alerts))
         if self.journal.file is not None:
             watching = partial(watch_space, self.journal.file, self.events)
             self._listen(group, "watch of free space", watching)
@@ -229,9 +242,21 @@ class Executive:
             if self._observers is not None:
                 await self._observers.close()
             await self._supervisor.close()
+            await write_alerts(self.alerts)
             self.bus.close()
             self.events.end()
             await self._stack.aclose()
+
+    def look(self) -> None:
+        """Raise and clear alerts by what is so now; on the clock of the system it is done twice a
+        second."""
+        self.alerts.update(self._conditions.now(), self._conditions.undecided)
+
+    async def _load_alerts(self) -> None:
+        try:
+            await self.alerts.load()
+        except JournalError as error:  # what matters more needs the journal, too, and says so
+            log.warning("who has acknowledged which alert is not known: %s", error)
 
     async def _serve_fleet(self) -> None:
         """Let no other executive on the journal command the vehicles, until it is closed; those

@@ -168,7 +168,9 @@ class LostResources:
             return
         if resource in self._stopping:
             return
-        log.warning("%s: its link is restored; it must end %s", resource, self._what(resource))
+        about = {"resource": resource, "notice": True}
+        what = self._what(resource)
+        log.warning("%s: its link is restored; it must end %s", resource, what, extra=about)
         self._explain(
             resource, f"its link is restored, and it must first end {self._what(resource)}"
         )
@@ -219,7 +221,10 @@ class LostResources:
             self._show(self.annotated(said))
         now = self._availability.reason(resource) or "free"
         log.warning(
-            "%s: its link is restored, it has ended what it did before, and is %s", resource, now
+            "%s: its link is restored, it has ended what it did before, and is %s",
+            resource,
+            now,
+            extra={"resource": resource, "notice": True},
         )
 
     async def _end_command(self, resource: ResourceId) -> str:

@@ -19,6 +19,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Self
 
+from m2pem.api.alerts import AlertSeverity
 from m2pem.api.runs import Alert
 from m2pem.errors import JournalError
 from m2pem.executive.control_events import ControlEvents
@@ -104,7 +105,7 @@ class LoopMonitor:
                 f"{self._blocked_by} blocked the executive"
             )
             self._blocked_by = ""
-            self._events.publish(Alert("", "BLOCKED", text))
+            self._events.publish(Alert("", "BLOCKED", text, AlertSeverity.ERROR))
             self._health.blocked(text)
         self._timer = self._loop.call_later(TICK_S, self._tick)
 
@@ -181,8 +182,10 @@ async def watch_space(journal: Path, events: ControlEvents) -> None:
             log.warning("%s: its disk cannot be asked for free space: %s", journal, error.strerror)
             text = ""
         if text and short_for % AGAIN_AFTER == 0:
-            events.publish(Alert("", CODE, text))
+            events.publish(Alert("", CODE, text, AlertSeverity.ERROR, group=CODE))
         elif not text and short_for:
-            events.publish(Alert("", CODE, f"there is room again in {journal.parent}"))
+            text = f"there is room again in {journal.parent}"
+            events.publish(Alert("", CODE, text, AlertSeverity.NOTICE, clears=True))
+            text = ""
         short_for = short_for + 1 if text else 0
         await asyncio.sleep(EVERY_S)

@@ -12,6 +12,7 @@ from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
+from m2pem.api.alerts import AlertSeverity
 from m2pem.api.clock import Clock
 from m2pem.api.log_context import current_run
 from m2pem.api.runs import Alert, OpenPrompt, PromptClosed, RunId, stamped_records
@@ -310,7 +311,7 @@ class Runner:
             f"paused: {why}: a loop of the mission may have no end. Stop it, or resume it for as "
             "many steps more; the fleet's steps_between_waits is the bound"
         )
-        self._context.events.publish(Alert(self.id, "NEVER_WAITS", text))
+        self._context.events.publish(Alert(self.id, "NEVER_WAITS", text, AlertSeverity.ERROR))
         return PauseRun(f"m2pem, as {why}")
 
     async def _wait_until(self, due_us: int) -> None:
@@ -408,7 +409,9 @@ class Runner:
             f"the journal has not written for {STALLED_AFTER_S:g} s: the run commands nothing new "
             "until it does. STOP and pause reach its vehicles all the same"
         )
-        self._context.events.publish(Alert(self.id, "JOURNAL_STALLED", text))
+        self._context.events.publish(
+            Alert(self.id, "JOURNAL_STALLED", text, AlertSeverity.CRITICAL)
+        )
 
     def _settle_pause(self) -> None:
         """The pause that was sent ahead is decided: from here on the run's own state counts."""
@@ -537,8 +540,8 @@ class Runner:
             f"held: {failure}. Commanded to hold: {resources or 'no vehicle'}. Mend the cause, "
             f"start again and go on with `m2pem resume {self.id}`"
         )
-        log.error("%s: %s", self.id, text)
-        self._context.events.publish(Alert(self.id, "RUN_HELD", text))
+        log.error("%s: %s", self.id, text, extra={"unlisted": True})
+        self._context.events.publish(Alert(self.id, "RUN_HELD", text, AlertSeverity.CRITICAL))
 
     # --- taking over after a restart --------------------------------------------------------------
 

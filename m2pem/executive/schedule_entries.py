@@ -10,6 +10,7 @@ from contextlib import contextmanager
 
 import msgspec
 
+from m2pem.api.alerts import AlertSeverity
 from m2pem.api.runs import NOT_STARTED, SCHEDULE, Alert, RunId
 from m2pem.api.schedule import Schedule, ScheduleChanged, ScheduledMission
 from m2pem.errors import JournalError, OperatorError
@@ -27,6 +28,8 @@ from m2pem.scheduling.entry import (
     SchedulePlan,
     entry_number,
 )
+
+_SEVERITIES = {NOT_STARTED: AlertSeverity.WARNING}
 
 log = logging.getLogger("m2pem.schedule")
 
@@ -220,7 +223,7 @@ class ScheduleEntries:
     def say(self, text: str, code: str = SCHEDULE) -> None:
         """Tell operators what was done with the schedule."""
         log.info("%s", text)
-        self._publish(Alert("", code, text))
+        self._publish(Alert("", code, text, _SEVERITIES.get(code, AlertSeverity.NOTICE)))
         self._publish(ScheduleChanged())
 
     def view(self) -> Schedule:

@@ -11,6 +11,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from m2pem.api.alerts import BATTERY_LOW, RUN_FAILED, AlertSeverity
 from m2pem.api.allocation import SharedSpaceState
 from m2pem.api.arbiter import BehaviorId, BehaviorReport
 from m2pem.api.clock import Clock
@@ -20,7 +21,7 @@ from m2pem.api.service import ServiceContext
 from m2pem.api.telemetry import TeamState, Telemetry
 from m2pem.bpmn.one_task import is_one_task
 from m2pem.engine.inputs import GeometrySet, Input, ResourceFault
-from m2pem.engine.records import Record, RunEnded, WorkReassigned
+from m2pem.engine.records import Record, RunEnded, RunOutcome, WorkReassigned
 from m2pem.engine.run import STEPS_AT_ONCE, MissionRun
 from m2pem.engine.state import OutOfReach, RunStatus
 from m2pem.errors import (
@@ -170,6 +171,8 @@ class Supervisor:
         self.availability.on_change = self._resources_changed
         self.on_change: Callable[[], None] = lambda: None
         """Is called when a run has ended, or when resources may be free."""
+        self.on_alert: Callable[[Alert], None] = lambda alert: None
+        """Takes an alert for the list alone: subscribers learn of it from the records."""
         self.served_by_another: Callable[[], Awaitable[str]] | None = None
         """Says which other executive may serve the fleet, or ""; None: none can."""
         self.emergency = EmergencyCommands(self.dispatcher, events, self.marks)
@@ -398,6 +401,9 @@ class Supervisor:
         for record in records[-3:]:
             if isinstance(record, RunEnded):
                 self.counts.ended[record.outcome.value] += 1
+                if record.outcome is RunOutcome.FAILED:
+                    text = f"failed: {record.detail}" if record.detail else "failed"
+                    self.on_alert(Alert(run, RUN_FAILED, text, AlertSeverity.ERROR))
                 self.marks.remove(run)
 
     # --- what happens outside of the runs -------------------------------------------------------
@@ -436,7 +442,7 @@ class Supervisor:
             f"{error}. This executive commands nothing more for {run}; its vehicles do what the "
             f"other one commands. STOP of {run} here still holds them"
         )
-        self.events.publish(Alert(run, "RUN_REPLACED", text))
+        self.events.publish(Alert(run, "RUN_REPLACED", text, AlertSeverity.CRITICAL))
 
     def on_telemetry(self, state: Telemetry) -> None:
         """An arbiter published the state of a vehicle, payload or team."""
@@ -452,7 +458,9 @@ class Supervisor:
 
     def fault(self, fault: ResourceFault) -> None:
         """Post the fault of a vehicle or payload, or its lost link, to the runs that command it."""
-        about = {"resource": fault.resource}
+        about: dict[str, object] = {"resource": fault.resource}
+        # The list of alerts has the lost link and the low battery as conditions, which end.
+        about["unlisted"] = fault.code in (LINK_LOST, BATTERY_LOW)
         log.warning("%s: %s: %s", fault.resource, fault.code, fault.reason, extra=about)
         resource = ResourceId(fault.resource)
         if not fault.reachable:

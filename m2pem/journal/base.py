@@ -392,6 +392,21 @@ class Journal(Protocol):
         """Return who has edited these files, by their hashes, as far as it is known."""
         ...
 
+    # --- alerts ---------------------------------------------------------------------------------
+
+    async def write_alerts(self, fleet: str, alerts: Mapping[int, str | None]) -> None:
+        """Write alerts of a fleet by their numbers, new ones or in place of those of the same
+        number; None: remove it. Durable on return.
+
+        Raises:
+            JournalError: they cannot be written.
+        """
+        ...
+
+    async def alerts(self, fleet: str) -> Mapping[int, str]:
+        """Return the alerts of a fleet by their numbers, which rise, as they were written."""
+        ...
+
     async def close(self) -> None:
         """Finish what is being written, and release all runs."""
         ...

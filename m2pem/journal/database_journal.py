@@ -449,6 +449,21 @@ class DatabaseJournal(ABC):
                 found[digest] = decode_part(row[0], Edit)
         return found
 
+    async def write_alerts(self, fleet: str, alerts: Mapping[int, str | None]) -> None:
+        """See `Journal.write_alerts`."""
+        self._check_open()
+        await self._writer.submit(lambda transaction: transaction.write_alerts(fleet, alerts))
+
+    async def alerts(self, fleet: str) -> Mapping[int, str]:
+        """See `Journal.alerts`."""
+        return await self._read(lambda: self._alerts(fleet))
+
+    def _alerts(self, fleet: str) -> Mapping[int, str]:
+        rows = self._reading.execute(
+            "SELECT number, alert FROM alerts WHERE fleet = ? ORDER BY number", (fleet,)
+        )
+        return dict(rows)
+
     async def _read(self, work: Callable[[], T]) -> T:
         self._check_open()
         try:

@@ -52,6 +52,7 @@ class MemoryJournal:
         self._last = 0
         self._entries: dict[str, ScheduleEntry] = {}
         self._holds: dict[str, Hold | None] = {}
+        self._alerts: dict[str, dict[int, str]] = {}
         self._last_entry = 0
         self._approvals: dict[tuple[str, str, str], Approval] = {}
         self._edits: dict[str, Edit] = {}
@@ -306,6 +307,21 @@ class MemoryJournal:
         """See `Journal.edits`."""
         self._check_open()
         return {each: self._edits[each] for each in digests if each in self._edits}
+
+    async def write_alerts(self, fleet: str, alerts: Mapping[int, str | None]) -> None:
+        """See `Journal.write_alerts`."""
+        self._check_open()
+        kept = self._alerts.setdefault(fleet, {})
+        for number, text in alerts.items():
+            if text is None:
+                kept.pop(number, None)
+            else:
+                kept[number] = text
+
+    async def alerts(self, fleet: str) -> Mapping[int, str]:
+        """See `Journal.alerts`."""
+        self._check_open()
+        return dict(sorted(self._alerts.get(fleet, {}).items()))
 
     async def close(self) -> None:
         """See `Journal.close`."""

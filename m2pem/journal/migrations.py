@@ -146,6 +146,18 @@ def approvals(connection: sqlite3.Connection) -> None:
     connection.execute("CREATE TABLE edits (digest TEXT PRIMARY KEY, edit TEXT NOT NULL)")
 
 
+def alerts(connection: sqlite3.Connection) -> None:
+    """0.9: what operators are alerted of, who acknowledged it and who takes care, as JSON."""
+    connection.execute(
+        """CREATE TABLE alerts (
+            fleet TEXT NOT NULL,
+            number INTEGER NOT NULL,
+            alert TEXT NOT NULL,
+            PRIMARY KEY (fleet, number)
+        ) WITHOUT ROWID"""
+    )
+
+
 MIGRATIONS: tuple[Callable[[sqlite3.Connection], None], ...] = (
     runs_standings_and_entries,
     other_files_of_missions,
@@ -155,6 +167,7 @@ MIGRATIONS: tuple[Callable[[sqlite3.Connection], None], ...] = (
     schedule,
     origin_of_salvaged_runs,
     approvals,
+    alerts,
 )
 
 

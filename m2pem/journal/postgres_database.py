@@ -285,6 +285,14 @@ def approvals(connection: psycopg.Connection[Any]) -> None:
     connection.execute("CREATE TABLE edits (digest TEXT PRIMARY KEY, edit TEXT NOT NULL)")
 
 
+def alerts(connection: psycopg.Connection[Any]) -> None:
+    """0.4: what operators are alerted of, who acknowledged it and who takes care, as JSON."""
+    connection.execute(
+        "CREATE TABLE alerts (fleet TEXT NOT NULL, number BIGINT NOT NULL, alert TEXT NOT NULL,"
+        " PRIMARY KEY (fleet, number))"
+    )
+
+
 MIGRATIONS: tuple[Callable[[psycopg.Connection[Any]], None], ...] = (
     first_tables,
     fleets,
@@ -292,6 +300,7 @@ MIGRATIONS: tuple[Callable[[psycopg.Connection[Any]], None], ...] = (
     pages,
     server_starts,
     approvals,
+    alerts,
 )
 """A released step is never changed; a change becomes a new step at the end."""
 

@@ -355,6 +355,22 @@ class WriteTransaction:
         )
         self._wrote = True
 
+    def write_alerts(self, fleet: str, alerts: Mapping[int, str | None]) -> None:
+        """Write or remove alerts of a fleet."""
+        self._refuse_while_short()
+        for number, text in alerts.items():
+            if text is None:
+                self._connection.execute(
+                    "DELETE FROM alerts WHERE fleet = ? AND number = ?", (fleet, number)
+                )
+            else:
+                self._connection.execute(
+                    "INSERT INTO alerts VALUES (?, ?, ?)"
+                    " ON CONFLICT (fleet, number) DO UPDATE SET alert = excluded.alert",
+                    (fleet, number, text),
+                )
+        self._wrote = True
+
     def append(self, rows: Sequence[EntryRow]) -> None:
         """Add entries."""
         changed: dict[int, RunPosition] = {}

@@ -108,6 +108,10 @@ class LinkMonitor:
         link = self._links.get(resource)
         return link is not None and link.lost
 
+    def has_low_battery(self, resource: ResourceId) -> bool:
+        """Whether the battery of a resource counts as low."""
+        return resource in self._low
+
     def receives_nothing(self, now_us: int) -> bool:
         """Whether nothing is received any more of all that was received since connecting: each link
         is lost, or silent for two fifths of its bound. False also while states may still wait, as

@@ -232,7 +232,8 @@ async def test_an_older_executive_that_drives_on_keeps_the_length_of_its_lease(
         await older.serve_fleet("north", ["ugv1"])
         for statement in (
             "ALTER TABLE executives DROP COLUMN lease, DROP COLUMN server_start",
-            "UPDATE m2pem_format SET version = version - 1",
+            "DROP TABLE approvals, edits, alerts",
+            "UPDATE m2pem_format SET version = version - 3",
         ):
             postgres.execute(statement, postgres_url)
         async with opened(lambda: open_journal(postgres_url)):

@@ -177,6 +177,34 @@ class JournalSchedule(JournalFixtures):
             await journal.hold_schedule("another", Hold("anna", "rain", 8))
             assert await journal.create(HEADER, started) == "r1"
 
+    async def test_alerts_are_kept_for_each_fleet_by_their_numbers(
+        self, open_journal: OpenJournal
+    ) -> None:
+        """Until they are removed."""
+        async with opened(open_journal) as journal:
+            assert await journal.alerts("north") == {}
+            await journal.write_alerts("north", {2: "two", 1: "one"})
+            await journal.write_alerts("south", {1: "another"})
+            await journal.write_alerts("north", {2: "two, acknowledged", 3: "three"})
+            assert list((await journal.alerts("north")).items()) == [
+                (1, "one"),
+                (2, "two, acknowledged"),
+                (3, "three"),
+            ]
+            await journal.write_alerts("north", {1: None, 2: None, 9: None})
+            assert await journal.alerts("north") == {3: "three"}
+            assert await journal.alerts("south") == {1: "another"}
+
+    @needs("durability")
+    async def test_what_operators_did_about_alerts_outlives_the_journal_that_wrote_it(
+        self, open_journal: OpenJournal
+    ) -> None:
+        """The next executive reads it."""
+        async with opened(open_journal) as journal:
+            await journal.write_alerts("north", {1: "acknowledged by anna"})
+        async with opened(open_journal) as journal:
+            assert await journal.alerts("north") == {1: "acknowledged by anna"}
+
     @needs("durability")
     async def test_each_of_two_journals_sees_what_the_other_does_with_the_schedule(
         self, open_journal: OpenJournal

@@ -19,6 +19,7 @@ from m2pem_plugin_web.live.standbys import Standbys
 from m2pem_plugin_web.pages import Pages
 from m2pem_plugin_web.problems import ProblemModel, handle_problems
 from m2pem_plugin_web.rest import (
+    alerts,
     approvals,
     catalogue,
     checks,
@@ -59,6 +60,7 @@ def routers_of(
         steering.resource_router(control),
         fleet_commands.router(control, hub),
         incidents.router(control),
+        alerts.router(control),
         missions.router(control, folder),
         approvals.router(control, folder),
         missions.template_router(),

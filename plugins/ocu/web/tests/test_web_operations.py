@@ -8,12 +8,14 @@ import httpx
 import pytest
 from fastapi import FastAPI
 from m2pem_plugin_web.live.standbys import Standbys
-from m2pem_plugin_web.rest import incidents, schedule, standbys, steering
+from m2pem_plugin_web.rest import alerts, incidents, schedule, standbys, steering
 from rest_world import As, app_of
 
 from m2pem.api import (
     OPERATIONS,
+    AlertSeverity,
     MissionControl,
+    OperatorAlert,
     RunStatus,
     RunSummary,
     Schedule,
@@ -35,6 +37,8 @@ COMMANDS: dict[str, tuple[str, str, Any]] = {
             "even_if_stuck": True,
         },
     ),
+    "acknowledge_alert": ("POST", "/api/alerts/a1/acknowledge", None),
+    "own_alert": ("POST", "/api/alerts/a1/own", {"owner": "otto"}),
     "signal": ("POST", "/api/runs/r1/signals", {"signal": "s", "data": {"a": 1}}),
     "message": ("POST", "/api/runs/r1/messages", {"message": "m", "data": {"a": 1}}),
     "stop": ("POST", "/api/runs/r1/stop", {"reason": "rain"}),
@@ -70,6 +74,8 @@ SENT = {
     "geometry": {"type": "Point", "coordinates": [7.0, 51.0]},
     "resource": "ugv1/camera",
     "entry": "s1",
+    "alert": "a1",
+    "owner": "otto",
     "by": "a commander",
 }
 """What the requests of `COMMANDS` say, by the parameter of the operation."""
@@ -82,6 +88,7 @@ QUERIES = {
     "mission_time_s": "/api/runs/{run}",
     "prompts": "/api/prompts",
     "incidents": "/api/incidents",
+    "alerts": "/api/alerts",
     "holders": "/api/resources",
     "holder_labels": "/api/resources",
     "unavailable": "/api/resources",
@@ -126,6 +133,8 @@ def control() -> Mock:
     entry = ScheduledMission(SENT["entry"], "M", "P", When(), "", ScheduledStatus.SCHEDULED)
     control.scheduled = AsyncMock(return_value=Schedule((entry,)))
     control.holders = AsyncMock(return_value={SENT["resource"]: ""})
+    alert = OperatorAlert(SENT["alert"], AlertSeverity.WARNING, "QUESTION", "asks: Go?", 0, 0)
+    control.alerts = AsyncMock(return_value=[alert])
     control.runs = AsyncMock(return_value=[RunSummary("r1", "M", "P", RunStatus.RUNNING, 0)])
     return control
 
@@ -139,6 +148,7 @@ def app(control: Mock) -> FastAPI:
         steering.resource_router(control),
         schedule.router(control, Mock()),
         incidents.router(control),
+        alerts.router(control),
         standbys.router(Standbys(control)),
     )
 

@@ -135,6 +135,10 @@ class Hub(Listener):
         is_news = alert.code == SCHEDULE
         self._send_to_all(messages.notice(text) if is_news else messages.fault(text))
 
+    def alerts_changed(self) -> None:
+        """Send at once that the alerts are to be read again."""
+        self._send_to_all(messages.alerts_changed())
+
     def schedule_changed(self) -> None:
         """Send at once that the schedule is to be read again."""
         self._send_to_all(messages.schedule_changed())

@@ -89,6 +89,11 @@ def schedule_changed() -> dict[str, Any]:
     return {"type": "schedule"}
 
 
+def alerts_changed() -> dict[str, Any]:
+    """Return the message that the alerts are to be read again: `GET /api/alerts`."""
+    return {"type": "alerts"}
+
+
 def shared_space_changed() -> dict[str, Any]:
     """Return the message that shared space is to be read again: `GET /api/resources`."""
     return {"type": "shared_space"}

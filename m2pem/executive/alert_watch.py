@@ -1,0 +1,62 @@
+"""Looks at what is so now, tells operators when the list of alerts has changed, and keeps it."""
+
+import asyncio
+import logging
+from collections.abc import Callable
+from contextlib import suppress
+
+from m2pem.api.alerts import AlertsChanged
+from m2pem.errors import JournalError
+from m2pem.executive.alert_list import WRITTEN_WITHIN_S, AlertList
+
+log = logging.getLogger("m2pem.alerts")
+
+LOOK_EVERY_S = 0.5
+TOLD_EVERY_S = 0.1
+"""However many alerts come, operators are told no more often that the list has changed."""
+
+WRITE_AGAIN_S = 5.0
+
+
+async def watch_alerts(
+    alerts: AlertList, look: Callable[[], None], publish: Callable[[AlertsChanged], None]
+) -> None:
+    """Look, and publish an event after each change, for ever. `look`: updates the list."""
+    changed = asyncio.Event()
+    alerts.on_change = changed.set
+    known = alerts.changes
+    while True:
+        look()
+        if alerts.changes != known:
+            known = alerts.changes
+            publish(AlertsChanged())
+        changed.clear()
+        await asyncio.sleep(TOLD_EVERY_S)
+        with suppress(TimeoutError):
+            async with asyncio.timeout(LOOK_EVERY_S - TOLD_EVERY_S):
+                await changed.wait()
+
+
+async def keep_alerts(alerts: AlertList) -> None:
+    """Have the journal keep the list, for ever; what it does not write is written later."""
+    written, said = -1, False
+    while True:
+        if alerts.changes != written:
+            changes = alerts.changes
+            try:
+                await alerts.write()
+            except JournalError as error:
+                if not said:
+                    log.warning("the journal does not keep the alerts: %s", error)
+                said = True
+                await asyncio.sleep(WRITE_AGAIN_S)
+                continue
+            written, said = changes, False
+        await asyncio.sleep(LOOK_EVERY_S)
+
+
+async def write_alerts(alerts: AlertList) -> None:
+    """Have the journal keep the list at the end; what fails then was said before."""
+    with suppress(JournalError, TimeoutError):
+        async with asyncio.timeout(WRITTEN_WITHIN_S):
+            await alerts.write()

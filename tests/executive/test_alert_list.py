@@ -1,0 +1,226 @@
+"""The list of alerts: raised and cleared, grouped, acknowledged, owned, and kept."""
+
+import pytest
+
+from m2pem.api.alerts import LINK_LOST, AlertSeverity
+from m2pem.api.runs import Alert
+from m2pem.errors import JournalError, OperatorError
+from m2pem.executive.alert_list import MOST_OVER, AlertList, Condition
+from m2pem.journal import MemoryJournal
+from m2pem.units import US_PER_S
+
+pytestmark = pytest.mark.asyncio
+
+
+class Clock:
+    """A clock that the test sets."""
+
+    def __init__(self) -> None:
+        self.s = 1000.0
+
+    def now_us(self) -> int:
+        return round(self.s * US_PER_S)
+
+
+class FullJournal(MemoryJournal):
+    """A journal whose disk is full."""
+
+    async def write_alerts(self, fleet, alerts):
+        raise JournalError("the disk is full")
+
+
+def lost(*names):
+    """Links that are lost now."""
+    return Condition(LINK_LOST, AlertSeverity.ERROR, "{names}: the link is lost", resources=names)
+
+
+def asks(prompt, run="r1", deadline_us=None):
+    """A question that is open."""
+    severity = AlertSeverity.WARNING
+    return Condition("QUESTION", severity, "asks: Go?", run, prompt, deadline_us=deadline_us)
+
+
+def update(alerts, *conditions, undecided=()):
+    alerts.update(conditions, lambda alert: undecided)
+
+
+def made(clock=None, journal=None):
+    return AlertList("north", journal or MemoryJournal(), (clock or Clock()).now_us)
+
+
+async def test_a_condition_is_raised_and_cleared_as_it_comes_and_goes():
+    alerts = made()
+    update(alerts, asks("p1"))
+    update(alerts, asks("p1"))
+    (alert,) = alerts.alerts()
+    assert (alert.alert, alert.run, alert.subject, alert.count) == ("a1", "r1", "p1", 1)
+    update(alerts)
+    assert alerts.alerts() == []
+    (over,) = alerts.alerts(over=True)
+    assert (over.alert, over.open) == ("a1", False)
+
+
+async def test_a_thousand_vehicles_that_lose_their_links_at_once_are_one_alert():
+    clock = Clock()
+    alerts = made(clock)
+    names = [f"uav{number}" for number in range(1000)]
+    for number in range(0, 1000, 100):
+        update(alerts, lost(*names[: number + 100]))
+        clock.s += 0.5
+    (alert,) = alerts.alerts()
+    assert (alert.count, len(alert.resources)) == (1, 1000)
+    assert alert.text == "uav0, uav1, uav2, uav3, uav4 and 995 more: the link is lost"
+
+
+async def test_a_vehicle_that_is_lost_later_or_after_an_acknowledgement_is_an_alert_of_its_own():
+    clock = Clock()
+    alerts = made(clock)
+    update(alerts, lost("uav1"))
+    await alerts.acknowledge("a1", "anna")
+    update(alerts, lost("uav1", "uav2"))
+    clock.s += 6
+    update(alerts, lost("uav1", "uav2", "uav3"))
+    assert {each.alert: each.resources for each in alerts.alerts()} == {
+        "a1": ("uav1",),
+        "a2": ("uav2",),
+        "a3": ("uav3",),
+    }
+
+
+async def test_what_is_left_of_an_alert_is_said_until_all_of_it_is_over():
+    alerts = made()
+    update(alerts, lost("uav1", "uav2"))
+    update(alerts, lost("uav2"))
+    (alert,) = alerts.alerts()
+    assert (alert.text, alert.resources) == ("uav2: the link is lost", ("uav1", "uav2"))
+    update(alerts)
+    assert alerts.alerts() == []
+
+
+async def test_what_cannot_be_said_yet_stays():
+    alerts = made()
+    update(alerts, lost("uav1"), asks("p1"))
+    update(alerts, undecided=("uav1", "p1"))
+    assert len(alerts.alerts()) == 2
+
+
+async def test_a_deadline_is_told_when_it_changes():
+    alerts = made()
+    update(alerts, asks("p1", deadline_us=5))
+    changes = alerts.changes
+    update(alerts, asks("p1", deadline_us=5))
+    assert alerts.changes == changes
+    update(alerts, asks("p1", deadline_us=None))
+    assert alerts.alerts()[0].deadline_us is None
+
+
+async def test_what_was_said_once_is_open_until_it_is_acknowledged():
+    alerts = made()
+    alerts.add(Alert("r1", "NOT_RECEIVED", "uav1 may not have stopped", AlertSeverity.CRITICAL))
+    update(alerts)
+    assert [each.code for each in alerts.alerts()] == ["NOT_RECEIVED"]
+    await alerts.acknowledge("a1", "anna")
+    assert alerts.alerts() == []
+    assert alerts.alerts(over=True)[0].acknowledged_by == "anna"
+
+
+async def test_alike_ones_that_come_together_are_one_and_keep_what_each_says():
+    clock = Clock()
+    alerts = made(clock)
+    for number in range(3):
+        said = f"uav{number} may not have stopped"
+        alerts.add(Alert("r1", "NOT_RECEIVED", said, resources=(f"uav{number}",), group="STOP"))
+    clock.s += 6
+    alerts.add(Alert("r1", "NOT_RECEIVED", "uav9 may not have stopped", group="STOP"))
+    last, first = alerts.alerts()
+    assert (first.count, first.resources) == (3, ("uav0", "uav1", "uav2"))
+    assert first.details == ("uav1 may not have stopped", "uav2 may not have stopped")
+    assert last.text == "uav9 may not have stopped"
+
+
+async def test_a_notice_is_over_at_once_and_what_the_list_has_as_a_condition_is_not_added():
+    alerts = made()
+    alerts.add(Alert("", "SCHEDULE", "s1 was held by anna", AlertSeverity.NOTICE))
+    alerts.add(Alert("", "LOGGED", "uav1: LINK_LOST", listed=False))
+    assert alerts.alerts() == []
+    assert [each.code for each in alerts.alerts(over=True)] == ["SCHEDULE"]
+
+
+async def test_it_is_said_that_something_is_over():
+    alerts = made()
+    alerts.add(Alert("", "JOURNAL_SPACE", "the disk is full", AlertSeverity.ERROR))
+    alerts.add(Alert("", "JOURNAL_SPACE", "there is room again", clears=True))
+    assert alerts.alerts() == []
+
+
+async def test_the_most_severe_come_first_then_the_newest():
+    clock = Clock()
+    alerts = made(clock)
+    for severity in ("warning", "critical", "error", "warning"):
+        clock.s += 10
+        alerts.add(Alert("", "X", f"{severity} at {clock.s}", AlertSeverity(severity)))
+    assert [each.text for each in alerts.alerts()] == [
+        "critical at 1020.0",
+        "error at 1030.0",
+        "warning at 1040.0",
+        "warning at 1010.0",
+    ]
+
+
+async def test_the_first_acknowledgement_counts_and_what_is_over_or_unknown_is_refused():
+    alerts = made()
+    update(alerts, asks("p1"))
+    await alerts.acknowledge("a1", "anna")
+    with pytest.raises(OperatorError, match="anna has acknowledged a1 already"):
+        await alerts.acknowledge("a1", "otto")
+    with pytest.raises(OperatorError, match="no alert 'a7'; open ones: a1"):
+        await alerts.acknowledge("a7", "otto")
+    update(alerts)
+    with pytest.raises(OperatorError, match="a1 is over"):
+        await alerts.own("a1", "otto")
+
+
+async def test_who_takes_care_can_be_changed_and_taken_back():
+    alerts = made()
+    update(alerts, asks("p1"))
+    await alerts.own("a1", "anna")
+    assert alerts.alerts()[0].owner == "anna"
+    await alerts.own("a1", "")
+    assert (alerts.alerts()[0].owner, alerts.alerts()[0].owned_us) == ("", None)
+
+
+async def test_the_next_executive_knows_who_acknowledged_and_owns_what():
+    journal = MemoryJournal()
+    before = made(journal=journal)
+    update(before, asks("p1"), lost("uav1"))
+    await before.acknowledge("a1", "anna")
+    await before.own("a2", "otto")
+    after = made(journal=journal)
+    await after.load()
+    update(after, asks("p1"), undecided=("uav1",))
+    assert {each.alert: (each.acknowledged_by, each.owner) for each in after.alerts()} == {
+        "a1": ("anna", ""),
+        "a2": ("", "otto"),
+    }
+    update(after, asks("p1"), asks("p2"), lost("uav1"))
+    assert sorted(each.alert for each in after.alerts()) == ["a1", "a2", "a3"]
+
+
+async def test_a_journal_that_does_not_write_is_told_and_written_later():
+    alerts = AlertList("north", FullJournal(), Clock().now_us)
+    update(alerts, asks("p1"))
+    with pytest.raises(OperatorError, match=r"a1 is acknowledged here, but .*the disk is full"):
+        await alerts.acknowledge("a1", "anna")
+    assert alerts.alerts()[0].acknowledged_by == "anna"
+    with pytest.raises(JournalError):
+        await alerts.write()
+
+
+async def test_the_oldest_that_are_over_are_removed_from_list_and_journal():
+    journal, clock = MemoryJournal(), Clock()
+    alerts = made(clock, journal)
+    for number in range(MOST_OVER + 10):
+        alerts.add(Alert("", "SCHEDULE", f"{number}", AlertSeverity.NOTICE))
+    await alerts.write()
+    assert len(alerts.alerts(over=True)) == MOST_OVER
+    assert min(await journal.alerts("north")) == 11
