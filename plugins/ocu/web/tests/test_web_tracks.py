@@ -86,7 +86,8 @@ def kept(store: TrackStore, after_s: float | None = None, limit: int = 1000) -> 
         (at(mode="drive"), True),
         (at(link=LinkState.LOST), True),
         (at(battery_fraction=0.5), True),
-        (at(velocity_enu_m_s=(1.0, 0.0, 0.0), armed=True, behavior="b1"), False),
+        (at(armed=True, behavior="b1"), False),
+        (at(velocity_enu_m_s=(1.0, 0.0, 0.0)), True),  # it was not known
         (VehicleState(ResourceId("v"), 9, None), True),
     ],
 )
@@ -113,6 +114,16 @@ def test_the_antimeridian_is_no_distance() -> None:
 def test_a_battery_counts_by_whole_percents() -> None:
     assert not differs(at(battery_fraction=0.501), at(battery_fraction=0.504))
     assert differs(at(battery_fraction=0.504), at(battery_fraction=0.494))
+
+
+def test_what_is_plotted_counts_as_news() -> None:
+    assert not differs(at(velocity_enu_m_s=(3.0, 4.0, 0.0)), at(velocity_enu_m_s=(4.0, 3.0, 0.2)))
+    assert differs(at(velocity_enu_m_s=(3.0, 4.0, 0.0)), at(velocity_enu_m_s=(0.0, 4.0, 0.0)))
+    assert differs(at(velocity_enu_m_s=(0.0, 0.0, 0.0)), at())
+    assert not differs(at(altitude_above_home_m=10.0), at(altitude_above_home_m=10.4))
+    assert differs(at(altitude_above_home_m=10.0), at(altitude_above_home_m=11.0))
+    assert differs(at(), at(pitch_rad=0.2))
+    assert differs(at(roll_rad=-0.2), at())
 
 
 def test_a_camera_says_something_when_it_looks_elsewhere() -> None:

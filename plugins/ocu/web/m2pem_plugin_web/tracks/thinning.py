@@ -14,6 +14,7 @@ SPACING_S = 1.0
 MOVED_M = 0.5
 TURNED_RAD = math.radians(5.0)
 ZOOMED = 1.05
+FASTER_M_S = 0.3
 
 State: TypeAlias = VehicleState | PayloadState
 
@@ -52,7 +53,7 @@ class Thinner:
 
 
 def differs(before: State, now: State) -> bool:
-    """Return whether a resource has moved, turned, or changed its state."""
+    """Return whether a resource has moved, turned, or changed its state or its speed."""
     if before.link is not now.link:
         return True
     match before, now:
@@ -62,6 +63,10 @@ def differs(before: State, now: State) -> bool:
                 or _percent(before.battery_fraction) != _percent(now.battery_fraction)
                 or _moved(before.position, now.position)
                 or _turned(before.yaw_rad, now.yaw_rad)
+                or _turned(before.roll_rad, now.roll_rad)
+                or _turned(before.pitch_rad, now.pitch_rad)
+                or _apart(_speed_m_s(before), _speed_m_s(now), FASTER_M_S)
+                or _apart(before.altitude_above_home_m, now.altitude_above_home_m, MOVED_M)
             )
         case PayloadState(), PayloadState():
             return (
@@ -99,6 +104,18 @@ def _zoomed(before: float | None, now: float | None) -> bool:
         return before is not now
     low, high = sorted((before, now))
     return high > low * ZOOMED
+
+
+def _speed_m_s(state: VehicleState) -> float | None:
+    velocity = state.velocity_enu_m_s
+    return None if velocity is None else math.hypot(*velocity)
+
+
+def _apart(before: float | None, now: float | None, most: float) -> bool:
+    before, now = _known(before), _known(now)
+    if before is None or now is None:
+        return before is not now
+    return abs(now - before) > most
 
 
 def _known(value: float | None) -> float | None:

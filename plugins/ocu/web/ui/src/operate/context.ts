@@ -5,6 +5,7 @@ import { useContext } from "preact/hooks";
 import type { Fleet, Geometry } from "../shared/types";
 import type { Draft, Vertex } from "./map/draft";
 import type { MissionModel } from "./mission/missionModel";
+import type { Range } from "./plots/series";
 import type { Scene } from "./scene/scene";
 
 export interface Place {
@@ -23,6 +24,10 @@ export interface OperateContext {
   followed: Signal<string>;
   /** A vehicle that the map shows, once; a new object each time. */
   centred: Signal<{ resource: string } | null>;
+  /** What the time line and the plots show of the run's time; null: all of it. */
+  range: Signal<Range | null>;
+  /** The time that is pointed at, on the time line or the plots. */
+  pointed: Signal<number | null>;
   /** What is drawn on the map. */
   draft: Signal<Draft | null>;
   /** The middle of the map, while there is one. */
@@ -51,6 +56,8 @@ export function operateContext(
     selected: signal(null),
     followed: signal(""),
     centred: signal(null),
+    range: signal(null),
+    pointed: signal(null),
     draft: signal(null),
   };
 }

@@ -1,12 +1,12 @@
 // Two panes with a border between them that can be moved, with the mouse, a finger or the keyboard.
 import { useComputed, useSignal } from "@preact/signals";
 import type { ComponentChildren } from "preact";
-import { useRef } from "preact/hooks";
+import { useEffect, useRef } from "preact/hooks";
 import { remember, remembered } from "./memory";
 import "./split.css";
 
 export interface SplitProps {
-  /** Under which the position is remembered. */
+  /** Under which the position is remembered; with another name it has that one's position. */
   name: string;
   direction: "row" | "column";
   /** The first pane's part of the room, in percent. */
@@ -23,6 +23,9 @@ const within = (part: number): number => Math.max(LEAST, Math.min(100 - LEAST, p
 export function Split({ name, direction, initial, label, children }: SplitProps) {
   const box = useRef<HTMLDivElement>(null);
   const part = useSignal(within(remembered(`split.${name}`, initial)));
+  useEffect(() => {
+    part.value = within(remembered(`split.${name}`, initial));
+  }, [name]);
   const style = useComputed(() => `flex-basis: ${part.value}%`);
 
   const place = (value: number) => {

@@ -3,6 +3,7 @@ import { requirements, verify } from "./checks";
 import { editor } from "./editor";
 import { home } from "./home";
 import { operate } from "./operate";
+import { plots } from "./plots";
 import { begin, run } from "./run";
 import { shell, signIn } from "./shell";
 
@@ -16,6 +17,7 @@ export const strings = {
   run,
   begin,
   operate,
+  plots,
 };
 
 /** `{name}` in a text becomes its value. */

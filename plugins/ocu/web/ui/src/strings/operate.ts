@@ -7,6 +7,8 @@ export const operate = {
     vehicles: "Vehicles",
     timeline: "Time line",
     log: "Events",
+    plots: "Plots",
+    cameras: "Cameras",
     left: "Elements and diagram",
     right: "Map and vehicles",
     bottom: "Time line and events",

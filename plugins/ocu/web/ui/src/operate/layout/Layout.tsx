@@ -1,5 +1,4 @@
 // Where the parts of the page are: beside each other where there is room, behind tabs on a tablet.
-import { useEffect, useState } from "preact/hooks";
 import { Split } from "../../shared/Split";
 import { Tabs } from "../../shared/Tabs";
 import { strings } from "../../strings";
@@ -9,6 +8,9 @@ import { LogPane } from "../log/LogPane";
 import { DrawForm } from "../map/DrawForm";
 import { MapPane } from "../map/MapPane";
 import { OutlinePane } from "../outline/OutlinePane";
+import { PlotsPane } from "../plots/PlotsPane";
+import { plotsShown } from "../plots/shown";
+import { useMedia } from "./media";
 import { Pane } from "./Pane";
 import { TimelinePane } from "../timeline/TimelinePane";
 import { VehiclesPane } from "../vehicles/VehiclesPane";
@@ -27,8 +29,11 @@ type Parts = { onSeek: ((t: number) => void) | undefined };
 
 function Wide({ onSeek }: Parts) {
   const { draft } = useOperating();
+  const bottom = plotsShown.value
+    ? { name: "bottom-plots", initial: 44 }
+    : { name: "bottom", initial: 68 };
   return (
-    <Split name="bottom" direction="column" initial={68} label={`${text.resize}: ${text.bottom}`}>
+    <Split {...bottom} direction="column" label={`${text.resize}: ${text.bottom}`}>
       <Split name="right" direction="row" initial={64} label={`${text.resize}: ${text.right}`}>
         <Split name="left" direction="row" initial={24} label={`${text.resize}: ${text.outline}`}>
           <OutlinePane />
@@ -46,9 +51,20 @@ function Wide({ onSeek }: Parts) {
         </Split>
       </Split>
       <Split name="log" direction="row" initial={58} label={`${text.resize}: ${text.log}`}>
-        <TimelinePane onSeek={onSeek} />
+        <TimesPane onSeek={onSeek} />
         <LogPane />
       </Split>
+    </Split>
+  );
+}
+
+/** Plots are below the time line, so that the same times are below each other. */
+function TimesPane({ onSeek }: Parts) {
+  if (!plotsShown.value) return <TimelinePane onSeek={onSeek} plots={plotsShown} />;
+  return (
+    <Split name="plots" direction="column" initial={38} label={`${text.resize}: ${text.plots}`}>
+      <TimelinePane onSeek={onSeek} plots={plotsShown} />
+      <PlotsPane onSeek={onSeek} />
     </Split>
   );
 }
@@ -69,20 +85,10 @@ function Narrow({ onSeek }: Parts) {
           { id: "map", title: text.map, render: () => <MapPane formInside /> },
           { id: "vehicles", title: text.vehicles, render: () => <VehiclesPane /> },
           { id: "timeline", title: text.timeline, render: () => <TimelinePane onSeek={onSeek} /> },
+          { id: "plots", title: text.plots, render: () => <PlotsPane onSeek={onSeek} /> },
           { id: "log", title: text.log, render: () => <LogPane /> },
         ]}
       />
     </Split>
   );
-}
-
-function useMedia(query: string): boolean {
-  const [matches, setMatches] = useState(() => matchMedia(query).matches);
-  useEffect(() => {
-    const media = matchMedia(query);
-    const renew = () => setMatches(media.matches);
-    media.addEventListener("change", renew);
-    return () => media.removeEventListener("change", renew);
-  }, [query]);
-  return matches;
 }

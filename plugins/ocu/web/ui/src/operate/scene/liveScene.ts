@@ -9,6 +9,8 @@ import type {
   RunSummary,
   ServerMessage,
 } from "../../shared/types";
+import { historyOf, TelemetryHistory } from "../plots/history";
+import { HistoryRecorder } from "../plots/recorder";
 import { ElementBoard } from "./elementBoard";
 import { RecordFeed, type Page } from "./recordFeed";
 import { TRAIL_POINTS, type Scene } from "./scene";
@@ -42,6 +44,9 @@ export class LiveScene implements Scene {
   readonly teams = executive.teams;
   readonly silentFor_s = executive.silentFor_s;
   readonly end = this.time;
+  readonly history = signal({ history: new TelemetryHistory(0) });
+  /** Once it is known what was before. */
+  private recorder: HistoryRecorder | null = null;
   private readonly feed: RecordFeed;
   /** Of the time before the page was opened. */
   private before = new TelemetryTrack(NO_TELEMETRY);
@@ -57,7 +62,7 @@ export class LiveScene implements Scene {
       get<Page>(`${path}?after=${after}&limit=${limit}`),
     );
     this.stopListening = executive.listen((message) => this.take(message));
-    this.ticking = setInterval(() => (this.time.value = this.now()), TICK_MS);
+    this.ticking = setInterval(() => this.tick(), TICK_MS);
     executive.watch(run);
     void this.lookBack();
   }
@@ -93,12 +98,29 @@ export class LiveScene implements Scene {
   }
 
   private async lookBack(): Promise<void> {
+    let track = NO_TELEMETRY;
     try {
-      this.before = new TelemetryTrack(await loadTrack(this.run));
+      track = await loadTrack(this.run);
+      this.before = new TelemetryTrack(track);
+      this.jumps.value += 1;
     } catch {
-      return; // Trails begin now, then.
+      // Trails and plots begin now, then.
     }
-    this.jumps.value += 1;
+    const known = [this.vehicles.peek(), this.payloads.peek()];
+    const expected = known.reduce((sum, states) => sum + Object.keys(states).length, 0);
+    this.recorder = new HistoryRecorder(historyOf(track, expected, null));
+    this.history.value = { history: this.recorder.history };
+  }
+
+  private tick(): void {
+    this.time.value = this.now();
+    // Before the first snapshot it is not known what time it is.
+    if (!this.begun || !this.recorder) return;
+    const states = { vehicles: this.vehicles.peek(), payloads: this.payloads.peek() };
+    const silentFor_s = (resource: string) => this.silentFor_s(resource);
+    if (this.recorder.take(this.now(), performance.now(), states, silentFor_s)) {
+      this.history.value = { history: this.recorder.history };
+    }
   }
 
   private take(message: ServerMessage): void {

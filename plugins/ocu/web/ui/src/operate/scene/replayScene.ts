@@ -1,5 +1,5 @@
 // A run of the past, or a rehearsal, from its records: any moment of it, at any speed.
-import { batch, computed, signal } from "@preact/signals";
+import { batch, computed, signal, type Signal } from "@preact/signals";
 import { Reel } from "../../records/reel";
 import { Spans } from "../../records/spans";
 import type {
@@ -13,6 +13,7 @@ import type {
   TeamState,
   VehicleState,
 } from "../../shared/types";
+import { historyOf, type TelemetryHistory } from "../plots/history";
 import { ElementBoard } from "./elementBoard";
 import { TRAIL_POINTS, type LogPage, type Scene } from "./scene";
 import { TelemetryTrack, type Telemetry } from "./telemetryTrack";
@@ -53,12 +54,13 @@ export class ReplayScene implements Scene {
   private frame = 0;
   private before_ms = 0;
   private ticked_ms = 0;
+  private known: Signal<{ history: TelemetryHistory }> | undefined;
 
   constructor(
     readonly run: string,
     summary: RunSummary,
     records: readonly RunRecord[],
-    telemetry: Telemetry,
+    private readonly telemetry: Telemetry,
   ) {
     this.summary = signal<RunSummary | null>(summary);
     this.reel = new Reel(records);
@@ -79,6 +81,16 @@ export class ReplayScene implements Scene {
 
   now(): number {
     return this.position_s;
+  }
+
+  /** Made when it is first asked for: not everybody looks at plots. */
+  get history(): Signal<{ history: TelemetryHistory }> {
+    if (!this.known) {
+      const resources = Object.keys(this.telemetry.samples[0]?.vehicles ?? {}).length;
+      const history = historyOf(this.telemetry, 2 * resources, this.end.value);
+      this.known = signal({ history });
+    }
+    return this.known;
   }
 
   silentFor_s(resource: string): number | null {

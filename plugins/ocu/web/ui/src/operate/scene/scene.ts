@@ -2,6 +2,7 @@
 // past.
 import type { ReadonlySignal } from "@preact/signals";
 import type { Spans } from "../../records/spans";
+import type { TelemetryHistory } from "../plots/history";
 import type {
   Command,
   GeoPosition,
@@ -58,6 +59,8 @@ export interface Scene {
   readonly jumps: ReadonlySignal<number>;
   /** Seconds since the last state of a resource; null: there was none. */
   silentFor_s(resource: string): number | null;
+  /** Numbers of vehicles and payloads up to now; they grow in place, and the signal tells it. */
+  readonly history: ReadonlySignal<{ history: TelemetryHistory }>;
   /** Its `spans` change in place; the signal tells that they did. */
   readonly timeline: ReadonlySignal<{ spans: Spans }>;
   readonly log: ReadonlySignal<LogPage>;

@@ -1,6 +1,6 @@
 // Who did what when: a row for each vehicle and payload, questions and services above.
-import { useSignal } from "@preact/signals";
-import { useEffect, useMemo, useRef, useState } from "preact/hooks";
+import type { Signal } from "@preact/signals";
+import { useMemo, useRef } from "preact/hooks";
 import { PROMPTS, SERVICES, WAITS, type Span } from "../../records/spans";
 import { clock } from "../../shared/format";
 import { strings } from "../../strings";
@@ -11,7 +11,10 @@ import { usePaced } from "../layout/pace";
 import type { Scene } from "../scene/scene";
 import { heldElsewhere } from "../vehicles/work";
 import { Bars } from "./Bars";
-import { lanes, marks, whole, zoomed, type Bar, type Window } from "./scale";
+import { lanes, marks, type Bar } from "./scale";
+import { TimeCursor } from "./TimeCursor";
+import { TimeTools } from "./TimeTools";
+import { useTimeWindow } from "./useTimeWindow";
 import "./timeline.css";
 
 const text = strings.operate.timeline;
@@ -31,89 +34,41 @@ export interface Row {
   bars: Bar<Span>[];
 }
 
-export function TimelinePane({ onSeek }: { onSeek?: ((t: number) => void) | undefined }) {
-  const { scene, fleet } = useOperating();
+export interface TimelineProps {
+  onSeek?: ((t: number) => void) | undefined;
+  /** Whether there are plots below, where there is room for both. */
+  plots?: Signal<boolean>;
+}
+
+export function TimelinePane({ onSeek, plots }: TimelineProps) {
+  const { scene, fleet, pointed } = useOperating();
   const { spans } = usePaced(scene.timeline, 300);
   usePaced(scene.time, EVERY_MS[scene.mode]);
   const time = scene.now();
-  const end = Math.max(usePaced(scene.end, 1000), time);
-  const [width, setWidth] = useState(600);
-  const chosen = useSignal<Window | null>(null);
   const plot = useRef<HTMLDivElement>(null);
   const rows = useMemo(() => rowsOf(spans.all, fleet), [spans, spans.all.length, fleet]);
   const height = (rows.at(-1)?.top ?? 0) + (rows.at(-1)?.height ?? 0);
-  const window = chosen.value ?? whole(end, width);
-  const window_ = useRef(window);
-  window_.current = window;
-
-  useEffect(() => {
-    const box = plot.current!;
-    const observer = new ResizeObserver(() => setWidth(box.clientWidth));
-    observer.observe(box);
-    const wheel = (event: WheelEvent) => {
-      if (event.ctrlKey) {
-        event.preventDefault();
-        const around = event.clientX - box.getBoundingClientRect().left;
-        chosen.value = zoomed(window_.current, event.deltaY < 0 ? 1.25 : 0.8, around);
-      } else if (event.deltaX !== 0 || event.shiftKey) {
-        event.preventDefault();
-        pan(event.deltaX || event.deltaY);
-      }
-    };
-    box.addEventListener("wheel", wheel, { passive: false });
-    return () => {
-      observer.disconnect();
-      box.removeEventListener("wheel", wheel);
-    };
-  }, []);
-
-  const pan = (px: number) => {
-    const { from_s, px_per_s } = window_.current;
-    chosen.value = { px_per_s, from_s: Math.max(0, from_s + px / px_per_s) };
-  };
+  const shown = useTimeWindow(plot);
+  const { window, width } = shown;
   const x = (t: number) => (t - window.from_s) * window.px_per_s;
-  const seek = (event: MouseEvent) => {
-    const left = plot.current!.getBoundingClientRect().left;
-    onSeek?.(window.from_s + (event.clientX - left) / window.px_per_s);
-  };
-
   return (
     <Pane
       title={strings.operate.panes.timeline}
       class="timeline-pane"
       scrolls
       tools={
-        <div class="tools">
-          <button
-            type="button"
-            class="plain"
-            aria-label={text.zoomOut}
-            onClick={() => (chosen.value = zoomed(window, 1 / 1.5, width / 2))}
-          >
-            −
-          </button>
-          <button
-            type="button"
-            class="plain"
-            aria-label={text.zoomIn}
-            onClick={() => (chosen.value = zoomed(window, 1.5, width / 2))}
-          >
-            +
-          </button>
-          <button type="button" class="plain" onClick={() => (chosen.value = null)}>
-            {text.all}
-          </button>
-          <button
-            type="button"
-            class="plain"
-            onClick={() => {
-              const from_s = Math.max(0, time - (width * 0.7) / window.px_per_s);
-              chosen.value = { px_per_s: window.px_per_s, from_s };
-            }}
-          >
-            {text.now}
-          </button>
-        </div>
+        <TimeTools shown={shown}>
+          {plots && (
+            <button
+              type="button"
+              class="plain"
+              aria-pressed={plots.value}
+              onClick={() => (plots.value = !plots.value)}
+            >
+              {strings.operate.panes.plots}
+            </button>
+          )}
+        </TimeTools>
       }
     >
       <div class="timeline" title={text.hint}>
@@ -124,13 +79,18 @@ export function TimelinePane({ onSeek }: { onSeek?: ((t: number) => void) | unde
             </li>
           ))}
         </ul>
-        <div ref={plot} class={onSeek ? "timeline-plot timeline-seek" : "timeline-plot"}>
+        <div
+          ref={plot}
+          class={onSeek ? "timeline-plot timeline-seek" : "timeline-plot"}
+          onMouseMove={(event) => (pointed.value = shown.timeAt(event.clientX))}
+          onMouseLeave={() => (pointed.value = null)}
+        >
           <svg
             width={width}
             height={Math.max(height + AXIS_PX, 60)}
             role="group"
             aria-label={text.label}
-            onClick={seek}
+            onClick={(event) => onSeek?.(shown.timeAt(event.clientX))}
           >
             {marks(window, width, 70).map((t) => (
               <g
@@ -166,6 +126,7 @@ export function TimelinePane({ onSeek }: { onSeek?: ((t: number) => void) | unde
             </g>
             <line class="now" x1={x(time)} x2={x(time)} y1={AXIS_PX - 6} y2="100%" />
           </svg>
+          <TimeCursor window={window} />
           {spans.all.length === 0 && <p class="nothing">{text.none}</p>}
         </div>
       </div>

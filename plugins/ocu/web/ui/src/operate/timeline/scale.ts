@@ -1,10 +1,22 @@
 // Between mission time and pixels of the time line.
+import type { Range } from "../plots/series";
 
 /** What is seen: from `from_s`, `px_per_s` pixels a second. */
 export interface Window {
   from_s: number;
   px_per_s: number;
 }
+
+/** The same, from its first to its last second, however wide it is drawn. */
+export const rangeOf = ({ from_s, px_per_s }: Window, width_px: number): Range => ({
+  from_s,
+  to_s: from_s + width_px / px_per_s,
+});
+
+export const windowOf = ({ from_s, to_s }: Range, width_px: number): Window => ({
+  from_s,
+  px_per_s: width_px / (to_s - from_s),
+});
 
 const LEAST_PX_PER_S = 0.002;
 const MOST_PX_PER_S = 400;

@@ -9,6 +9,7 @@ import type { Fleet, PayloadState, VehicleState } from "../../shared/types";
 import { useOperating } from "../context";
 import { Pane } from "../layout/Pane";
 import { DomainSymbol } from "./DomainSymbol";
+import { Sparklines } from "../plots/Sparklines";
 import { SharedSpaces } from "./SharedSpaces";
 import { Teams } from "./Teams";
 import { heldElsewhere, isOperator, payloadsOf, workOf } from "./work";
@@ -74,6 +75,7 @@ function Card({ vehicle, state, payloads, silent_s }: CardProps) {
         </span>
       </div>
       {state && <Numbers state={state} />}
+      {state && hasTelemetry && <Sparklines resource={vehicle.id} />}
       {state && state.not_ready_reasons.length > 0 && (
         <p class="card-reasons">
           {state.ready === false && `${text.notReady}: `}
