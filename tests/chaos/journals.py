@@ -17,6 +17,7 @@ UNDONE = {
     "schedule": ("DROP TABLE schedule", "DROP TABLE schedule_holds"),
     "origin_of_salvaged_runs": ("DROP TABLE origin",),
     "approvals": ("DROP TABLE approvals", "DROP TABLE edits"),
+    "alerts": ("DROP TABLE alerts",),
     "fleets": ("DROP TABLE fleets",),
     "notifications": ("DROP FUNCTION m2pem_tell CASCADE",),
     "pages": ("ALTER TABLE fleets DROP COLUMN page",),
