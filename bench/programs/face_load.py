@@ -29,7 +29,6 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
-import yaml
 from m2pem_plugin_mavlink.link.hub import shared_hub
 from m2pem_plugin_mavlink.link.udp import UdpEndpoint
 from m2pem_plugin_mavlink.protocol.url import parse_url
@@ -83,8 +82,8 @@ def fleet_file(
             name: {"domain": "ground", "sitl": True, **each} for name, each in vehicles.items()
         },
     }
-    path = folder / "fleet.yaml"
-    path.write_text(yaml.safe_dump(text), encoding="utf-8")
+    path = folder / "fleet.yaml"  # JSON is YAML
+    path.write_text(json.dumps(text), encoding="utf-8")
     return path
 
 
