@@ -144,7 +144,9 @@ if TYPE_CHECKING:
     from m2pem.findings import Finding, Severity
     from m2pem.fleet.approval import file_digest
     from m2pem.fleet.behaviors import SHARED
+    from m2pem.fleet.endurance import lasts_s
     from m2pem.fleet.fleet import Fleet
+    from m2pem.geo.cameras import ImagePlan, SurveyCamera, image_plan
     from m2pem.geo.fence import Fence
     from m2pem.geo.geojson import GeometryError, as_geojson, kind_of, parse_geojson
     from m2pem.geo.geometry_files import (
@@ -160,6 +162,7 @@ if TYPE_CHECKING:
     from m2pem.geo.local_frame import EastNorth, LatLon, LocalFrame, distance_m, offset
     from m2pem.geo.polygon import convex_hull, edges_enclose, middle_of
     from m2pem.geo.polyline import Polyline, Segment
+    from m2pem.geo.survey_pattern import Surveyor, SurveyPattern, SurveyRoute, survey_routes
     from m2pem.geo.survey_tracks import SurveyTracks
     from m2pem.mission.behavior import BehaviorType, Decision
     from m2pem.mission.catalogue import (
@@ -248,8 +251,10 @@ _MODULES = {
     "m2pem.mission.geometry": "Area Point Route VehiclePosition",
     "m2pem.mission.values": "Value",
     "m2pem.fleet.behaviors": "SHARED",
+    "m2pem.geo.cameras": "ImagePlan SurveyCamera image_plan",
     "m2pem.geo.fence": "Fence",
     "m2pem.fleet.approval": "file_digest",
+    "m2pem.fleet.endurance": "lasts_s",
     "m2pem.fleet.fleet": "Fleet",
     "m2pem.geo.geojson": "GeometryError as_geojson kind_of parse_geojson",
     "m2pem.geo.geometry_files": (
@@ -260,6 +265,7 @@ _MODULES = {
     "m2pem.geo.local_frame": "EastNorth LatLon LocalFrame distance_m offset",
     "m2pem.geo.polygon": "convex_hull edges_enclose middle_of",
     "m2pem.geo.polyline": "Polyline Segment",
+    "m2pem.geo.survey_pattern": "SurveyPattern SurveyRoute Surveyor survey_routes",
     "m2pem.geo.survey_tracks": "SurveyTracks",
     "m2pem.suggestions": "did_you_mean",
     "m2pem.units": "US_PER_S Dimension UnitError quantity",
@@ -425,7 +431,15 @@ __all__ = [
     "StandbyOcu",
     "StampedRecord",
     "SubscriptionStatistics",
+    "ImagePlan",
+    "SurveyCamera",
+    "SurveyPattern",
+    "SurveyRoute",
     "SurveyTracks",
+    "Surveyor",
+    "image_plan",
+    "lasts_s",
+    "survey_routes",
     "SystemClock",
     "TeamMemberState",
     "TeamState",

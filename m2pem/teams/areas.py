@@ -9,53 +9,10 @@ from m2pem.fleet.parameters import accepted
 from m2pem.geo.lawn_mower import lawn_mower, longest_edge_yaw, strip_width_m
 from m2pem.geo.polygon import middle_of
 from m2pem.geo.survey_tracks import SurveyTracks
+from m2pem.geo.work_shares import owners, reach_m, split
 from m2pem.mission.geometry import Area, Route, VehiclePosition
 from m2pem.teams.paths import SPACING_M
 from m2pem.teams.plan import Leg, Plan, PlanningContext, TeamRefusedError
-
-
-def split(whole: float, weights: Sequence[float], reaches: Sequence[float]) -> list[float] | None:
-    """Return shares that add up to `whole`; None: the sum of the reaches is less than `whole`.
-
-    A share is proportional to its weight, but at most its reach; the others take the rest.
-    """
-    if sum(reaches) < whole:
-        return None
-    shares = [0.0] * len(weights)
-    open_ = [index for index, weight in enumerate(weights) if weight > 0]
-    left = whole
-    while open_:
-        each = left / sum(weights[index] for index in open_)
-        full = [index for index in open_ if reaches[index] < each * weights[index]]
-        for index in full or open_:
-            shares[index] = reaches[index] if full else each * weights[index]
-            left -= shares[index]
-        open_ = [index for index in open_ if index not in full] if full else []
-    return shares
-
-
-def owners(lengths: Sequence[float], shares: Sequence[float]) -> list[int]:
-    """Return the owner of each length in a row, so that the owners' sums approximate the shares.
-
-    No owner gets more than its share and the longest of the lengths.
-    """
-    whole = sum(lengths) or 1.0
-    bounds = [sum(shares[: index + 1]) / sum(shares) for index in range(len(shares))]
-    last = max(index for index, share in enumerate(shares) if share > 0)
-    found = []
-    done = 0.0
-    for length in lengths:
-        middle = (done + length / 2) / whole
-        at = next((i for i, b in enumerate(bounds) if middle <= b and shares[i] > 0), last)
-        found.append(at)
-        done += length
-    return found
-
-
-def reach_m(lasts_s: float | None, way_s: float, speed_m_s: float) -> float:
-    """Return the distance that a vehicle can survey in `lasts_s`, `way_s` of which is travel."""
-    return math.inf if lasts_s is None else max(0.0, lasts_s - way_s) * speed_m_s
-
 
 Place: TypeAlias = tuple[float, float]
 """East and north in metres."""

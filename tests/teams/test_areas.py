@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from m2pem.geo.work_shares import owners, split
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.geometry import Route
-from m2pem.teams.areas import owners, split
 from m2pem.teams.plan import Plan, TeamRefusedError
 from m2pem.teams.restart import Reference, read_reference
 from m2pem.teams.team_state import PLANS

@@ -33,6 +33,7 @@ from m2pem_plugin_web.rest import (
     session,
     standbys,
     steering,
+    survey_patterns,
     tracks,
     verifications,
 )
@@ -69,6 +70,7 @@ def routers_of(
         rehearsals.router(control, folder, services.rehearsals),
         catalogue.router(control),
         geometries.router(control),
+        survey_patterns.router(control),
         standbys.router(hub.standbys),
         map_tiles.router(tiles),
         socket.router(hub, entry),

@@ -19,6 +19,7 @@ from m2pem_plugin_web.rest import (
     missions,
     rehearsals,
     runs,
+    survey_patterns,
     verifications,
 )
 from m2pem_plugin_web.services import Services, services_of
@@ -64,6 +65,7 @@ def app_of(services: Services, *others: APIRouter) -> FastAPI:
         rehearsals.router(control, folder, services.rehearsals),
         catalogue.router(control),
         geometries.router(control),
+        survey_patterns.router(control),
         *others,
     )
     routes = [route for router in routers for route in router.routes]

@@ -1,0 +1,390 @@
+"""Survey patterns: routes that cover an area with parallel passes and keep out of other areas.
+
+The passes are those of `lawn_mower`, which teams and arbiters use. Passes that lie side by side
+make a cell, each cell is covered as a whole, and the way between two passes leads around what is
+kept out. Several vehicles get passes in a row, by their speeds.
+"""
+
+import heapq
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any, TypeAlias
+
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from m2pem.geo.geojson import GeometryError
+from m2pem.geo.lawn_mower import lawn_mower
+from m2pem.geo.local_frame import EastNorth, LocalFrame
+from m2pem.geo.polygon import convex_hull
+from m2pem.geo.work_shares import owners, reach_m, split
+from m2pem.mission.geometry import Area, Coordinate, Route
+
+MAX_PASSES = 2_000
+MAX_CORNERS = 500
+"""Of the area and of all that is kept out together: the way around them is searched."""
+
+_TRIED_HEADINGS = 3
+_GRAZE_M = 0.01
+"""Ways may run along what is kept out."""
+
+_AROUND_M = 0.05
+"""How far from its corners a way leads around it, beside the clearance."""
+
+_SHORTEST_M = 0.01
+_ROW_DIGITS = 4
+
+Pass: TypeAlias = tuple[EastNorth, EastNorth]
+"""From its beginning to its end, in metres."""
+
+
+@dataclass(frozen=True, slots=True)
+class SurveyPattern:
+    """What is surveyed, and how.
+
+    `heading_rad`: of the passes, from true north, clockwise; None: that with the fewest turns.
+    `margin_m`: how far beyond the area's edge is surveyed; below 0, within it. `turn_around_m`: how
+    far each pass goes on. `corner`: where it begins: 0 to 3, counter-clockwise from the right of
+    the passes' beginning. `cross_hatch`: a second time, across. `keep_out`: areas that no way
+    enters, nor comes nearer to than `clearance_m`.
+    """
+
+    area: Area
+    spacing_m: float
+    heading_rad: float | None = None
+    margin_m: float = 0.0
+    turn_around_m: float = 0.0
+    corner: int = 0
+    cross_hatch: bool = False
+    keep_out: Sequence[Area] = ()
+    clearance_m: float = 0.0
+    altitude_m: float | None = None
+    altitude_frame: str = "relative"
+
+
+@dataclass(frozen=True, slots=True)
+class Surveyor:
+    """A vehicle that surveys. `lasts_s`: how long it can, None: not known."""
+
+    name: str
+    speed_m_s: float
+    lasts_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class SurveyRoute:
+    """The route of one vehicle. `length_m`: of all of it; `surveyed_m`: of its passes alone."""
+
+    surveyor: Surveyor
+    route: Route
+    passes: int
+    length_m: float
+    surveyed_m: float
+
+    @property
+    def time_s(self) -> float:
+        """How long the route takes at the vehicle's speed, without turns."""
+        return self.length_m / self.surveyor.speed_m_s
+
+
+def survey_routes(pattern: SurveyPattern, surveyors: Sequence[Surveyor]) -> list[SurveyRoute]:
+    """Return a route for each vehicle; one that gets no pass has none.
+
+    Raises:
+        GeometryError: nothing of the area is left, it needs too many passes, the vehicles do not
+            last long enough, or a part cannot be reached.
+    """
+    if not surveyors:
+        raise GeometryError("a survey needs a vehicle")
+    if pattern.spacing_m <= 0:
+        raise GeometryError(f"spacing: {pattern.spacing_m:g} m is not above 0")
+    if sum(len(ring) for each in (pattern.area, *pattern.keep_out) for ring in each.rings) > (
+        MAX_CORNERS
+    ):
+        raise GeometryError(
+            f"the area and what is kept out have more than {MAX_CORNERS} corners: simplify them"
+        )
+    frame = LocalFrame(pattern.area.rings[0][0][:2])
+    ground = _Ground.of(pattern, frame)
+    yaw = _yaw(pattern, ground)
+    passes = _passes(pattern, ground, yaw)
+    if pattern.cross_hatch:
+        passes += _passes(pattern, ground, yaw + math.pi / 2)
+    if not passes:
+        raise GeometryError(
+            "nothing of the area is left to survey: check margin and keep-out areas"
+        )
+    routes = []
+    for surveyor, own in zip(surveyors, _shared(passes, surveyors), strict=True):
+        if own:
+            routes.append(_route(pattern, frame, ground, surveyor, own))
+    return routes
+
+
+@dataclass
+class _Ground:
+    """What is surveyed and what is kept out, in metres. `inner`: where no way is."""
+
+    region: BaseGeometry
+    closed: BaseGeometry
+    inner: BaseGeometry
+    corners: list[EastNorth]
+    _visible: dict[tuple[int, int], bool] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, pattern: SurveyPattern, frame: LocalFrame) -> "_Ground":
+        outer, *holes = (_polygon(ring, frame) for ring in pattern.area.rings)
+        obstacles = [*holes, *(_whole(area, frame) for area in pattern.keep_out)]
+        closed: BaseGeometry = shapely.union_all(obstacles) if obstacles else shapely.Polygon()
+        if pattern.clearance_m > 0:
+            closed = closed.buffer(pattern.clearance_m, join_style="mitre")
+        region: BaseGeometry = (
+            outer.buffer(pattern.margin_m, join_style="mitre") if pattern.margin_m else outer
+        )
+        region = region.difference(closed)
+        around = closed.buffer(_AROUND_M, join_style="mitre")
+        corners = [
+            (x, y)
+            for part in _polygons(around)
+            for ring in (part.exterior, *part.interiors)
+            for x, y, *_ in ring.coords[:-1]
+        ]
+        inner = closed.buffer(-_GRAZE_M, join_style="mitre")
+        shapely.prepare(inner)
+        return cls(region, closed, inner, corners)
+
+    def free(self, a: EastNorth, b: EastNorth) -> bool:
+        """Whether the straight way between two places enters nothing that is kept out."""
+        return not self.inner.intersects(shapely.LineString((a, b)))
+
+    def way(self, a: EastNorth, b: EastNorth) -> list[EastNorth]:
+        """Return the places to pass between two places on the shortest way around.
+
+        Raises:
+            GeometryError: there is none.
+        """
+        if a == b or self.free(a, b):
+            return []
+        places = [a, b, *self.corners]
+        best = {0: 0.0}
+        before: dict[int, int] = {}
+        queue = [(0.0, 0)]
+        while queue:
+            length, at = heapq.heappop(queue)
+            if at == 1:
+                break
+            if length > best[at]:
+                continue
+            for to in range(1, len(places)):
+                further = length + math.dist(places[at], places[to])
+                if further < best.get(to, math.inf) and self._sees(places, at, to):
+                    best[to], before[to] = further, at
+                    heapq.heappush(queue, (further, to))
+        if 1 not in before:
+            raise GeometryError(
+                "a part of the area cannot be reached without entering what is kept out: "
+                "survey the parts on their own"
+            )
+        way, at = [], before[1]
+        while at:
+            way.append(places[at])
+            at = before[at]
+        return way[::-1]
+
+    def _sees(self, places: Sequence[EastNorth], at: int, to: int) -> bool:
+        if min(at, to) < 2:
+            return self.free(places[at], places[to])
+        key = (min(at, to), max(at, to))
+        if key not in self._visible:
+            self._visible[key] = self.free(places[at], places[to])
+        return self._visible[key]
+
+
+def _polygon(ring: Sequence[Coordinate], frame: LocalFrame) -> shapely.Polygon:
+    return shapely.Polygon([frame.to_local(corner[:2]) for corner in ring])
+
+
+def _whole(area: Area, frame: LocalFrame) -> BaseGeometry:
+    outer, *holes = (_polygon(ring, frame) for ring in area.rings)
+    return outer.difference(shapely.union_all(holes)) if holes else outer
+
+
+def _polygons(geometry: BaseGeometry) -> list[Any]:
+    parts = getattr(geometry, "geoms", [geometry])
+    return [part for part in parts if part.geom_type == "Polygon" and not part.is_empty]
+
+
+def _yaw(pattern: SurveyPattern, ground: _Ground) -> float:
+    """Return the direction of the passes, from east, counter-clockwise, in rad."""
+    if pattern.heading_rad is not None:
+        return math.pi / 2 - pattern.heading_rad
+    corners = [place for part in _polygons(ground.region) for place in part.exterior.coords]
+    hull = convex_hull((x, y) for x, y, *_ in corners)
+    if len(hull) < 3:
+        return 0.0
+    headings = {
+        math.atan2(b[1] - a[1], b[0] - a[0]) % math.pi for a, b in pairwise((*hull, hull[0]))
+    }
+    # The fewest passes are along a side of the hull across which it is narrowest.
+    narrow = sorted(headings, key=lambda yaw: (round(_width_m(hull, yaw), 3), yaw))
+    tried = [(_passes(pattern, ground, yaw), yaw) for yaw in narrow[:_TRIED_HEADINGS]]
+    return min(tried, key=lambda found: (len(found[0]), _length_m(found[0])))[1]
+
+
+def _width_m(hull: Sequence[EastNorth], yaw: float) -> float:
+    norths = [_turned(corner, yaw)[1] for corner in hull]
+    return max(norths) - min(norths)
+
+
+def _passes(pattern: SurveyPattern, ground: _Ground, yaw: float) -> list[Pass]:
+    """Return the passes in the order in which they are flown or driven."""
+    cells: list[_Cell] = []
+    for part in _polygons(ground.region):
+        rings = [[(x, y) for x, y, *_ in ring.coords] for ring in (part.exterior, *part.interiors)]
+        if _width_m(rings[0], yaw) > MAX_PASSES * pattern.spacing_m:
+            raise GeometryError(
+                f"spacing: {pattern.spacing_m:g} m needs more than {MAX_PASSES} passes: "
+                "survey with a wider spacing, or a smaller area"
+            )
+        rows: dict[float, list[tuple[float, float]]] = {}
+        points = lawn_mower(rings, pattern.spacing_m, yaw)
+        for a, b in zip(points[::2], points[1::2], strict=True):
+            for start, end in _outside((a, b), ground.closed):
+                (ax, ay), (bx, _) = _turned(start, yaw), _turned(end, yaw)
+                rows.setdefault(round(ay, _ROW_DIGITS), []).append((min(ax, bx), max(ax, bx)))
+        cells += _cells([(y, sorted(spans)) for y, spans in sorted(rows.items())])
+    ordered = _ordered(cells, pattern.corner)
+    return [(_turned(a, -yaw), _turned(b, -yaw)) for a, b in ordered]
+
+
+def _outside(line: Pass, closed: BaseGeometry) -> Iterator[Pass]:
+    """Yield the parts of a pass that are not kept out: a strip is as long as its longest side."""
+    left = shapely.LineString(line).difference(closed)
+    for part in getattr(left, "geoms", [left]):
+        if part.length >= _SHORTEST_M:
+            yield tuple(part.coords[0][:2]), tuple(part.coords[-1][:2])
+
+
+_Cell: TypeAlias = list[tuple[float, tuple[float, float]]]
+"""The y and the span of x of passes side by side."""
+
+
+def _cells(rows: Sequence[tuple[float, Sequence[tuple[float, float]]]]) -> list[_Cell]:
+    """Group passes: a cell ends where a pass has two neighbours, or none, in the next row."""
+    cells: list[_Cell] = []
+    before: list[tuple[_Cell, tuple[float, float]]] = []
+    for y, spans in rows:
+        now: list[tuple[_Cell, tuple[float, float]]] = []
+        for span in spans:
+            near = [(cell, other) for cell, other in before if _overlap(other, span)]
+            alone = len(near) == 1 and sum(_overlap(near[0][1], each) for each in spans) == 1
+            cell = near[0][0] if alone else []
+            if not alone:
+                cells.append(cell)
+            cell.append((y, span))
+            now.append((cell, span))
+        before = now
+    return cells
+
+
+def _overlap(a: tuple[float, float], b: tuple[float, float]) -> bool:
+    return a[0] < b[1] and b[0] < a[1]
+
+
+def _ordered(cells: Sequence[_Cell], corner: int) -> list[Pass]:
+    """Return the passes of all cells, from the corner on: next is the cell that begins nearest."""
+    spans = [span for cell in cells for _, span in cell]
+    if not spans:
+        return []
+    xs = [x for span in spans for x in span]
+    ys = [y for cell in cells for y, _ in cell]
+    right, top = corner in (1, 2), corner in (2, 3)
+    at = (max(xs) if right else min(xs), max(ys) if top else min(ys))
+    left = [_serpentines(cell) for cell in cells]
+    ordered: list[Pass] = []
+    while left:
+        options = [(way, ways) for ways in left for way in ways]
+        way, chosen = min(options, key=lambda option: math.dist(at, option[0][0][0]))
+        left = [ways for ways in left if ways is not chosen]
+        ordered += way
+        at = way[-1][1]
+    return ordered
+
+
+def _serpentines(cell: _Cell) -> list[list[Pass]]:
+    """Return the four ways to cover a cell: from each of its corners."""
+    ways = []
+    for rows in (cell, cell[::-1]):
+        for first in (0, 1):
+            ways.append(
+                [
+                    ((span[0], y), (span[1], y))
+                    if (row + first) % 2 == 0
+                    else ((span[1], y), (span[0], y))
+                    for row, (y, span) in enumerate(rows)
+                ]
+            )
+    return ways
+
+
+def _shared(passes: Sequence[Pass], surveyors: Sequence[Surveyor]) -> list[list[Pass]]:
+    """Return each vehicle's passes in a row: by their speeds, within their endurance."""
+    lengths = [math.dist(*each) for each in passes]
+    reaches = [reach_m(each.lasts_s, 0.0, each.speed_m_s) for each in surveyors]
+    shares = split(sum(lengths), [each.speed_m_s for each in surveyors], reaches)
+    if shares is None:
+        last = ", ".join(
+            f"{each.name} {reach:.0f} m" for each, reach in zip(surveyors, reaches, strict=True)
+        )
+        raise GeometryError(
+            f"the area has {sum(lengths):.0f} m of passes, and the vehicles last for less: {last}; "
+            "take more of them, or a wider spacing"
+        )
+    own: list[list[Pass]] = [[] for _ in surveyors]
+    for each, owner in zip(passes, owners(lengths, shares), strict=True):
+        own[owner].append(each)
+    return own
+
+
+def _route(
+    pattern: SurveyPattern,
+    frame: LocalFrame,
+    ground: _Ground,
+    surveyor: Surveyor,
+    passes: Sequence[Pass],
+) -> SurveyRoute:
+    places: list[EastNorth] = []
+    for start, end in passes:
+        begin = _beyond(end, start, pattern.turn_around_m, ground)
+        if places:
+            places += ground.way(places[-1], begin)
+        places += [begin, _beyond(start, end, pattern.turn_around_m, ground)]
+    waypoints = [(*frame.to_latlon(place), pattern.altitude_m) for place in places]
+    return SurveyRoute(
+        surveyor,
+        Route(tuple(waypoints), pattern.altitude_frame),
+        passes=len(passes),
+        length_m=_length_m(list(pairwise(places))),
+        surveyed_m=_length_m(passes),
+    )
+
+
+def _beyond(a: EastNorth, b: EastNorth, by_m: float, ground: _Ground) -> EastNorth:
+    """Return the place so far beyond the end of a pass; at the end if that is kept out."""
+    length = math.dist(a, b)
+    if by_m <= 0 or length <= 0:
+        return b
+    place = (b[0] + (b[0] - a[0]) * by_m / length, b[1] + (b[1] - a[1]) * by_m / length)
+    return place if ground.free(b, place) else b
+
+
+def _length_m(lines: Sequence[Pass]) -> float:
+    return sum(math.dist(a, b) for a, b in lines)
+
+
+def _turned(place: EastNorth, angle_rad: float) -> EastNorth:
+    """Return a place in axes that are turned by an angle, counter-clockwise."""
+    cos, sin = math.cos(angle_rad), math.sin(angle_rad)
+    return place[0] * cos + place[1] * sin, place[1] * cos - place[0] * sin
