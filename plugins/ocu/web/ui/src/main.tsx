@@ -12,6 +12,7 @@ import { strings } from "./strings";
 import "./theme.css";
 
 const Home = lazy(() => import("./home/Home"));
+const Fleet = lazy(() => import("./fleet/Fleet"));
 const Editor = lazy(() => import("./editor/Editor"));
 const Operate = lazy(() => import("./operate/Operate"));
 const SignIn = lazy(() => import("./signin/SignIn"));
@@ -23,6 +24,8 @@ function Page() {
       return <Home />;
     case "signIn":
       return <SignIn />;
+    case "fleet":
+      return <Fleet />;
     case "editor":
       return <Editor key={at.mission} mission={at.mission} />;
     case "run":

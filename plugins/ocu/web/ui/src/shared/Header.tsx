@@ -39,13 +39,17 @@ export function Header() {
               <circle cx="4" cy="12" r="2.6" fill="currentColor" />
               <circle cx="20" cy="12" r="2.6" fill="currentColor" />
             </svg>
-            {text.title}
+            <span class="brand-name">{text.title}</span>
           </a>
           {who && (
             <>
               <span class="fleet" title={text.fleet}>
                 {who.fleet}
               </span>
+              <nav class="header-pages" aria-label={text.pages}>
+                <PageLink to="/" label={text.home} isHere={route.value.page === "home"} />
+                <PageLink to="/fleet" label={text.fleetPage} isHere={route.value.page === "fleet"} />
+              </nav>
               <Reality simulated={who.simulated} />
               <Link />
             </>
@@ -102,6 +106,14 @@ export function Header() {
         </div>
       )}
     </>
+  );
+}
+
+function PageLink({ to, label, isHere }: { to: string; label: string; isHere: boolean }) {
+  return (
+    <a href={to} aria-current={isHere ? "page" : undefined} onClick={leave(to)}>
+      {label}
+    </a>
   );
 }
 

@@ -15,6 +15,9 @@ export function clock(seconds: number): string {
 export const clockTenths = (seconds: number): string =>
   `${clock(seconds)}.${Math.floor((Math.max(0, seconds) * 10) % 10)}`;
 
+/** Older states are stale: as a fleet's `lost_after`, where it says nothing. */
+export const STALE_S = 3;
+
 export function age(seconds: number): string {
   if (seconds < 120) return `${Math.round(seconds)} s`;
   return seconds < 7200 ? `${Math.round(seconds / 60)} min` : `${Math.round(seconds / 3600)} h`;

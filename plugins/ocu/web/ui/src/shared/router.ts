@@ -4,6 +4,7 @@ import { signal } from "@preact/signals";
 export type Route =
   | { page: "home" }
   | { page: "signIn" }
+  | { page: "fleet" }
   | { page: "editor"; mission: string }
   | { page: "run"; run: string }
   | { page: "rehearsal"; id: string }
@@ -17,7 +18,8 @@ export function routeOf(path: string): Route {
   if (more.length > 0) return { page: "nothing" };
   if (second === undefined) {
     if (first === "") return { page: "home" };
-    return first === "sign-in" ? { page: "signIn" } : { page: "nothing" };
+    if (first === "sign-in") return { page: "signIn" };
+    return first === "fleet" ? { page: "fleet" } : { page: "nothing" };
   }
   switch (first) {
     case "missions":

@@ -69,6 +69,10 @@ export interface Fleet {
     domain: "ground" | "air" | "surface" | "subsurface";
     manned: boolean;
     arbiter: string;
+    /** Of its arbiter; "": the executive's own. */
+    host: string;
+    /** What the fleet file says that it does when its link is lost; "": nothing. */
+    failsafe: string;
     payloads: string[];
   }[];
   payloads: { id: string; vehicle: string; detector: boolean; arbiter: string }[];

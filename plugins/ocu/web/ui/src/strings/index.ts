@@ -1,6 +1,7 @@
 // Every text that a person reads, one section a page.
 import { requirements, verify } from "./checks";
 import { editor } from "./editor";
+import { fleet } from "./fleet";
 import { home } from "./home";
 import { operate } from "./operate";
 import { plots } from "./plots";
@@ -18,6 +19,7 @@ export const strings = {
   begin,
   operate,
   plots,
+  fleet,
 };
 
 /** `{name}` in a text becomes its value. */

@@ -26,6 +26,8 @@ export const shell = {
     "No answer within the time limit. What arrives later is refused: look at what is shown when it is connected again.",
   stopReason: "STOP on the web page",
   home: "Missions",
+  fleetPage: "Fleet",
+  pages: "Pages",
   signedInAs: "Signed in as",
   roles: { viewer: "viewer", operator: "operator", commander: "commander" },
   signOut: "Sign out",

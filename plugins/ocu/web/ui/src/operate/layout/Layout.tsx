@@ -1,6 +1,7 @@
 // Where the parts of the page are: beside each other where there is room, behind tabs on a tablet.
 import { Split } from "../../shared/Split";
 import { Tabs } from "../../shared/Tabs";
+import { useMedia } from "../../shared/useMedia";
 import { strings } from "../../strings";
 import { useOperating } from "../context";
 import { DiagramPane } from "../diagram/DiagramPane";

@@ -1,13 +1,12 @@
 // Where everybody is; and routes, areas and points, which operators draw for the mission.
 import { useComputed, useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
-import { clock } from "../../shared/format";
+import { clock, STALE_S } from "../../shared/format";
 import { remember, remembered } from "../../shared/memory";
 import { may, session } from "../../shared/session";
 import { fill, strings } from "../../strings";
 import { useOperating } from "../context";
 import { Pane } from "../layout/Pane";
-import { STALE_S } from "../vehicles/VehiclesPane";
 import { sharedSpaces } from "../vehicles/sharedSpaces";
 import { workOf } from "../vehicles/work";
 import { DrawForm } from "./DrawForm";

@@ -1,6 +1,6 @@
 // Each vehicle: how it is, what it does and for which element, and who has it.
 import { usePaced } from "../layout/pace";
-import { age, heading_deg, speed_m_s } from "../../shared/format";
+import { age, heading_deg, speed_m_s, STALE_S } from "../../shared/format";
 import { may, session } from "../../shared/session";
 import { command } from "../../shared/command";
 import { toast } from "../../shared/Toasts";
@@ -19,8 +19,6 @@ const text = strings.operate.vehicles;
 
 /** Nobody reads numbers that change faster. */
 const PACE_MS = 400;
-/** As a fleet's `lost_after`, where it says nothing. */
-export const STALE_S = 3;
 
 export function VehiclesPane() {
   const { scene, fleet } = useOperating();

@@ -14,7 +14,7 @@ const words = strings.editor.parameter;
 const GEOMETRIES = ["route", "area", "point"];
 
 export interface ParameterFieldProps {
-  editor: EditorContext;
+  editor: Pick<EditorContext, "catalogue">;
   parameter: Parameter;
   value: string;
   write(value: string): void;

@@ -1,0 +1,60 @@
+// What is known of a vehicle or payload, in words.
+import { age, STALE_S } from "../shared/format";
+import { session } from "../shared/session";
+import { fill, strings } from "../strings";
+import type { Column, Row } from "./rows";
+
+const text = strings.fleet;
+
+const percent = (fraction: number): string => `${Math.round(fraction * 100)} %`;
+
+/** The text of a cell. The column of the holder has a link, too. */
+export function cellOf(row: Row, column: Column): string {
+  switch (column) {
+    case "name":
+      return row.id;
+    case "health":
+      return text.health[row.health];
+    case "link":
+      return linkOf(row);
+    case "battery":
+      return row.battery === null ? "" : percent(row.battery);
+    case "mode":
+      return [row.mode, armedOf(row)].filter(Boolean).join(", ");
+    case "holder":
+      return holderOf(row);
+    case "doing":
+      return row.status?.held ? `${row.doing} (${text.heldBehavior})` : row.doing;
+    case "speed":
+      return row.speed === null ? "" : `${row.speed.toFixed(1)} m/s`;
+    case "height":
+      return row.height_m === null ? "" : `${row.height_m.toFixed(1)} m`;
+    case "failsafe":
+      return row.isPayload ? "" : row.failsafe || text.noFailsafe;
+    case "position":
+      return row.latitude === null || row.longitude === null
+        ? ""
+        : `${row.latitude.toFixed(6)}, ${row.longitude.toFixed(6)}`;
+  }
+}
+
+export function armedOf({ armed }: Row): string {
+  if (armed === null) return "";
+  return armed ? text.armed : text.disarmed;
+}
+
+function linkOf({ link, age_s }: Row): string {
+  if (age_s === null) return text.links.unknown;
+  const how = text.links[link];
+  return age_s > STALE_S ? `${how}, ${fill(text.silent, { age: age(age_s) })}` : how;
+}
+
+/** Without the run that commands it. */
+export function holderOf({ operator, status, manned }: Row): string {
+  if (operator) {
+    return operator === session.value?.user ? text.withYou : fill(text.with, { by: operator });
+  }
+  if (status?.run) return "";
+  if (status?.unavailable) return status.unavailable;
+  return manned ? text.manned : text.free;
+}
