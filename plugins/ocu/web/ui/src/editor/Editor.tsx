@@ -3,9 +3,11 @@ import { useEffect, useRef, useState } from "preact/hooks";
 import { ApiError } from "../shared/api";
 import { remember, remembered } from "../shared/memory";
 import { guardLeaving } from "../shared/router";
+import { Split } from "../shared/Split";
 import { fill, strings } from "../strings";
 import { BlockLibrary } from "./blocks/BlockLibrary";
 import { Questions } from "./dialogs/Questions";
+import { MapPanel } from "./map/MapPanel";
 import { SidePanel } from "./panels/SidePanel";
 import { Catalogue } from "./session/catalogue";
 import { followKeys, stepThrough } from "./session/keyboard";
@@ -69,10 +71,14 @@ function Workplace({ work, fail }: WorkplaceProps) {
   const [showsBlocks, setBlocks] = useRemembered("editor-blocks", innerWidth > NARROW);
   const [showsPanel, setPanel] = useRemembered("editor-panel", true);
   useEffect(() => {
-    if (!canvas.current) return;
+    if (!canvas.current) return undefined;
     // What is drawn must have a size before it can be fitted to it.
     session.modeler.attachTo(canvas.current);
     work.begin().catch(fail);
+    // bpmn-js keeps the size that the canvas had.
+    const resized = new ResizeObserver(() => session.service("canvas").resized());
+    resized.observe(canvas.current);
+    return () => resized.disconnect();
   }, [work]);
   useEffect(() => followKeys(work), [work]);
   useEffect(() => {
@@ -114,14 +120,25 @@ function Workplace({ work, fail }: WorkplaceProps) {
         <div class="m2-drawing">
           <h2 class="m2-hidden">{words.canvas}</h2>
           <DiagramTabs session={session} />
-          <div
-            id="m2-canvas"
-            class="m2-canvas"
-            ref={canvas}
-            role="region"
-            aria-label={words.canvas}
-            onKeyDown={(event) => stepThrough(session, event)}
-          />
+          <div class={`m2-sheets${session.plan.isShown.value ? " m2-with-map" : ""}`}>
+            <Split
+              name="editor-map"
+              direction="row"
+              initial={46}
+              label={strings.plan.resize}
+              alone={!session.plan.isShown.value}
+            >
+              <div
+                id="m2-canvas"
+                class="m2-canvas"
+                ref={canvas}
+                role="region"
+                aria-label={words.canvas}
+                onKeyDown={(event) => stepThrough(session, event)}
+              />
+              {session.plan.isShown.value && <MapPanel editor={session} />}
+            </Split>
+          </div>
         </div>
         {showsPanel && <SidePanel editor={session} />}
       </div>

@@ -3,7 +3,7 @@ import { signal, type Signal } from "@preact/signals";
 import { createContext } from "preact";
 import { useContext } from "preact/hooks";
 import type { Fleet, Geometry } from "../shared/types";
-import type { Draft, Vertex } from "./map/draft";
+import type { Draft, Vertex } from "../map/draft";
 import type { MissionModel } from "./mission/missionModel";
 import type { Range } from "./plots/series";
 import type { Scene } from "./scene/scene";

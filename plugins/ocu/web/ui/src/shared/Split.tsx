@@ -12,6 +12,8 @@ export interface SplitProps {
   /** The first pane's part of the room, in percent. */
   initial: number;
   label: string;
+  /** The first pane has all of the room; the second one stays as it is. */
+  alone?: boolean;
   children: [ComponentChildren, ComponentChildren];
 }
 
@@ -20,7 +22,7 @@ const STEP = 2;
 
 const within = (part: number): number => Math.max(LEAST, Math.min(100 - LEAST, part));
 
-export function Split({ name, direction, initial, label, children }: SplitProps) {
+export function Split({ name, direction, initial, label, alone, children }: SplitProps) {
   const box = useRef<HTMLDivElement>(null);
   const part = useSignal(within(remembered(`split.${name}`, initial)));
   useEffect(() => {
@@ -47,7 +49,7 @@ export function Split({ name, direction, initial, label, children }: SplitProps)
   };
 
   return (
-    <div ref={box} class={`split split-${direction}`}>
+    <div ref={box} class={`split split-${direction}${alone ? " split-alone" : ""}`}>
       <div class="split-first" style={style}>
         {children[0]}
       </div>

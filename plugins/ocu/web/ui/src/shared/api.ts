@@ -48,14 +48,22 @@ async function request<T>(
 }
 
 async function ask<T>(path: string, body: unknown, init: RequestInit): Promise<T> {
-  if (body !== undefined) {
+  const response = await answered(path, body, init);
+  return (response.status === 204 ? undefined : await response.json()) as T;
+}
+
+async function answered(path: string, body: unknown, init: RequestInit): Promise<Response> {
+  if (body instanceof Blob) {
+    init.headers = { ...init.headers, "Content-Type": "application/octet-stream" };
+    init.body = body;
+  } else if (body !== undefined) {
     init.headers = { ...init.headers, "Content-Type": "application/json" };
     init.body = JSON.stringify(body);
   }
   const key = sessionKey();
   if (key) init.headers = { ...init.headers, "M2pem-Key": key };
   const response = await fetch(`/api${path}`, init);
-  if (response.ok) return (response.status === 204 ? undefined : await response.json()) as T;
+  if (response.ok) return response;
   throw new ApiError(await problemOf(response));
 }
 
@@ -71,6 +79,11 @@ async function problemOf(response: Response): Promise<Problem> {
 export const get = <T>(path: string): Promise<T> => request("GET", path);
 export const post = <T>(path: string, body: unknown = {}, options?: Options): Promise<T> =>
   request("POST", path, body, options);
+/** The bytes of a file that comes in answer. */
+export async function postForFile(path: string, body: unknown): Promise<Blob> {
+  const init: RequestInit = { method: "POST", credentials: "same-origin" };
+  return (await answered(path, body, init)).blob();
+}
 export const put = <T>(path: string, body: unknown, options?: Options): Promise<T> =>
   request("PUT", path, body, options);
 export const remove = <T>(path: string): Promise<T> => request("DELETE", path);

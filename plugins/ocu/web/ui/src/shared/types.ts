@@ -89,7 +89,7 @@ export interface Geometry {
   kind: "route" | "area" | "point";
   geometry: GeoJSON.Geometry;
   altitude_frame: AltitudeFrame;
-  from: "fleet" | "operator";
+  from: "fleet" | "operator" | "mission";
   by: string;
   at_us: number | null;
 }

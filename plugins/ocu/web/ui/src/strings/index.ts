@@ -5,6 +5,7 @@ import { fleet } from "./fleet";
 import { home } from "./home";
 import { operate } from "./operate";
 import { plots } from "./plots";
+import { plan } from "./plan";
 import { begin, run } from "./run";
 import { shell, signIn } from "./shell";
 
@@ -13,6 +14,7 @@ export const strings = {
   signIn,
   home,
   editor,
+  plan,
   verify,
   requirements,
   run,

@@ -5,6 +5,8 @@ import { adopt, child, isA, list, type Factory, type ModdleElement } from "./mod
 export interface Change {
   target: ModdleElement;
   properties: Record<string, unknown>;
+  /** What is drawn of it, where that is another one than of the command as a whole. */
+  shown?: unknown;
 }
 
 export function extensions(element: ModdleElement, type: string): ModdleElement[] {

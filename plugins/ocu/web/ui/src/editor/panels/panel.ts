@@ -3,7 +3,8 @@ import type { ReadonlySignal } from "@preact/signals";
 import type { ComponentChildren } from "preact";
 import type { Catalogue } from "../session/catalogue";
 import type { Checks } from "../session/checks";
-import type { Services } from "../session/services";
+import type { MapPlan } from "../map/plan";
+import type { Element, Services } from "../session/services";
 
 /** A tab beside the canvas. It stays mounted while another tab is shown. */
 export interface Panel {
@@ -19,6 +20,8 @@ export interface EditorContext {
   readonly mission: string;
   readonly catalogue: Catalogue;
   readonly checks: Checks;
+  readonly plan: MapPlan;
+  readonly selected: ReadonlySignal<readonly Element[]>;
   /** Counts changes, undone and redone ones too: what was found for an older count may be stale. */
   readonly changes: ReadonlySignal<number>;
   readonly isDirty: ReadonlySignal<boolean>;

@@ -2,6 +2,9 @@
 import { signal } from "@preact/signals";
 import { post } from "../../shared/api";
 import type { Check } from "../../shared/types";
+import { MapPlan } from "../map/plan";
+import { geometriesOf } from "../moddle/geometries";
+import type { ModdleElement } from "../moddle/moddle";
 import type { EditorContext } from "../panels/panel";
 import type { Catalogue } from "./catalogue";
 import { Checks } from "./checks";
@@ -22,6 +25,7 @@ export class EditorSession implements EditorContext {
   readonly canRedo = signal(false);
   readonly selected = signal<readonly Element[]>([]);
   readonly warnings = signal<readonly string[]>([]);
+  readonly plan: MapPlan;
   private readonly locator: Locator;
   private readonly marks: Marks;
   /** Where the command stack stood when the mission was saved; null: what is saved is not on it. */
@@ -38,6 +42,7 @@ export class EditorSession implements EditorContext {
       (xml) => post<Check>("/checks", { xml, mission }),
     );
     this.diagrams = new Diagrams(this.modeler, () => this.detachFromStack());
+    this.plan = new MapPlan(this);
     this.locator = new Locator(this.modeler, this.diagrams);
     this.marks = new Marks(this.modeler);
     this.follow();
@@ -110,6 +115,7 @@ export class EditorSession implements EditorContext {
     this.canUndo.value = stack.canUndo();
     this.canRedo.value = stack.canRedo();
     this.isDirty.value = this.savedAt === null || this.stackIndex() !== this.savedAt;
+    this.catalogue.own.value = geometriesOf(this.modeler.getDefinitions() as ModdleElement);
     this.changes.value += 1;
     this.diagrams.refresh();
     this.checks.soon();

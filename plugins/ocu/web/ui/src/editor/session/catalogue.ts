@@ -1,5 +1,5 @@
 // What this fleet has and can do: behaviors, services, vehicles, payloads, teams, routes and areas.
-import { signal, type Signal } from "@preact/signals";
+import { computed, signal, type ReadonlySignal, type Signal } from "@preact/signals";
 import { get } from "../../shared/api";
 import type { Behavior, Fleet, Geometry } from "../../shared/types";
 import type { BehaviorUse, ResourceKind } from "../moddle/behavior";
@@ -20,7 +20,11 @@ export interface Candidate {
 }
 
 export class Catalogue {
-  readonly geometries: Signal<Geometry[]>;
+  /** Those of the mission stand in place of others of their names. */
+  readonly geometries: ReadonlySignal<readonly Geometry[]>;
+  /** Of the mission that is drawn. */
+  readonly own = signal<readonly Geometry[]>([]);
+  private readonly shared: Signal<readonly Geometry[]>;
 
   constructor(
     readonly fleet: Fleet,
@@ -28,7 +32,11 @@ export class Catalogue {
     readonly services: readonly Service[],
     geometries: Geometry[],
   ) {
-    this.geometries = signal(geometries);
+    this.shared = signal(geometries);
+    this.geometries = computed(() => {
+      const own = new Set(this.own.value.map(({ name }) => name));
+      return [...this.own.value, ...this.shared.value.filter(({ name }) => !own.has(name))];
+    });
   }
 
   static async load(): Promise<Catalogue> {
@@ -43,7 +51,12 @@ export class Catalogue {
 
   /** Routes, areas and points may have been drawn meanwhile. */
   async refreshGeometries(): Promise<void> {
-    this.geometries.value = await get<Geometry[]>("/geometries");
+    this.shared.value = await get<Geometry[]>("/geometries");
+  }
+
+  /** Whether the fleet, or an operator, has a geometry of that name. */
+  isShared(name: string): boolean {
+    return this.shared.value.some((each) => each.name === name);
   }
 
   domainOf(resource: string): Domain | undefined {

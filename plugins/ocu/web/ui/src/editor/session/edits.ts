@@ -24,8 +24,8 @@ class ChangeHandler {
   constructor(private readonly modeling: Modeling) {}
 
   preExecute({ element, changes }: ChangeContext): void {
-    for (const { target, properties } of changes) {
-      this.modeling.updateModdleProperties(element, target, properties);
+    for (const { target, properties, shown } of changes) {
+      this.modeling.updateModdleProperties((shown as Element) ?? element, target, properties);
     }
   }
 }

@@ -77,6 +77,15 @@ export function Toolbar(props: ToolbarProps) {
         act={() => (work.question.value = { kind: "layout" })}
       />
       <span class="m2-stretch" />
+      <button
+        type="button"
+        class="plain m2-map-button"
+        aria-pressed={session.plan.isShown.value}
+        onClick={() => session.plan.show(!session.plan.isShown.value)}
+      >
+        <Icon name="place" />
+        {strings.plan.toggle}
+      </button>
       <IconButton
         icon="blocks"
         label={words.blocks}

@@ -8,6 +8,8 @@ const PATHS = {
   minus: "M4 9h12v2H4z",
   fit: "M3 3h5v2H5v3H3zm9 0h5v5h-2V5h-3zM3 12h2v3h3v2H3zm12 0h2v5h-5v-2h3z",
   map: "M2 4h16v12H2zm2 2v8h12V6zm1 1h5v4H5z",
+  place:
+    "M10 2a6 6 0 0 1 6 6c0 4-6 10-6 10S4 12 4 8a6 6 0 0 1 6-6zm0 3.500a2.500 2.500 0 1 0 .01 0z",
   layout:
     "M3 3h5v4H3zm9 0h5v4h-5zM3 13h5v4H3zm9 0h5v4h-5zM8 4.500h4v1H8zm1.500 0h1V15h-1zM8 14.500h4v1H8z",
   blocks: "M3 3h6v6H3zm8 0h6v6h-6zM3 11h6v6H3zm8 0h6v6h-6z",

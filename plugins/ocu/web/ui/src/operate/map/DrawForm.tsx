@@ -15,8 +15,8 @@ import {
   removed,
   undone,
   type Draft,
-  type Vertex,
-} from "./draft";
+} from "../../map/draft";
+import { VertexList } from "../../map/VertexList";
 import "./draw.css";
 
 const text = strings.operate.map;
@@ -98,25 +98,11 @@ export function DrawForm({ draft }: { draft: Draft }) {
           </label>
         )}
       </div>
-      <ol class="draw-vertices">
-        {draft.vertices.map((vertex, index) => (
-          <li key={index}>
-            <VertexFields
-              vertex={vertex}
-              label={fill(text.vertex, { number: index + 1 })}
-              onChange={(to) => change(moved(draft, index, to))}
-            />
-            <button
-              type="button"
-              class="plain"
-              aria-label={fill(text.removeVertex, { number: index + 1 })}
-              onClick={() => change(removed(draft, index))}
-            >
-              ×
-            </button>
-          </li>
-        ))}
-      </ol>
+      <VertexList
+        vertices={draft.vertices}
+        move={(index, to) => change(moved(draft, index, to))}
+        remove={(index) => change(removed(draft, index))}
+      />
       <div class="draw-row draw-actions">
         <button
           type="button"
@@ -146,45 +132,5 @@ export function DrawForm({ draft }: { draft: Draft }) {
         {problem === "name" && text.needsName}
       </p>
     </form>
-  );
-}
-
-interface VertexFieldsProps {
-  vertex: Vertex;
-  label: string;
-  onChange: (to: Partial<Vertex>) => void;
-}
-
-function VertexFields({ vertex, label, onChange }: VertexFieldsProps) {
-  const number = (
-    name: string,
-    value: number | null,
-    limit: number,
-    set: (value: number | null) => void,
-  ) => (
-    <input
-      type="number"
-      step="any"
-      min={-limit}
-      max={limit}
-      aria-label={`${label}: ${name}`}
-      placeholder={name}
-      value={value ?? ""}
-      onChange={({ currentTarget: { value: typed, valueAsNumber, validity } }) => {
-        if (typed === "") set(null);
-        else if (validity.valid) set(valueAsNumber);
-      }}
-    />
-  );
-  return (
-    <>
-      {number(text.latitude, Number(vertex.latitude.toFixed(7)), 90, (latitude) => {
-        if (latitude !== null) onChange({ latitude });
-      })}
-      {number(text.longitude, Number(vertex.longitude.toFixed(7)), 180, (longitude) => {
-        if (longitude !== null) onChange({ longitude });
-      })}
-      {number(text.altitude, vertex.altitude, 20_000, (altitude) => onChange({ altitude }))}
-    </>
   );
 }

@@ -10,10 +10,9 @@ import { Pane } from "../layout/Pane";
 import { sharedSpaces } from "../vehicles/sharedSpaces";
 import { workOf } from "../vehicles/work";
 import { DrawForm } from "./DrawForm";
-import { added, draftOf, emptyDraft, moved, type Kind } from "./draft";
+import { added, draftOf, emptyDraft, moved, type Kind } from "../../map/draft";
 import { MapTools, type MapShows } from "./MapTools";
 import { MapView } from "./mapView";
-import "leaflet/dist/leaflet.css";
 import "./map.css";
 
 const text = strings.operate.map;

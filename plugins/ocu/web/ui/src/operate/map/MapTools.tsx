@@ -3,7 +3,7 @@ import type { Signal } from "@preact/signals";
 import { Menu } from "../../shared/Menu";
 import { strings } from "../../strings";
 import type { Fleet, Geometry } from "../../shared/types";
-import type { Kind } from "./draft";
+import type { Kind } from "../../map/draft";
 
 const text = strings.operate.map;
 

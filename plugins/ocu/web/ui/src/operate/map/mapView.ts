@@ -1,17 +1,12 @@
 // The map, without Preact: Leaflet with no tiles but local ones.
 import L from "leaflet";
 import type { Fleet, Geometry, SharedSpace } from "../../shared/types";
-import type { Draft, Vertex } from "./draft";
-import { Graticule } from "./graticule";
+import type { Draft, Vertex } from "../../map/draft";
+import { baseMap, escaped, placeOf, vertexOf, type Tiles } from "../../map/baseMap";
 import { fill, strings } from "../../strings";
 import { VehicleLayer } from "./vehicleLayer";
 
 const text = strings.operate.map;
-
-export interface Tiles {
-  max_zoom: number;
-  attribution: string;
-}
 
 export interface MapListener {
   chosen(resource: string): void;
@@ -23,7 +18,6 @@ export interface MapListener {
 
 const OF_FLEET = "#56687a";
 const OF_OPERATOR = "#8347c7";
-const FENCE = "#c2262e";
 /** From how large on a geometry's name is shown. */
 const NAMED_PX = 120;
 const NAMED_ZOOM = 17;
@@ -51,30 +45,7 @@ export class MapView {
     tiles: Tiles | null,
     private readonly listener: MapListener,
   ) {
-    const { lat, lon } = fleet.origin;
-    this.map = L.map(host, {
-      center: [lat, lon],
-      zoom: 17,
-      maxZoom: 22,
-      preferCanvas: true,
-      attributionControl: tiles !== null,
-      zoomSnap: 0.5,
-    });
-    this.map.attributionControl?.setPrefix(false);
-    if (tiles) {
-      const options = {
-        maxNativeZoom: tiles.max_zoom,
-        maxZoom: 22,
-        attribution: escaped(tiles.attribution),
-      };
-      L.tileLayer("/tiles/{z}/{x}/{y}.png", options).addTo(this.map);
-    }
-    L.control.scale({ imperial: false }).addTo(this.map);
-    new Graticule(this.map);
-    if (fleet.fence) {
-      const style = { color: FENCE, weight: 2, dashArray: "6 6", fill: false, interactive: false };
-      L.geoJSON(fleet.fence, { style }).addTo(this.map);
-    }
+    this.map = baseMap(host, fleet, tiles);
     this.spaces.addTo(this.map);
     this.geometries.addTo(this.map);
     this.map.on("zoomend", () => {
@@ -195,7 +166,7 @@ export class MapView {
     this.map.getContainer().classList.toggle("map-drawing", this.isDrawing);
     this.drafted.clearLayers();
     if (!draft) return;
-    const points = draft.vertices.map<L.LatLngTuple>((each) => [each.latitude, each.longitude]);
+    const points = draft.vertices.map(placeOf);
     const style = { color: DRAFT, weight: 3, dashArray: "4 6", interactive: false };
     const line = draft.kind === "area" ? L.polygon(points, style) : L.polyline(points, style);
     if (draft.kind !== "point") line.addTo(this.drafted);
@@ -219,16 +190,6 @@ export class MapView {
     marker.addTo(this.drafted);
   }
 }
-
-/** Leaflet takes it as HTML. */
-const escaped = (text: string) =>
-  text.replaceAll("&", "&amp;").replaceAll("<", "&lt;").replaceAll(">", "&gt;");
-
-const vertexOf = ({ lat, lng }: L.LatLng): Vertex => ({
-  latitude: lat,
-  longitude: lng,
-  altitude: null,
-});
 
 function layerOf({ kind, from, geometry }: Geometry): L.GeoJSON {
   const color = from === "fleet" ? OF_FLEET : OF_OPERATOR;

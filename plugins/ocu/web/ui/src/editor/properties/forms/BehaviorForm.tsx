@@ -65,7 +65,9 @@ function Parameters({ form, use, meant, write }: ParametersProps) {
   );
   const first = known.filter((each) => needed(each) || given.has(each.name));
   const further = known.filter((each) => !first.includes(each));
-  const change = (name: string, value: string) => write(withParameter(use, name, value));
+  // A value that is picked on the map may come when others have been changed meanwhile.
+  const change = (name: string, value: string) =>
+    write(withParameter(behaviorOf(objectOf(form)) ?? use, name, value));
   const valueOf = (name: string) => use.parameters.find((each) => each.name === name)?.value ?? "";
   const field = (spec: Parameter) => (
     <ParameterField

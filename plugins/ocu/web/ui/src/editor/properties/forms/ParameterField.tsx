@@ -1,5 +1,5 @@
 // The field of one parameter, by what kind of value it takes.
-import type { Parameter } from "../../../shared/types";
+import type { Geometry, Parameter } from "../../../shared/types";
 import { fill, strings } from "../../../strings";
 import { titleOf } from "../../blocks/blocks";
 import type { EditorContext } from "../../panels/panel";
@@ -11,7 +11,9 @@ import type { Suggestion } from "../fields/Listbox";
 import { TextField } from "../fields/TextField";
 
 const words = strings.editor.parameter;
-const GEOMETRIES = ["route", "area", "point"];
+const GEOMETRIES = ["route", "area", "point"] as const;
+const isKind = (kind: string): kind is (typeof GEOMETRIES)[number] =>
+  (GEOMETRIES as readonly string[]).includes(kind);
 
 export interface ParameterFieldProps {
   editor: Pick<EditorContext, "catalogue">;
@@ -41,10 +43,32 @@ export function ParameterField({ editor, parameter, value, write, error }: Param
     ) : (
       <TextField {...common} />
     );
-  if (parameter.kind !== "position") return field;
+  const { kind } = parameter;
+  if (kind !== "position" && !isKind(kind)) return field;
+  const pick = (
+    <button
+      type="button"
+      class="m2-link-button"
+      onClick={() => {
+        editor.plan.show(true);
+        editor.plan.picking.value = { kind, label: titleOf(parameter.name), write };
+      }}
+    >
+      {strings.plan.pick}
+    </button>
+  );
+  if (kind !== "position") {
+    return (
+      <>
+        {field}
+        {pick}
+      </>
+    );
+  }
   return (
     <>
       {field}
+      {pick}
       <Coordinates {...{ editor, parameter, value, write }} />
     </>
   );
@@ -57,7 +81,7 @@ function suggestionsOf(catalogue: Catalogue, parameter: Parameter): Suggestion[]
     return ["true", "false"].map((value) => ({ value, label: words[value as "true"] }));
   if (kind === "position") return [...geometries(catalogue, "point"), ...vehicles(catalogue)];
   if (kind === "vehicle") return vehicles(catalogue);
-  return GEOMETRIES.includes(kind) ? geometries(catalogue, kind) : [];
+  return isKind(kind) ? geometries(catalogue, kind) : [];
 }
 
 function geometries(catalogue: Catalogue, kind: string): Suggestion[] {
@@ -65,8 +89,13 @@ function geometries(catalogue: Catalogue, kind: string): Suggestion[] {
   return found.map((each) => ({
     value: each.name,
     group: words.geometries[each.kind],
-    note: each.from === "operator" ? fill(words.byOperator, { by: each.by }) : "",
+    note: noteOf(each),
   }));
+}
+
+function noteOf({ from, by }: Geometry): string {
+  if (from === "mission") return strings.plan.groups.mission;
+  return from === "operator" ? fill(words.byOperator, { by }) : "";
 }
 
 function vehicles(catalogue: Catalogue): Suggestion[] {

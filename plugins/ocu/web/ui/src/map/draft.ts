@@ -1,5 +1,5 @@
 // A route, area or point while it is drawn.
-import type { AltitudeFrame, Geometry } from "../../shared/types";
+import type { AltitudeFrame, Geometry } from "../shared/types";
 
 export type Kind = Geometry["kind"];
 
@@ -60,12 +60,30 @@ export function removed(draft: Draft, index: number): Draft {
   );
 }
 
+/** A new vertex before another one. */
+export function inserted(draft: Draft, index: number, vertex: Vertex): Draft {
+  return changed(draft, draft.vertices.toSpliced(index, 0, vertex));
+}
+
+/** The whole of it, by so many degrees. Holes go along. */
+export function shifted(draft: Draft, latitude: number, longitude: number): Draft {
+  const vertices = draft.vertices.map((each) => ({
+    ...each,
+    latitude: each.latitude + latitude,
+    longitude: each.longitude + longitude,
+  }));
+  const holes = draft.holes.map((ring) =>
+    ring.map(([x = 0, y = 0, ...more]) => [round(x + longitude), round(y + latitude), ...more]),
+  );
+  return { ...changed(draft, vertices), holes };
+}
+
 export function undone(draft: Draft): Draft {
   const vertices = draft.before.at(-1);
   return vertices ? { ...draft, vertices, before: draft.before.slice(0, -1) } : draft;
 }
 
-const LEAST: Record<Kind, number> = { route: 2, area: 3, point: 1 };
+export const LEAST: Record<Kind, number> = { route: 2, area: 3, point: 1 };
 
 export type Problem = "vertices" | "name";
 
@@ -102,6 +120,7 @@ function verticesOf(geometry: GeoJSON.Geometry): Vertex[] {
     case "Point":
       return [vertexOf(geometry.coordinates)];
     case "LineString":
+    case "MultiPoint":
       return geometry.coordinates.map(vertexOf);
     case "Polygon":
       return (geometry.coordinates[0] ?? []).slice(0, -1).map(vertexOf);

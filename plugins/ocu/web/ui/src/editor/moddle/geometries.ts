@@ -1,0 +1,130 @@
+// The routes, areas and points that a mission has itself: m2pem:geometry in a process's extension
+// elements (docs/missions.md).
+import type { AltitudeFrame, Geometry } from "../../shared/types";
+import { behaviorOf, serviceOf, setBehavior, setService } from "./behavior";
+import { extensions, replaced, type Change } from "./extensions";
+import { isA, list, successor, text, type Factory, type ModdleElement } from "./moddle";
+
+const TYPE = "m2pem:Geometry";
+const FRAMES: readonly string[] = ["relative", "amsl", "terrain"];
+const KINDS: Record<string, Geometry["kind"]> = {
+  Point: "point",
+  LineString: "route",
+  MultiPoint: "route",
+  Polygon: "area",
+};
+
+export interface NamedFeature {
+  name: string;
+  feature: GeoJSON.Feature;
+}
+
+export const processesIn = (definitions: ModdleElement | undefined): ModdleElement[] =>
+  list(definitions, "rootElements").filter((each) => isA(each, "bpmn:Process"));
+
+/** Those that can be drawn, by name; what is wrong with others, the check says. */
+export function geometriesOf(definitions: ModdleElement | undefined): Geometry[] {
+  const found = processesIn(definitions)
+    .flatMap((process) => extensions(process, TYPE))
+    .flatMap((element) => geometryOf(element) ?? []);
+  return found.sort((one, other) => one.name.localeCompare(other.name));
+}
+
+/** Puts geometries into the mission, each in place of the one that was called `before`. */
+export function putGeometries(
+  factory: Factory,
+  definitions: ModdleElement,
+  put: readonly (NamedFeature & { before?: string })[],
+): Change[] {
+  const process = holderIn(definitions);
+  if (!process) return [];
+  const all = [...extensions(process, TYPE)];
+  for (const { name, feature, before = name } of put) {
+    const at = all.findIndex((each) => text(each, "name") === before);
+    const made = written(factory, name, feature, all[at]);
+    if (at < 0) all.push(made);
+    else all[at] = made;
+  }
+  return [replaced(factory, process, [TYPE], all)];
+}
+
+export function removeGeometry(
+  factory: Factory,
+  definitions: ModdleElement,
+  name: string,
+): Change[] {
+  return processesIn(definitions).flatMap((process) => {
+    const all = extensions(process, TYPE);
+    const kept = all.filter((each) => text(each, "name") !== name);
+    return kept.length < all.length ? [replaced(factory, process, [TYPE], kept)] : [];
+  });
+}
+
+/** Parameters of a task that name a geometry go on doing so under its new name. */
+export function renameUses(
+  factory: Factory,
+  task: ModdleElement,
+  before: string,
+  name: string,
+): Change[] {
+  const renamed = (values: readonly { name: string; value: string }[]) =>
+    values.map((each) => (each.value === before ? { ...each, value: name } : each));
+  const behavior = behaviorOf(task);
+  if (behavior) {
+    const use = { ...behavior, parameters: renamed(behavior.parameters) };
+    return setBehavior(factory, task, use);
+  }
+  const service = serviceOf(task);
+  return service
+    ? setService(factory, task, { ...service, parameters: renamed(service.parameters) })
+    : [];
+}
+
+/** The process that has some already; else the first that can be started. */
+function holderIn(definitions: ModdleElement): ModdleElement | undefined {
+  const all = processesIn(definitions);
+  return (
+    all.find((each) => extensions(each, TYPE).length > 0) ??
+    all.find((each) => each.get("isExecutable") === true) ??
+    all[0]
+  );
+}
+
+function written(
+  factory: Factory,
+  name: string,
+  { properties, geometry }: GeoJSON.Feature,
+  before?: ModdleElement,
+): ModdleElement {
+  const frame = (properties as { altitude_frame?: string } | null)?.altitude_frame ?? "relative";
+  const value =
+    frame === "relative"
+      ? geometry
+      : { type: "Feature", properties: { altitude_frame: frame }, geometry };
+  return successor(factory, TYPE, { name, body: JSON.stringify(value) }, before);
+}
+
+function geometryOf(element: ModdleElement): Geometry | undefined {
+  const name = text(element, "name");
+  try {
+    const read = JSON.parse(text(element, "body")) as GeoJSON.Feature | GeoJSON.Geometry;
+    const feature = read.type === "Feature" ? read : null;
+    const geometry = feature ? feature.geometry : (read as GeoJSON.Geometry);
+    const kind = KINDS[geometry.type];
+    const frame = String(feature?.properties?.altitude_frame ?? "relative");
+    if (!kind || !name || !FRAMES.includes(frame)) return undefined;
+    if (!("coordinates" in geometry) || !isPlaced(geometry.coordinates)) return undefined;
+    const altitude_frame = frame as AltitudeFrame;
+    return { name, kind, geometry, altitude_frame, from: "mission", by: "", at_us: null };
+  } catch {
+    return undefined;
+  }
+}
+
+/** Whether all of it are numbers: Leaflet throws at anything else. */
+function isPlaced(coordinates: unknown): boolean {
+  if (!Array.isArray(coordinates) || coordinates.length === 0) return false;
+  if (typeof coordinates[0] === "number")
+    return coordinates.length >= 2 && coordinates.every((each) => Number.isFinite(each));
+  return coordinates.every(isPlaced);
+}

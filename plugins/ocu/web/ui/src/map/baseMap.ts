@@ -1,0 +1,55 @@
+// What every map of the page has: pictures of this machine if there are any, lines of latitude and
+// longitude, a scale, and the fence of the fleet.
+import L from "leaflet";
+import type { Fleet } from "../shared/types";
+import type { Vertex } from "./draft";
+import { Graticule } from "./graticule";
+import "leaflet/dist/leaflet.css";
+import "./map.css";
+
+export interface Tiles {
+  max_zoom: number;
+  attribution: string;
+}
+
+const FENCE = "#c2262e";
+
+export function baseMap(host: HTMLElement, fleet: Fleet, tiles: Tiles | null): L.Map {
+  const { lat, lon } = fleet.origin;
+  const map = L.map(host, {
+    center: [lat, lon],
+    zoom: 17,
+    maxZoom: 22,
+    preferCanvas: true,
+    attributionControl: tiles !== null,
+    zoomSnap: 0.5,
+  });
+  map.attributionControl?.setPrefix(false);
+  if (tiles) {
+    const options = {
+      maxNativeZoom: tiles.max_zoom,
+      maxZoom: 22,
+      attribution: escaped(tiles.attribution),
+    };
+    L.tileLayer("/tiles/{z}/{x}/{y}.png", options).addTo(map);
+  }
+  L.control.scale({ imperial: false }).addTo(map);
+  new Graticule(map);
+  if (fleet.fence) {
+    const style = { color: FENCE, weight: 2, dashArray: "6 6", fill: false, interactive: false };
+    L.geoJSON(fleet.fence, { style }).addTo(map);
+  }
+  return map;
+}
+
+/** Leaflet takes it as HTML. */
+export const escaped = (text: string): string =>
+  text.replaceAll("&", "&amp;").replaceAll("<", "&lt;").replaceAll(">", "&gt;");
+
+export const vertexOf = ({ lat, lng }: L.LatLng): Vertex => ({
+  latitude: lat,
+  longitude: lng,
+  altitude: null,
+});
+
+export const placeOf = ({ latitude, longitude }: Vertex): L.LatLngTuple => [latitude, longitude];
