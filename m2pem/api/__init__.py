@@ -96,6 +96,7 @@ if TYPE_CHECKING:
     from m2pem.api.runs import (
         SCHEDULE,
         Alert,
+        GeometryVersion,
         HandedOver,
         IncidentPreview,
         IncidentVerdict,
@@ -224,8 +225,9 @@ _MODULES = {
     ),
     "m2pem.api.run_view": "RunView",
     "m2pem.api.runs": (
-        "SCHEDULE Alert HandedOver IncidentPreview IncidentVerdict OpenIncident OpenPrompt"
-        " PromptClosed RunId RunStatus RunSummary SimulationResult StampedRecord TelemetrySample"
+        "SCHEDULE Alert GeometryVersion HandedOver IncidentPreview IncidentVerdict OpenIncident"
+        " OpenPrompt PromptClosed RunId RunStatus RunSummary SimulationResult StampedRecord"
+        " TelemetrySample"
     ),
     "m2pem.api.statistics": (
         "DurationCounts ExecutiveStatistics LinkStatistics SubscriptionStatistics"
@@ -358,6 +360,7 @@ __all__ = [
     "GeoPosition",
     "GeometryError",
     "GeometryFile",
+    "GeometryVersion",
     "NamedGeometry",
     "READ_SUFFIXES",
     "kind_of",

@@ -25,6 +25,7 @@ from m2pem.api.authoring import (
 from m2pem.api.health import ExecutiveAddress, HealthCheck
 from m2pem.api.runs import (
     Alert,
+    GeometryVersion,
     HandedOver,
     IncidentPreview,
     OpenIncident,
@@ -298,7 +299,34 @@ class MissionControl(Protocol):
     async def set_geometry(
         self, name: str, geometry: Mapping[str, Value], *, run: RunId | None = None, by: str = ""
     ) -> None:
-        """Hand over a route, area or point (GeoJSON), to one run or to all, now and later."""
+        """Hand over a route, area or point (GeoJSON), to one run or to all, now and later.
+
+        What is for all runs is kept in the journal, with its former versions.
+
+        Raises:
+            OperatorError: it is no geometry; or it is handed over, and the journal has not written
+                it within 1.5 s.
+        """
+        ...
+
+    async def delete_geometry(self, name: str, *, by: str = "") -> None:
+        """Delete a geometry that was handed over for all runs: later runs get that of the fleet
+        file, if it has one. Runs under way keep it. Its versions are kept.
+
+        Raises:
+            OperatorError: no operator has handed it over; or as for `set_geometry`.
+        """
+        ...
+
+    async def geometry_versions(self, name: str) -> Sequence[GeometryVersion]:
+        """The versions of a geometry that were handed over for all runs, the newest last."""
+        ...
+
+    async def geometry_users(self, name: str) -> Sequence[RunId]:
+        """The runs under way whose missions name a geometry that is not their own.
+
+        Operators see them before they hand over another one of that name.
+        """
         ...
 
     async def take(self, resource: str, *, by: str = "") -> None:

@@ -29,6 +29,7 @@ from m2pem.api.control import MissionControl
 from m2pem.api.health import ExecutiveAddress, HealthCheck
 from m2pem.api.runs import (
     Alert,
+    GeometryVersion,
     IncidentPreview,
     OpenIncident,
     OpenPrompt,
@@ -157,6 +158,18 @@ class Geometry(Params, frozen=True):
     name: str
     geometry: dict[str, Value]
     run: str | None = None
+    by: str = ""
+
+
+class OfGeometry(Params, frozen=True):
+    """As `MissionControl.geometry_versions` and `geometry_users`."""
+
+    name: str
+
+
+class DeleteGeometry(OfGeometry, frozen=True):
+    """As `MissionControl.delete_geometry`."""
+
     by: str = ""
 
 
@@ -357,6 +370,9 @@ OPERATIONS: dict[str, Operation] = {
         Operation("pause", OfRun, alone=True),
         Operation("resume", OfRun),
         Operation("set_geometry", Geometry),
+        Operation("delete_geometry", DeleteGeometry),
+        Operation("geometry_versions", OfGeometry, list[GeometryVersion]),
+        Operation("geometry_users", OfGeometry, list[str]),
         Operation("take", Resource),
         Operation("preview_take", Preview, list[TakeEffect]),
         Operation("give_back", Resource),

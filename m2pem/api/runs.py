@@ -209,6 +209,19 @@ class HandedOver:
 
 
 @dataclass(frozen=True, slots=True)
+class GeometryVersion:
+    """A version of a geometry that was handed over for all runs; `number` rises with time.
+
+    `geometry` None: it was deleted then.
+    """
+
+    number: int
+    geometry: Mapping[str, Value] | None
+    by: str
+    at_us: int
+
+
+@dataclass(frozen=True, slots=True)
 class TelemetrySample:
     """The states of vehicles and payloads of a rehearsal at one mission time."""
 

@@ -26,6 +26,7 @@ from m2pem.api.authoring import (
 from m2pem.api.control import ControlEvent
 from m2pem.api.health import ExecutiveAddress, HealthCheck
 from m2pem.api.runs import (
+    GeometryVersion,
     HandedOver,
     IncidentPreview,
     IncidentVerdict,
@@ -349,10 +350,24 @@ class Control:
         given = _bounded(geometry)
         if run is None:
             self._supervisor.set_geometry(name, given, None, by)
+            await self._supervisor.drawings.write(f"{name} is handed over")
             return
         async with self._explain_end("set_geometry", run):
             refuse_ended(self._supervisor.runner(run))
             self._supervisor.set_geometry(name, given, run, by)
+
+    async def delete_geometry(self, name: str, *, by: str = "") -> None:
+        """Delete a geometry that was handed over for all runs."""
+        self._supervisor.delete_geometry(name, by)
+        await self._supervisor.drawings.write(f"{name} is deleted")
+
+    async def geometry_versions(self, name: str) -> Sequence[GeometryVersion]:
+        """The versions of a geometry that were handed over for all runs."""
+        return self._supervisor.drawings.versions(name)
+
+    async def geometry_users(self, name: str) -> Sequence[RunId]:
+        """The runs under way whose missions name a geometry that is not their own."""
+        return self._supervisor.geometry_users(name)
 
     async def take(self, resource: str, *, by: str = "") -> None:
         """Take a vehicle or payload from the missions."""
@@ -627,7 +642,7 @@ class Control:
 
     def geometries(self) -> Mapping[str, HandedOver]:
         """What operators have handed over for all runs."""
-        return self._supervisor.handed_over
+        return self._supervisor.drawings.handed_over
 
     def services(self) -> Mapping[str, Sequence[str]]:
         """The service-task classes that there are, with what each writes."""

@@ -179,6 +179,7 @@ class Executive:
         """
         await self._serve_fleet()
         await self._load_alerts()
+        await self._load_drawings()
         try:
             self._locks.acquire()
             await self._connections.connect()
@@ -257,6 +258,12 @@ class Executive:
             await self.alerts.load()
         except JournalError as error:  # what matters more needs the journal, too, and says so
             log.warning("who has acknowledged which alert is not known: %s", error)
+
+    async def _load_drawings(self) -> None:
+        try:
+            await self._supervisor.drawings.load()
+        except JournalError as error:  # what matters more needs the journal, too, and says so
+            log.warning("which geometries operators have handed over is not known: %s", error)
 
     async def _serve_fleet(self) -> None:
         """Let no other executive on the journal command the vehicles, until it is closed; those

@@ -46,7 +46,7 @@ class RunStarter:
             supervisor.fleet,
             supervisor.journal,
             lambda: supervisor.fleet_now.geometries,
-            lambda: {name: each.by for name, each in supervisor.handed_over.items()},
+            lambda: {name: each.by for name, each in supervisor.drawings.handed_over.items()},
             supervisor.clock.now_us,
             lambda text: supervisor.events.publish(Alert("", APPROVAL, text)),
         )
@@ -68,7 +68,7 @@ class RunStarter:
             supervisor.plugins,
             known_data(data),
             process,
-            handed_over=supervisor.handed_over,
+            handed_over=supervisor.drawings.handed_over,
         )
         refuse_errors(f"{loaded.file} cannot run with fleet {supervisor.fleet.file}", findings)
         if loaded.chooses_resources or waits_for_space(supervisor.fleet):
@@ -88,7 +88,7 @@ class RunStarter:
                 plugins,
                 names,
                 process,
-                handed_over=supervisor.handed_over,
+                handed_over=supervisor.drawings.handed_over,
             ),
             *requirement_findings(loaded, arbiters, plugins, names),
         ]

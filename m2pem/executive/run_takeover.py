@@ -101,7 +101,7 @@ class RunTakeover:
             for resource, operator in supervisor.handover.taken.items()
             if resource not in lent
         }
-        claim(runner, line.loss, taken, supervisor.geometries_given(mission))
+        claim(runner, line.loss, taken, supervisor.geometries_given(mission, resumed=True))
         mark = supervisor.marks.get(number)
         if mark is not None:
             log.warning("%s was stopped before its executive ended; it stays stopped", number)

@@ -16,7 +16,7 @@ from m2pem.api.allocation import SharedSpaceState
 from m2pem.api.arbiter import BehaviorId, BehaviorReport
 from m2pem.api.clock import Clock
 from m2pem.api.epoch_fence import run_of
-from m2pem.api.runs import LEFT_ARMED, Alert, HandedOver, RunId
+from m2pem.api.runs import LEFT_ARMED, Alert, RunId
 from m2pem.api.service import ServiceContext
 from m2pem.api.telemetry import TeamState, Telemetry
 from m2pem.bpmn.one_task import is_one_task
@@ -44,6 +44,7 @@ from m2pem.executive.behavior_reports import reported
 from m2pem.executive.control_events import ControlEvents, RecordObservers
 from m2pem.executive.counts import RunCounts
 from m2pem.executive.dispatcher import Dispatcher
+from m2pem.executive.drawings import Drawings
 from m2pem.executive.emergency import WRITTEN_WITHIN_S, EmergencyCommands, StopMarks
 from m2pem.executive.fleet_connections import FleetArbiters
 from m2pem.executive.handover import Handover
@@ -62,6 +63,7 @@ from m2pem.executive.services import Services
 from m2pem.executive.space_allocation import SpaceAllocation
 from m2pem.executive.waiting_tasks import waiting_tasks
 from m2pem.fleet.allocation import Availability, resources_of_mission
+from m2pem.fleet.approval import is_named
 from m2pem.fleet.fleet import Fleet
 from m2pem.fleet.space import waits_for_space
 from m2pem.geo.geojson import GeometryError, parse_geojson
@@ -73,6 +75,7 @@ from m2pem.mission.losses import LINK_LOST
 from m2pem.mission.mission import Mission
 from m2pem.mission.values import Value
 from m2pem.plugins import Plugins
+from m2pem.suggestions import suggest
 from m2pem.telemetry.bus import Bus
 
 log = logging.getLogger("m2pem.executive")
@@ -130,7 +133,7 @@ class Supervisor:
         self.events = events
         self.settings = settings
         self.runners: dict[RunId, Runner] = {}
-        self.handed_over: dict[str, HandedOver] = {}
+        self.drawings = Drawings(self.fleet.name, journal, clock.now_us)
         self.availability = Availability(self.fleet)
         self.counts = RunCounts()
         self._bus = bus
@@ -286,15 +289,18 @@ class Supervisor:
     @property
     def fleet_now(self) -> Fleet:
         """The fleet, with the geometries that operators have handed over for all runs."""
-        given = {name: parse_geojson(each.geometry) for name, each in self.handed_over.items()}
+        handed_over = self.drawings.handed_over
+        given = {name: parse_geojson(each.geometry) for name, each in handed_over.items()}
         return replace(self.fleet, geometries={**self.fleet.geometries, **given})
 
-    def geometries_given(self, mission: Mission) -> list[GeometrySet]:
+    def geometries_given(self, mission: Mission, *, resumed: bool = False) -> list[GeometrySet]:
         """Return the inputs that hand over what operators have handed over for all runs.
 
-        A geometry of the mission's own is not replaced by that.
+        A geometry of the mission's own is not replaced by that. A run that is `resumed` has had
+        what was handed over before this executive began.
         """
-        given = self.handed_over.items()
+        drawings = self.drawings
+        given = (drawings.given_here if resumed else drawings.handed_over).items()
         return [
             GeometrySet(name, dict(each.geometry), each.by)
             for name, each in given
@@ -513,7 +519,7 @@ class Supervisor:
             raise OperatorError(f"geometry {name!r}: {wrong[0]}; {wrong[1]}")
         item = GeometrySet(name, dict(geometry), by)
         if run is None:
-            self.handed_over[name] = HandedOver(dict(geometry), by, self.clock.now_us())
+            self.drawings.change(name, geometry, by)
         if run is not None:
             runners = [self.runner(run)]
         else:
@@ -522,6 +528,28 @@ class Supervisor:
         for runner in runners:
             if not runner.done.is_set():
                 runner.post(item)
+
+    def delete_geometry(self, name: str, by: str) -> None:
+        """Delete a geometry that was handed over for all runs; those under way keep it.
+
+        Raises:
+            OperatorError: none was handed over.
+        """
+        if name not in self.drawings.handed_over:
+            known = list(self.drawings.handed_over)
+            hint = suggest(name, known, "geometries") if known else "none is handed over"
+            raise OperatorError(f"no operator has handed over a geometry {name!r}; {hint}")
+        self.drawings.change(name, None, by)
+
+    def geometry_users(self, name: str) -> list[RunId]:
+        """Return the runs under way whose missions name a geometry that is not their own."""
+        return [
+            run
+            for run, runner in self.runners.items()
+            if not runner.done.is_set()
+            and name not in runner.run.state.mission.geometries
+            and is_named(name, [each.source for each in runner.run.state.mission.files()])
+        ]
 
     def runner(self, run: RunId) -> Runner:
         """The runner of a run that is driven here.
@@ -570,6 +598,6 @@ class Supervisor:
                 return parse_geojson(runner.run.state.geometries[name])
             if name in runner.run.state.mission.geometries:
                 return runner.run.state.mission.geometries[name]
-        if name in self.handed_over:
-            return parse_geojson(self.handed_over[name].geometry)
+        if name in self.drawings.handed_over:
+            return parse_geojson(self.drawings.handed_over[name].geometry)
         return self.fleet.geometries.get(name)

@@ -93,7 +93,7 @@ def content_of(
         parts[name] = file_digest(source.data)
     files = tuple(parts.values())
     texts = [mission, *(source.data for source in used)]
-    drawings = tuple(name for name in sorted(geometries) if _is_named(name, texts))
+    drawings = tuple(name for name in sorted(geometries) if is_named(name, texts))
     for name in drawings:
         parts[f"drawing {name}"] = _geometry_digest(geometries[name])
     # Which file answers which call is content, too; where an importer is kept is not.
@@ -102,7 +102,8 @@ def content_of(
     return Content(hashlib.sha256(whole).hexdigest(), parts, files, drawings)
 
 
-def _is_named(name: str, texts: Iterable[bytes]) -> bool:
+def is_named(name: str, texts: Iterable[bytes]) -> bool:
+    """Whether files of missions may name a geometry: whether its name is in one of them."""
     spelled = {name.encode(), escape(name).encode()}
     return any(
         any(each in text for each in spelled) or text[:2] in _UTF_16 or _REFERENCE.search(text)

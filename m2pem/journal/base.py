@@ -407,6 +407,22 @@ class Journal(Protocol):
         """Return the alerts of a fleet by their numbers, which rise, as they were written."""
         ...
 
+    # --- drawings -------------------------------------------------------------------------------
+
+    async def write_drawings(self, fleet: str, drawings: Mapping[int, str | None]) -> None:
+        """Write versions of routes, areas and points that operators have handed over, by their
+        numbers; None: remove it. Durable on return.
+
+        Raises:
+            JournalError: they cannot be written.
+        """
+        ...
+
+    async def drawings(self, fleet: str) -> Mapping[int, str]:
+        """Return the versions of drawings of a fleet by their numbers, which rise, as they were
+        written."""
+        ...
+
     async def close(self) -> None:
         """Finish what is being written, and release all runs."""
         ...

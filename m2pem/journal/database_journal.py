@@ -464,6 +464,21 @@ class DatabaseJournal(ABC):
         )
         return dict(rows)
 
+    async def write_drawings(self, fleet: str, drawings: Mapping[int, str | None]) -> None:
+        """See `Journal.write_drawings`."""
+        self._check_open()
+        await self._writer.submit(lambda transaction: transaction.write_drawings(fleet, drawings))
+
+    async def drawings(self, fleet: str) -> Mapping[int, str]:
+        """See `Journal.drawings`."""
+        return await self._read(lambda: self._drawings(fleet))
+
+    def _drawings(self, fleet: str) -> Mapping[int, str]:
+        rows = self._reading.execute(
+            "SELECT number, drawing FROM drawings WHERE fleet = ? ORDER BY number", (fleet,)
+        )
+        return dict(rows)
+
     async def _read(self, work: Callable[[], T]) -> T:
         self._check_open()
         try:

@@ -53,6 +53,7 @@ class MemoryJournal:
         self._entries: dict[str, ScheduleEntry] = {}
         self._holds: dict[str, Hold | None] = {}
         self._alerts: dict[str, dict[int, str]] = {}
+        self._drawings: dict[str, dict[int, str]] = {}
         self._last_entry = 0
         self._approvals: dict[tuple[str, str, str], Approval] = {}
         self._edits: dict[str, Edit] = {}
@@ -311,17 +312,22 @@ class MemoryJournal:
     async def write_alerts(self, fleet: str, alerts: Mapping[int, str | None]) -> None:
         """See `Journal.write_alerts`."""
         self._check_open()
-        kept = self._alerts.setdefault(fleet, {})
-        for number, text in alerts.items():
-            if text is None:
-                kept.pop(number, None)
-            else:
-                kept[number] = text
+        _write(self._alerts.setdefault(fleet, {}), alerts)
 
     async def alerts(self, fleet: str) -> Mapping[int, str]:
         """See `Journal.alerts`."""
         self._check_open()
         return dict(sorted(self._alerts.get(fleet, {}).items()))
+
+    async def write_drawings(self, fleet: str, drawings: Mapping[int, str | None]) -> None:
+        """See `Journal.write_drawings`."""
+        self._check_open()
+        _write(self._drawings.setdefault(fleet, {}), drawings)
+
+    async def drawings(self, fleet: str) -> Mapping[int, str]:
+        """See `Journal.drawings`."""
+        self._check_open()
+        return dict(sorted(self._drawings.get(fleet, {}).items()))
 
     async def close(self) -> None:
         """See `Journal.close`."""
@@ -341,3 +347,12 @@ class MemoryJournal:
     def _check_open(self) -> None:
         if self._closed:
             raise JournalError("the journal has been closed")
+
+
+def _write(kept: dict[int, str], texts: Mapping[int, str | None]) -> None:
+    """Write texts by their numbers; None: remove it."""
+    for number, text in texts.items():
+        if text is None:
+            kept.pop(number, None)
+        else:
+            kept[number] = text

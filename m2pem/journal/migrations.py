@@ -158,6 +158,18 @@ def alerts(connection: sqlite3.Connection) -> None:
     )
 
 
+def drawings(connection: sqlite3.Connection) -> None:
+    """0.10: versions of the routes, areas and points that operators have handed over, as JSON."""
+    connection.execute(
+        """CREATE TABLE drawings (
+            fleet TEXT NOT NULL,
+            number INTEGER NOT NULL,
+            drawing TEXT NOT NULL,
+            PRIMARY KEY (fleet, number)
+        ) WITHOUT ROWID"""
+    )
+
+
 MIGRATIONS: tuple[Callable[[sqlite3.Connection], None], ...] = (
     runs_standings_and_entries,
     other_files_of_missions,
@@ -168,6 +180,7 @@ MIGRATIONS: tuple[Callable[[sqlite3.Connection], None], ...] = (
     origin_of_salvaged_runs,
     approvals,
     alerts,
+    drawings,
 )
 
 

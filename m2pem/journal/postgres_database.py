@@ -293,6 +293,14 @@ def alerts(connection: psycopg.Connection[Any]) -> None:
     )
 
 
+def drawings(connection: psycopg.Connection[Any]) -> None:
+    """0.5: versions of the routes, areas and points that operators have handed over, as JSON."""
+    connection.execute(
+        "CREATE TABLE drawings (fleet TEXT NOT NULL, number BIGINT NOT NULL, drawing TEXT NOT NULL,"
+        " PRIMARY KEY (fleet, number))"
+    )
+
+
 MIGRATIONS: tuple[Callable[[psycopg.Connection[Any]], None], ...] = (
     first_tables,
     fleets,
@@ -301,6 +309,7 @@ MIGRATIONS: tuple[Callable[[psycopg.Connection[Any]], None], ...] = (
     server_starts,
     approvals,
     alerts,
+    drawings,
 )
 """A released step is never changed; a change becomes a new step at the end."""
 

@@ -371,6 +371,22 @@ class WriteTransaction:
                 )
         self._wrote = True
 
+    def write_drawings(self, fleet: str, drawings: Mapping[int, str | None]) -> None:
+        """Write or remove versions of drawings of a fleet."""
+        self._refuse_while_short()
+        for number, text in drawings.items():
+            if text is None:
+                self._connection.execute(
+                    "DELETE FROM drawings WHERE fleet = ? AND number = ?", (fleet, number)
+                )
+            else:
+                self._connection.execute(
+                    "INSERT INTO drawings VALUES (?, ?, ?)"
+                    " ON CONFLICT (fleet, number) DO UPDATE SET drawing = excluded.drawing",
+                    (fleet, number, text),
+                )
+        self._wrote = True
+
     def append(self, rows: Sequence[EntryRow]) -> None:
         """Add entries."""
         changed: dict[int, RunPosition] = {}

@@ -232,8 +232,8 @@ async def test_an_older_executive_that_drives_on_keeps_the_length_of_its_lease(
         await older.serve_fleet("north", ["ugv1"])
         for statement in (
             "ALTER TABLE executives DROP COLUMN lease, DROP COLUMN server_start",
-            "DROP TABLE approvals, edits, alerts",
-            "UPDATE m2pem_format SET version = version - 3",
+            "DROP TABLE approvals, edits, alerts, drawings",
+            "UPDATE m2pem_format SET version = version - 4",
         ):
             postgres.execute(statement, postgres_url)
         async with opened(lambda: open_journal(postgres_url)):

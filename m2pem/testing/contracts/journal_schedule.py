@@ -206,6 +206,21 @@ class JournalSchedule(JournalFixtures):
             assert await journal.alerts("north") == {1: "acknowledged by anna"}
 
     @needs("durability")
+    async def test_versions_of_drawings_outlive_the_journal_that_wrote_them(
+        self, open_journal: OpenJournal
+    ) -> None:
+        """Of each fleet, by their numbers, until they are removed."""
+        async with opened(open_journal) as journal:
+            assert await journal.drawings("north") == {}
+            await journal.write_drawings("north", {2: "two", 1: "one", 3: "three"})
+            await journal.write_drawings("south", {1: "another"})
+            await journal.write_drawings("north", {1: None, 3: "three again"})
+        async with opened(open_journal) as journal:
+            kept = await journal.drawings("north")
+            assert list(kept.items()) == [(2, "two"), (3, "three again")]
+            assert await journal.drawings("south") == {1: "another"}
+
+    @needs("durability")
     async def test_each_of_two_journals_sees_what_the_other_does_with_the_schedule(
         self, open_journal: OpenJournal
     ) -> None:

@@ -50,6 +50,7 @@ COMMANDS: dict[str, tuple[str, str, Any]] = {
         "/api/geometries/gate",
         {"geometry": {"type": "Point", "coordinates": [7.0, 51.0]}, "run": "r1"},
     ),
+    "delete_geometry": ("DELETE", "/api/geometries/gate", None),
     "unschedule": ("POST", "/api/schedule/s1/cancel", None),
     "start_scheduled": ("POST", "/api/schedule/s1/start", None),
     "hold_schedule": ("POST", "/api/schedule/s1/hold", {"reason": "rain"}),
