@@ -1,4 +1,6 @@
 // Texts of the editor: its canvas, toolbar, blocks and properties.
+import { control } from "./control";
+
 export const editor = {
   editing: "Editing",
   loading: "Loading…",
@@ -71,6 +73,7 @@ export const editor = {
     abortLabel: "Abort",
     detectorDoc: "Waits until a detector finds something",
     groups: {
+      control: control.group,
       operator: "Operator",
       ground: "Ground vehicles",
       air: "Aircraft",

@@ -1,5 +1,6 @@
 // Every text that a person reads, one section a page.
 import { requirements, verify } from "./checks";
+import { control } from "./control";
 import { editor } from "./editor";
 import { fleet } from "./fleet";
 import { home } from "./home";
@@ -15,6 +16,7 @@ export const strings = {
   home,
   editor,
   plan,
+  control,
   verify,
   requirements,
   run,

@@ -5,14 +5,15 @@ import type { EditorSession } from "../session/EditorSession";
 import type { Element } from "../session/services";
 import { blocksOf, GROUPS, matching, type Block } from "./blocks";
 import { iconSvg } from "./icons";
-import { makeShape } from "./making";
+import { draggingOf, makeShape } from "./making";
+import { takesPlace } from "./putting";
 
 const words = strings.editor.blocks;
 
 export function BlockLibrary({ session }: { session: EditorSession }) {
   const [search, setSearch] = useState("");
   const blocks = useMemo(() => blocksOf(session.catalogue), [session]);
-  const found = matching(blocks, search);
+  const found = matching(session.catalogue, blocks, search);
   return (
     <section class="m2-blocks" aria-label={words.title}>
       <input
@@ -51,12 +52,18 @@ export function BlockLibrary({ session }: { session: EditorSession }) {
 function BlockButton({ session, block }: { session: EditorSession; block: Block }) {
   const shape = () =>
     makeShape(session.service("edits").factory, session.service("elementFactory"), block);
-  const drag = (event: Event) => session.service("create").start(event, shape());
+  const drag = (event: Event) =>
+    session.service("create").start(event, shape(), draggingOf(block));
   const click = (event: MouseEvent) => {
+    const [selected, ...more] = session.selected.value;
+    const isAimed = selected && !more.length && mayFollow(session, selected);
+    // What is open, and what has a course that goes on, says where the block goes.
+    if (isAimed && takesPlace(session.service("fragments"), session.service("edits"), selected, block))
+      return;
     // A mouse carries the block to its place; a keyboard or a finger cannot.
     const isMouse = event.detail > 0 && (event as PointerEvent).pointerType !== "touch";
     if (isMouse) drag(event);
-    else place(session, shape());
+    else place(session, block, shape);
   };
   return (
     <button
@@ -77,22 +84,26 @@ function BlockButton({ session, block }: { session: EditorSession; block: Block 
   );
 }
 
+function mayFollow(session: EditorSession, element: Element): boolean {
+  return Boolean(session.service("rules").allowed("shape.append", { element }));
+}
+
 /** Behind what is selected, or else in the middle of what is seen. */
-function place(session: EditorSession, shape: Element): void {
+function place(session: EditorSession, { content }: Block, shape: () => Element): void {
   const [selected, ...more] = session.selected.value;
-  const mayFollow =
-    selected &&
-    !more.length &&
-    session.service("rules").allowed("shape.append", { element: selected });
-  if (selected && mayFollow) {
-    session.service("autoPlace").append(selected, shape);
+  if (selected && !more.length && mayFollow(session, selected)) {
+    session.service("autoPlace").append(selected, shape());
     return;
   }
   const canvas = session.service("canvas");
   const { x, y, width, height } = canvas.viewbox();
   const at = { x: Math.round(x + width / 2), y: Math.round(y + height / 2) };
   const parent = poolAt(session, at) ?? canvas.getRootElement();
-  const made = session.service("modeling").createShape(shape as never, at, parent as never);
+  if (content.kind === "fragment") {
+    session.service("fragments").putAt(content.fragment, at, parent as Element);
+    return;
+  }
+  const made = session.service("modeling").createShape(shape() as never, at, parent as never);
   session.service("selection").select(made as never);
 }
 

@@ -1,13 +1,18 @@
 // The blocks that a mission is drawn with, made from what the fleet can do: each gives a task.
 import type { Behavior, Parameter } from "../../shared/types";
-import { strings } from "../../strings";
+import { fill, strings } from "../../strings";
 import type { BehaviorUse, Role, ServiceUse } from "../moddle/behavior";
 import type { Candidate, Catalogue, Domain } from "../session/catalogue";
+import { shownDuration } from "../session/durations";
 import { defaultOf } from "../session/quantities";
+import type { Fragment } from "./control/fragment";
+import { fragmentOf, KINDS, type FragmentKind, type Options } from "./control/fragments";
+import { intentsOf } from "./control/intents";
 
-export type BlockGroup = Domain | "payload" | "team" | "service" | "operator";
+export type BlockGroup = Domain | "control" | "payload" | "team" | "service" | "operator";
 
 export const GROUPS: readonly BlockGroup[] = [
+  "control",
   "operator",
   "ground",
   "air",
@@ -18,10 +23,15 @@ export const GROUPS: readonly BlockGroup[] = [
   "service",
 ];
 
-export type Content =
+/** What a task does. */
+export type TaskContent =
   | { kind: "behavior"; use: BehaviorUse }
   | { kind: "service"; use: ServiceUse }
   | { kind: "prompt" };
+
+export type Content =
+  | TaskContent
+  | { kind: "fragment"; of: FragmentKind; options: Options; fragment: Fragment };
 
 export interface Block {
   id: string;
@@ -44,6 +54,7 @@ export function titleOf(name: string): string {
 
 export function blocksOf(catalogue: Catalogue): Block[] {
   const blocks = [
+    ...KINDS.map((kind) => controlBlock(catalogue, kind)),
     promptBlock(),
     ...catalogue.behaviors.flatMap((behavior, index) => behaviorBlocks(catalogue, behavior, index)),
     ...catalogue.services.map((service) => serviceBlock(catalogue, service.name)),
@@ -53,17 +64,61 @@ export function blocksOf(catalogue: Catalogue): Block[] {
 }
 
 function compare(a: Block, b: Block): number {
-  return a.group === b.group ? a.title.localeCompare(b.title) : 0;
+  // Those for the course of a mission have an order of their own.
+  return a.group === b.group && a.group !== "control" ? a.title.localeCompare(b.title) : 0;
 }
 
-/** Those that have every word of a search in their title, word or doc. */
-export function matching(blocks: readonly Block[], search: string): Block[] {
+/** Those that have every word of a search in their title, word or doc, after what it may mean. */
+export function matching(
+  catalogue: Catalogue,
+  blocks: readonly Block[],
+  search: string,
+): Block[] {
   const words = search.toLowerCase().split(/\s+/).filter(Boolean);
-  return blocks.filter((block) => {
+  const meant = intentsOf(search).map(({ kind, options }) => controlBlock(catalogue, kind, options));
+  const kinds = new Set(meant.map(({ word }) => word));
+  const others = blocks.filter((block) => {
+    if (block.group === "control" && kinds.has(block.word)) return false;
     const group = strings.editor.blocks.groups[block.group];
     const text = `${block.title} ${block.word} ${block.doc} ${group}`.toLowerCase();
     return words.every((word) => text.includes(word));
   });
+  return [...meant, ...others];
+}
+
+/** A block for the course of a mission; `options`: what a search says about it. */
+export function controlBlock(
+  catalogue: Catalogue,
+  kind: FragmentKind,
+  options: Options = {},
+): Block {
+  const { title, doc } = strings.control.blocks[wordingOf(kind, options)];
+  const { duration = "", count = 0 } = options;
+  return {
+    id: `control-${kind}`,
+    group: "control",
+    title: fill(title, { duration: shownDuration(duration), count }),
+    doc,
+    word: kind,
+    content: {
+      kind: "fragment",
+      of: kind,
+      options,
+      fragment: fragmentOf(kind, options, detectorContent(catalogue)),
+    },
+  };
+}
+
+function wordingOf(kind: FragmentKind, { duration, count }: Options) {
+  if (duration && kind === "wait") return "waitFor";
+  if (duration && kind === "every") return "everyFor";
+  if (duration && kind === "within") return "withinFor";
+  return count && kind === "repeat" ? "repeatFor" : kind;
+}
+
+function detectorContent(catalogue: Catalogue): TaskContent {
+  const { content } = serviceBlock(catalogue, "Detector");
+  return content as TaskContent;
 }
 
 function behaviorBlocks(catalogue: Catalogue, behavior: Behavior, index: number): Block[] {

@@ -2,6 +2,8 @@
 import type { BlockGroup } from "./blocks";
 
 export const ICONS: Record<BlockGroup, string> = {
+  control:
+    "M3 11h4l5-5 5 5h4v2h-4l-5 5-5-5H3zM12 8.800L8.800 12l3.200 3.200 3.200-3.200z",
   ground:
     "M3 16v-4l2-1 3-5h7l4 5 2 1v4h-2a2.5 2.5 0 0 1-5 0H10a2.5 2.5 0 0 1-5 0zM9 8l-2 3h4V8zm4 0v3h4l-2-3z",
   air: "M5 4a3 3 0 0 1 3 3l2 2h4l2-2a3 3 0 1 1 2 2l-2 2v2l2 2a3 3 0 1 1-2 2l-2-2h-4l-2 2a3 3 0 1 1-2-2l2-2v-2L6 9.800A3 3 0 1 1 5 4z",
@@ -19,6 +21,7 @@ export const ICONS: Record<BlockGroup, string> = {
 
 /** Contrast with white is at least 4.5 : 1. */
 export const COLORS: Record<BlockGroup, string> = {
+  control: "#3d4a57",
   ground: "#1f6f4a",
   air: "#0b5cad",
   surface: "#00697a",

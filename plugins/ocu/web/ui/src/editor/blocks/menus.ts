@@ -16,9 +16,12 @@ import type {
   Rules,
   Services,
 } from "../session/services";
-import { blocksOf, type Block } from "./blocks";
+import { blocksOf, controlBlock, type Block } from "./blocks";
+import { isOpen, type Fragments } from "./control/placing";
+import { BLOCK_CLASS, intendedEntry } from "./control/search";
 import { iconSvg } from "./icons";
-import { contentChanges, makeShape, typeOf } from "./making";
+import { draggingOf, makeShape } from "./making";
+import { becomeBlock, takesPlace } from "./putting";
 
 const BEFORE_BPMN = 1500;
 
@@ -39,18 +42,20 @@ export class BlockMenus {
     "rules",
     "mouse",
     "edits",
+    "fragments",
   ];
   private readonly blocks: Block[];
 
   constructor(
     private readonly popupMenu: PopupMenu,
-    catalogue: Catalogue,
+    private readonly catalogue: Catalogue,
     private readonly elementFactory: ElementFactory,
     private readonly create: Create,
     private readonly autoPlace: Services["autoPlace"],
     private readonly rules: Rules,
     private readonly mouse: Mouse,
     private readonly edits: Edits,
+    private readonly fragments: Fragments,
   ) {
     this.blocks = blocksOf(catalogue);
     this.register("bpmn-create", () => this.entries("create", (block) => this.creating(block)));
@@ -61,7 +66,7 @@ export class BlockMenus {
     );
     this.register("bpmn-replace", (target) =>
       canBecomeBlock(target.businessObject)
-        ? this.entries("replace", (block) => this.replacing(target, block))
+        ? this.entries("replace", (block) => this.replacing(target, block), mayTakeItsPlace(target))
         : {},
     );
   }
@@ -76,18 +81,21 @@ export class BlockMenus {
     this.popupMenu.registerProvider(menu, BEFORE_BPMN, provider as never);
   }
 
-  private entries(prefix: string, actions: (block: Block) => Actions): PopupMenuEntries {
+  private entries(
+    prefix: string,
+    actions: (block: Block) => Actions,
+    isMeant: (block: Block) => boolean = () => true,
+  ): PopupMenuEntries {
     const entries: PopupMenuEntries = {};
-    for (const block of this.blocks) {
-      entries[`${prefix}-block-${block.id}`] = {
-        label: block.title,
-        title: block.doc || block.title,
-        search: `${block.word} ${block.doc}`,
-        imageHtml: iconSvg(block.group),
-        className: "m2-block-entry",
-        group: { id: `m2-${block.group}`, name: strings.editor.blocks.groups[block.group] },
-        action: actions(block) as unknown as PopupMenuEntryAction,
-      };
+    for (const block of this.blocks.filter(isMeant)) {
+      const entry = (each: Block) => entryOf(each, actions(each) as unknown as PopupMenuEntryAction);
+      const { content } = block;
+      entries[`${prefix}-block-${block.id}`] =
+        content.kind === "fragment"
+          ? intendedEntry(entry(block), content.of, (options) =>
+              entry(controlBlock(this.catalogue, content.of, options)),
+            )
+          : entry(block);
     }
     return entries;
   }
@@ -100,7 +108,7 @@ export class BlockMenus {
     const start = (event: Event) => {
       this.popupMenu.close();
       const at = event instanceof KeyboardEvent ? this.mouse.getLastMoveEvent() : event;
-      this.create.start(at, this.shape(block));
+      this.create.start(at, this.shape(block), draggingOf(block));
     };
     return { click: start, dragstart: start };
   }
@@ -109,11 +117,13 @@ export class BlockMenus {
     return {
       click: () => {
         this.popupMenu.close();
-        this.autoPlace.append(source, this.shape(block));
+        if (!takesPlace(this.fragments, this.edits, source, block)) {
+          this.autoPlace.append(source, this.shape(block));
+        }
       },
       dragstart: (event) => {
         this.popupMenu.close();
-        this.create.start(event, this.shape(block), { source });
+        this.create.start(event, this.shape(block), { source, ...draggingOf(block) });
       },
     };
   }
@@ -121,19 +131,27 @@ export class BlockMenus {
   private replacing(element: Element, block: Block): Actions {
     const replace = () => {
       this.popupMenu.close();
-      this.edits.replace(element, typeOf(block), (task) =>
-        becoming(this.edits, block, element.businessObject, task),
-      );
+      becomeBlock(this.fragments, this.edits, element, block);
     };
     return { click: replace, dragstart: replace };
   }
 }
 
-/** The changes that turn a task into a block; a name that people gave it stays. */
-function becoming(edits: Edits, block: Block, before: ModdleElement, task: ModdleElement) {
-  const changes = contentChanges(edits.factory, block, task);
-  if (before.get("name")) return changes;
-  return [...changes, { target: task, properties: { name: block.title } }];
+function entryOf(block: Block, action: PopupMenuEntryAction) {
+  return {
+    label: block.title,
+    title: block.doc || block.title,
+    search: `${block.word} ${block.doc}`,
+    imageHtml: iconSvg(block.group),
+    className: BLOCK_CLASS,
+    group: { id: `m2-${block.group}`, name: strings.editor.blocks.groups[block.group] },
+    action,
+  };
+}
+
+/** Fragments take the place of what is still open, and of nothing else. */
+function mayTakeItsPlace(target: Element) {
+  return ({ content }: Block) => content.kind !== "fragment" || isOpen(target);
 }
 
 function canBecomeBlock(element: ModdleElement): boolean {

@@ -15,6 +15,9 @@ import { Marks } from "./marks";
 import { makeModeler, type MissionModeler } from "./modeler";
 import type { Element, Services } from "./services";
 
+/** Stands for the last change where there is none. */
+const BEGINNING = {};
+
 export class EditorSession implements EditorContext {
   readonly modeler: MissionModeler;
   readonly checks: Checks;
@@ -28,8 +31,8 @@ export class EditorSession implements EditorContext {
   readonly plan: MapPlan;
   private readonly locator: Locator;
   private readonly marks: Marks;
-  /** Where the command stack stood when the mission was saved; null: what is saved is not on it. */
-  private savedAt: number | null = -1;
+  /** The last change when the mission was saved; null: what is saved is not on the command stack. */
+  private savedAt: object | null = BEGINNING;
 
   constructor(
     readonly mission: string,
@@ -68,7 +71,7 @@ export class EditorSession implements EditorContext {
   async open(xml: string, isSaved: boolean): Promise<void> {
     const { warnings } = await this.modeler.importXML(xml);
     this.warnings.value = warnings.map(String);
-    this.savedAt = isSaved ? -1 : null;
+    this.savedAt = isSaved ? BEGINNING : null;
     this.stackChanged();
     this.fit();
   }
@@ -97,7 +100,7 @@ export class EditorSession implements EditorContext {
 
   /** What is drawn now is what the server has. */
   saved(): void {
-    this.savedAt = this.stackIndex();
+    this.savedAt = this.lastChange();
     this.isDirty.value = false;
   }
 
@@ -114,7 +117,7 @@ export class EditorSession implements EditorContext {
     const stack = this.service("commandStack");
     this.canUndo.value = stack.canUndo();
     this.canRedo.value = stack.canRedo();
-    this.isDirty.value = this.savedAt === null || this.stackIndex() !== this.savedAt;
+    this.isDirty.value = this.lastChange() !== this.savedAt;
     this.catalogue.own.value = geometriesOf(this.modeler.getDefinitions() as ModdleElement);
     this.changes.value += 1;
     this.diagrams.refresh();
@@ -123,11 +126,16 @@ export class EditorSession implements EditorContext {
 
   /** Another diagram is about to be drawn in place of these, with a command stack of its own. */
   private detachFromStack(): void {
-    this.savedAt = this.isDirty.value ? null : -1;
+    this.savedAt = this.isDirty.value ? null : BEGINNING;
   }
 
-  private stackIndex(): number {
-    return (this.service("commandStack") as unknown as { _stackIdx: number })._stackIdx;
+  /** Not its number: after an undo, another change may have that. */
+  private lastChange(): object {
+    const { _stack, _stackIdx } = this.service("commandStack") as unknown as {
+      _stack: object[];
+      _stackIdx: number;
+    };
+    return _stack[_stackIdx] ?? BEGINNING;
   }
 
   private showFindings(): void {

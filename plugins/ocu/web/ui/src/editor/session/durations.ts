@@ -59,6 +59,15 @@ export function isoOf(text: string): string | undefined {
   return `P${join(false)}${time && `T${time}`}`;
 }
 
+const RUN = new RegExp(`(?:${PARTS.source})(?:(?:\\s*,\\s*|\\s+and\\s+|\\s*)(?:${PARTS.source}))*`);
+
+/** The first duration in a text, and where it stands in it. */
+export function durationIn(text: string): { text: string; iso: string } | undefined {
+  const [said] = RUN.exec(text) ?? [];
+  const iso = said === undefined ? undefined : isoOf(said);
+  return said !== undefined && iso ? { text: said, iso } : undefined;
+}
+
 /** PT1H30M as people write it: "1 h 30 min"; what is none is shown as it stands. */
 export function shownDuration(iso: string): string {
   const [, years, months, weeks, days, hours, minutes, seconds] = ISO.exec(iso.trim()) ?? [];

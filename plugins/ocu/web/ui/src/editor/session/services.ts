@@ -13,6 +13,7 @@ import type EditorActions from "diagram-js/lib/features/editor-actions/EditorAct
 import type Overlays from "diagram-js/lib/features/overlays/Overlays";
 import type PopupMenu from "diagram-js/lib/features/popup-menu/PopupMenu";
 import type Selection from "diagram-js/lib/features/selection/Selection";
+import type { Fragments } from "../blocks/control/placing";
 import type { Catalogue } from "./catalogue";
 import type { Edits } from "./edits";
 import type { FindingMarks } from "./findingMarks";
@@ -23,7 +24,27 @@ export type { AutoPlace, BpmnFactory, BpmnReplace, Canvas, CommandStack, Element
 export type { ElementRegistry, EventBus, Modeling, Overlays, PopupMenu, Selection };
 
 export interface Create {
-  start(event: Event, shape: Element, context?: { source?: Element }): void;
+  start(
+    event: Event,
+    shape: Element,
+    context?: { source?: Element; hints?: { autoSelect: boolean } },
+  ): void;
+}
+
+export interface SpaceTool {
+  calculateAdjustments(
+    elements: readonly object[],
+    axis: "x" | "y",
+    delta: number,
+    start: number,
+  ): { movingShapes: object[]; resizingShapes: object[] };
+  makeSpace(
+    movingShapes: object[],
+    resizingShapes: object[],
+    delta: { x: number; y: number },
+    direction: "e" | "s",
+    start: number,
+  ): void;
 }
 
 export interface Rules {
@@ -55,6 +76,7 @@ export interface Services {
   elementRegistry: ElementRegistry;
   eventBus: EventBus;
   findingMarks: FindingMarks;
+  fragments: Fragments;
   minimap: Minimap;
   modeling: Modeling;
   overlays: Overlays;
