@@ -11,6 +11,7 @@ from m2pem.fleet.graph import Catalogue, ResourceGraph
 from m2pem.fleet.need_check import KnownFits, check_needs, places_of
 from m2pem.fleet.operator_roles import check_operator_roles
 from m2pem.fleet.parameters import ParameterProblem, examine
+from m2pem.fleet.same_vehicle import check_same_vehicle
 from m2pem.fleet.shortage import Demand, check_shortages
 from m2pem.fleet.space_check import check_space
 from m2pem.fleet.task_findings import TaskFindings
@@ -185,6 +186,7 @@ def check_mission(
     check = _Check(mission, fleet, graph, catalogue, handed_over)
     findings = [finding for task in mission.activities() for finding in check.task(task)]
     shortages = check_shortages(mission, check.demands)
+    shortages += check_same_vehicle(mission, check.demands)
     roles = check_operator_roles(mission, fleet)
     drawn = _out_of_reach(mission, fleet)
     return [*findings, *shortages, *_returned(mission, fleet), *roles, *drawn]
