@@ -4,7 +4,7 @@
 of conditions (a link that is lost, a question that is open), and of what was said.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from m2pem.units import US_PER_S
@@ -56,7 +56,8 @@ class OperatorAlert:
     prompt or an incident. `last_us`, `count`: when it was said last, and how often. `details`: what
     else was said that is part of it, the newest last. `deadline_us`: when a question will be
     withdrawn; None: never, or not while its run is paused. `cleared_us`: when it was over; None: it
-    is open. `acknowledged_by`: who has seen it; `owner`: who takes care; "": nobody.
+    is open. `acknowledged_by`: who has seen it; `owner`: who takes care; "": nobody. `age_s`,
+    `left_s`: seconds since it was raised and until its deadline, when it was asked for.
     """
 
     alert: str
@@ -76,6 +77,8 @@ class OperatorAlert:
     acknowledged_us: int | None = None
     owner: str = ""
     owned_us: int | None = None
+    age_s: float = 0.0
+    left_s: float | None = None
 
     @property
     def open(self) -> bool:
@@ -87,16 +90,20 @@ class OperatorAlert:
         """Whether it is open and nobody has acknowledged it."""
         return self.open and not self.acknowledged_by
 
-    def age_s(self, now_us: int) -> float:
-        """Seconds since it was raised."""
-        return max(0, now_us - self.raised_us) / US_PER_S
+    def at(self, now_us: int) -> "OperatorAlert":
+        """The same, with its age and what is left until its deadline."""
+        left_us = None if self.deadline_us is None else max(0, self.deadline_us - now_us)
+        age_us = max(0, (self.cleared_us or now_us) - self.raised_us)
+        left_s = None if left_us is None else left_us / US_PER_S
+        return replace(self, age_s=age_us / US_PER_S, left_s=left_s)
 
     def __str__(self) -> str:
         many = f" ({self.count} times)" if self.count > 1 else ""
         seen = f"; acknowledged by {self.acknowledged_by}" if self.acknowledged_by else ""
         owned = f"; {self.owner} takes care" if self.owner else ""
         where = f"{self.run}: " if self.run else ""
-        return f"{self.alert}: {self.severity}: {where}{self.text}{many}{seen}{owned}"
+        over = "; over" if not self.open else ""
+        return f"{self.alert}: {self.severity}: {where}{self.text}{many}{over}{seen}{owned}"
 
 
 @dataclass(frozen=True, slots=True)

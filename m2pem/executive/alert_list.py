@@ -125,7 +125,8 @@ class AlertList:
         if over:
             past = [line.alert for line in self._lines.values() if not line.alert.open]
             found += sorted(past, key=lambda each: -(each.cleared_us or 0))
-        return found
+        now_us = self._now_us()
+        return [each.at(now_us) for each in found]
 
     # --- what happens ---------------------------------------------------------------------------
 

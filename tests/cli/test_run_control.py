@@ -29,7 +29,7 @@ OTHERWISE = {
     "approval": "m2pem approve --show",
     "approve": "m2pem approve, which tests/cli/test_approve.py tries",
     "withdraw_approval": "m2pem approve --withdraw",
-    "alerts": "m2pem alerts, which tests/cli/test_alerts.py tries",
+    "alerts": "m2pem alerts, which tests/e2e/test_alerts.py tries",
     "acknowledge_alert": "m2pem acknowledge",
     "own_alert": "m2pem own",
     "delete_geometry": "the page deletes drawings",

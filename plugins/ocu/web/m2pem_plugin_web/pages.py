@@ -18,6 +18,7 @@ STATIC = Path(__file__).parent / "static"
 ADDRESSES = (
     "/",
     "/sign-in",
+    "/alerts",
     "/fleet",
     "/missions/{name}",
     "/runs/{run}",

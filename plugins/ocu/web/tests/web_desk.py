@@ -31,6 +31,8 @@ MISSION = "vignette1"
 OPERATOR = "anna"
 PEOPLE = {OPERATOR: Role.COMMANDER, "otto": Role.OPERATOR, "vera": Role.VIEWER}
 POLL_S = 0.05
+CONDITIONS = {"QUESTION", "INCIDENT", "LINK_LOST", "BATTERY_LOW", "NOT_READY", "SPACE_VIOLATED"}
+"""Alerts that end by themselves."""
 OVER = {"completed", "terminated", "failed", "stopped"}
 
 
@@ -111,6 +113,9 @@ class Desk:
             await self.ask("POST", "/api/stop", {"reason": "the test is over"})
         # A run that has ended still has its vehicles until they have stopped.
         await self.until("/api/resources", lambda said: not any(said["holders"].values()))
+        for alert in await self.ask("GET", "/api/alerts"):
+            if alert["calls"] and alert["code"] not in CONDITIONS:
+                await self.ask("POST", f"/api/alerts/{alert['alert']}/acknowledge")
 
     async def until(self, path: str, wanted: Callable[[Any], bool]) -> None:
         """Ask the server again and again, until its answer is what is wanted."""

@@ -16,7 +16,9 @@ class AlertModel(BaseModel):
     """An alert (docs/operating.md#alerts). Times are microseconds since the Unix epoch, by the
     executive's clock; null: there is none.
 
-    `subject`: the id of a prompt or incident. `calls`: it is open, and nobody has acknowledged it.
+    `subject`: the id of a prompt or incident. `age_s`, `left_s`: seconds since it was raised (of
+    one that is over: until it was), and until the deadline, by that clock. `calls`: it is open, and
+    nobody has acknowledged it.
     """
 
     alert: str
@@ -36,6 +38,8 @@ class AlertModel(BaseModel):
     acknowledged_us: int | None
     owner: str
     owned_us: int | None
+    age_s: float
+    left_s: float | None
     calls: bool
 
 

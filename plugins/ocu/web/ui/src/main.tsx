@@ -2,6 +2,7 @@
 import { render } from "preact";
 import { lazy, Suspense } from "preact/compat";
 import { useEffect } from "preact/hooks";
+import { followAlerts } from "./alerts/alerts";
 import { connect } from "./shared/executive";
 import { Header } from "./shared/Header";
 import { route } from "./shared/router";
@@ -12,6 +13,7 @@ import { strings } from "./strings";
 import "./theme.css";
 
 const Home = lazy(() => import("./home/Home"));
+const Alerts = lazy(() => import("./alerts/AlertPage"));
 const Fleet = lazy(() => import("./fleet/Fleet"));
 const Editor = lazy(() => import("./editor/Editor"));
 const Operate = lazy(() => import("./operate/Operate"));
@@ -22,6 +24,8 @@ function Page() {
   switch (at.page) {
     case "home":
       return <Home />;
+    case "alerts":
+      return <Alerts />;
     case "signIn":
       return <SignIn />;
     case "fleet":
@@ -61,4 +65,5 @@ function App() {
 }
 
 followStandbys();
+followAlerts();
 render(<App />, document.getElementById("page")!);

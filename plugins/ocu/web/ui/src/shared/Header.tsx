@@ -1,6 +1,8 @@
 // On every page: which fleet, who looks, whether what moves is real, and how to stop it.
 import { effect } from "@preact/signals";
 import { fill, strings } from "../strings";
+import { AlertBell } from "../alerts/AlertBell";
+import { calling } from "../alerts/alerts";
 import { connect, connection, prompts } from "./executive";
 import { go, route } from "./router";
 import { may, session, signOut } from "./session";
@@ -14,11 +16,17 @@ import "./header.css";
 
 const text = strings.shell;
 
-// A question is seen from another tab of the browser as well.
+// Questions and other alerts are seen from another tab of the browser as well.
 effect(() => {
   const count = prompts.value.length;
+  const more = calling.value.filter(({ code }) => code !== "QUESTION").length;
   const fleet = session.value?.fleet;
-  document.title = [count > 0 ? `(${count}?)` : "", text.title, fleet ? `– ${fleet}` : ""]
+  document.title = [
+    count > 0 ? `(${count}?)` : "",
+    more > 0 ? `(${more}!)` : "",
+    text.title,
+    fleet ? `– ${fleet}` : "",
+  ]
     .filter(Boolean)
     .join(" ");
 });
@@ -56,6 +64,7 @@ export function Header() {
           )}
           <span class="space" />
           {who && <Questions />}
+          {who && <AlertBell />}
           {who && (
             <span class="who" title={text.signedInAs}>
               {who.user} <small>{text.roles[who.role]}</small>

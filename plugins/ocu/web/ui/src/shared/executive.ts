@@ -69,6 +69,12 @@ const client = new LiveClient(browser, {
   },
 });
 
+/** Rises when the alerts are to be read again. */
+export const alertChanges = signal(0);
+
+/** Seconds of the executive's clock in a real second. */
+export const speed = signal(1);
+
 /** Rises when the schedule is to be read again. */
 export const scheduleChanges = signal(0);
 
@@ -95,8 +101,10 @@ function signedOut(): void {
 function take(message: ServerMessage): void {
   switch (message.type) {
     case "snapshot":
+      alertChanges.value += 1;
       scheduleChanges.value += 1;
       spaceChanges.value += 1;
+      speed.value = message.speed;
       runs.value = message.runs;
       prompts.value = message.prompts;
       holders.value = message.holders;
@@ -135,6 +143,9 @@ function take(message: ServerMessage): void {
       break;
     case "notice":
       toast(message.text);
+      break;
+    case "alerts":
+      alertChanges.value += 1;
       break;
     case "schedule":
       scheduleChanges.value += 1;

@@ -4,6 +4,7 @@ import { signal } from "@preact/signals";
 export type Route =
   | { page: "home" }
   | { page: "signIn" }
+  | { page: "alerts" }
   | { page: "fleet" }
   | { page: "editor"; mission: string }
   | { page: "run"; run: string }
@@ -18,6 +19,7 @@ export function routeOf(path: string): Route {
   if (more.length > 0) return { page: "nothing" };
   if (second === undefined) {
     if (first === "") return { page: "home" };
+    if (first === "alerts") return { page: "alerts" };
     if (first === "sign-in") return { page: "signIn" };
     return first === "fleet" ? { page: "fleet" } : { page: "nothing" };
   }

@@ -350,6 +350,7 @@ export type ServerMessage =
   | { type: "run"; seq: number; run: RunSummary }
   | { type: "fault"; seq: number; text: string }
   | { type: "notice"; seq: number; text: string }
+  | { type: "alerts"; seq: number }
   | { type: "schedule"; seq: number }
   | { type: "shared_space"; seq: number }
   | { type: "alive"; seq: number }

@@ -1,6 +1,7 @@
 // Every text that a person reads, one section a page.
 import { requirements, verify } from "./checks";
 import { control } from "./control";
+import { alerts } from "./alerts";
 import { editor } from "./editor";
 import { fleet } from "./fleet";
 import { home } from "./home";
@@ -14,6 +15,7 @@ export const strings = {
   shell,
   signIn,
   home,
+  alerts,
   editor,
   plan,
   control,

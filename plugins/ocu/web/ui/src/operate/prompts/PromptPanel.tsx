@@ -1,6 +1,7 @@
 // Questions to the operators: above all else on the page until they are answered.
 import { useComputed, useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
+import { Countdown } from "../../alerts/Countdown";
 import { command } from "../../shared/command";
 import { listen } from "../../shared/executive";
 import { go } from "../../shared/router";
@@ -104,6 +105,7 @@ export function PromptPanel() {
             ? fill(text.of, { element: mission.label(prompt.process, prompt.element) })
             : fill(text.run, { run: prompt.run })}
         </button>
+        <Countdown run={prompt.run} prompt={prompt.prompt} />
         {prompt.role && <span>{fill(text.role, { role: prompt.role })}</span>}
       </div>
       <p id="prompt-text">{prompt.text || mission.label(prompt.process, prompt.element)}</p>
