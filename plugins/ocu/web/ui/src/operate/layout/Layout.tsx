@@ -1,4 +1,5 @@
 // Where the parts of the page are: beside each other where there is room, behind tabs on a tablet.
+import { lazy, Suspense } from "preact/compat";
 import { Split } from "../../shared/Split";
 import { Tabs } from "../../shared/Tabs";
 import { useMedia } from "../../shared/useMedia";
@@ -9,7 +10,6 @@ import { LogPane } from "../log/LogPane";
 import { DrawForm } from "../map/DrawForm";
 import { MapPane } from "../map/MapPane";
 import { OutlinePane } from "../outline/OutlinePane";
-import { PlotsPane } from "../plots/PlotsPane";
 import { plotsShown } from "../plots/shown";
 import { useMedia } from "./media";
 import { Pane } from "./Pane";
@@ -18,6 +18,9 @@ import { VehiclesPane } from "../vehicles/VehiclesPane";
 
 const text = strings.operate.panes;
 const kinds = strings.operate.map.kinds;
+
+/** With what draws them: only those who look at plots load that. */
+const Plots = lazy(() => import("../plots/PlotsPane"));
 
 const WIDE = "(width >= 1180px)";
 
@@ -67,6 +70,14 @@ function TimesPane({ onSeek }: Parts) {
       <TimelinePane onSeek={onSeek} plots={plotsShown} />
       <PlotsPane onSeek={onSeek} />
     </Split>
+  );
+}
+
+function PlotsPane({ onSeek }: Parts) {
+  return (
+    <Suspense fallback={<p class="nothing">{strings.operate.run.loading}</p>}>
+      <Plots onSeek={onSeek} />
+    </Suspense>
   );
 }
 

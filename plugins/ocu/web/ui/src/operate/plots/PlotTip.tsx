@@ -7,7 +7,7 @@ import type { Window } from "../timeline/scale";
 import type { TelemetryHistory } from "./history";
 import { nameOf } from "./names";
 import { Swatch } from "./Swatch";
-import { readValue } from "./ValuesTable";
+import { readValue } from "./values";
 
 const MOST_LINES = 8;
 const BESIDE_PX = 12;

@@ -32,7 +32,7 @@ const CHART_PX = 118;
 const TITLE_PX = 19;
 const MARKS_PX = 22;
 
-export function PlotsPane({ onSeek }: { onSeek?: ((t: number) => void) | undefined }) {
+export default function PlotsPane({ onSeek }: { onSeek?: ((t: number) => void) | undefined }) {
   const { scene, fleet, pointed } = useOperating();
   const grown = usePaced(scene.history, EVERY_MS.live);
   usePaced(scene.time, EVERY_MS[scene.mode]);

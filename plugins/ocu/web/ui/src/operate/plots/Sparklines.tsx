@@ -6,7 +6,8 @@ import { useOperating } from "../context";
 import { usePaced } from "../layout/pace";
 import { LINK_LEVELS } from "./fields";
 import { drawn, grid, type Drawn } from "./series";
-import { readValue } from "./ValuesTable";
+import { readValue } from "./values";
+import "./sparks.css";
 
 const text = strings.plots;
 

@@ -1,10 +1,10 @@
 // The values of what is plotted at one time: for everybody who reads, also with a screen reader.
 import { clockTenths } from "../../shared/format";
 import { fill, strings } from "../../strings";
-import { LINK_LEVELS, unitOf } from "./fields";
 import type { TelemetryHistory } from "./history";
 import { nameOf } from "./names";
 import { Swatch } from "./Swatch";
+import { readValue } from "./values";
 
 const text = strings.plots;
 
@@ -44,21 +44,4 @@ export function ValuesTable({ history, resources, fields, t, isNow }: ValuesProp
       </tbody>
     </table>
   );
-}
-
-export function readValue(
-  history: TelemetryHistory,
-  resource: string,
-  field: string,
-  t: number,
-): string {
-  const value = history.series(resource, field)?.at(t) ?? null;
-  if (value === null) return "–";
-  if (field === "link") return text.links[LINK_LEVELS[Math.round(value)]!];
-  return `${written(value)} ${unitOf(field)}`.trim();
-}
-
-function written(value: number): string {
-  const size = Math.abs(value);
-  return value.toFixed(size >= 100 ? 0 : size >= 1 ? 1 : 2);
 }
