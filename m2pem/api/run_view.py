@@ -255,6 +255,13 @@ class RunView:
         file = self.mission.file if self.mission is not None else self.summary.mission
         return file.replace("\\", "/").rpartition("/")[2].removesuffix(".bpmn")
 
+    @property
+    def is_command(self) -> bool:
+        """Whether it is one behavior that was commanded from outside of a mission."""
+        from m2pem.bpmn.one_task import is_one_task  # noqa: PLC0415  # lxml loads slowly
+
+        return self.mission is not None and is_one_task(self.mission)
+
     def label(self, element: str) -> str:
         """Return the name of an element in the diagram; its id, if it has none."""
         found = self.mission.elements.get(element) if self.mission is not None else None

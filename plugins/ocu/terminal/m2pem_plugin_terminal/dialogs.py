@@ -1,7 +1,7 @@
 """Dialogs: a list to choose from, a text to read. STOP stays visible and works over them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, TypeVar
 
 from rich.text import Text
@@ -31,25 +31,35 @@ class Choice:
 
 
 class Choose(ModalScreen[str | None]):
-    """A list: Enter or a digit chooses a value, Escape returns None."""
+    """A list: Enter or a digit chooses a value, Escape returns None.
+
+    Other characters are searched for: only lines with them are shown.
+    """
 
     AUTO_FOCUS = "OptionList"
-    BINDINGS: ClassVar[list[BindingType]] = [("escape", "dismiss(None)", "Close")]
+    BINDINGS: ClassVar[list[BindingType]] = [
+        ("escape", "dismiss(None)", "Close"),
+        ("backspace", "shorten", "Search for less"),
+    ]
 
     def __init__(self, title: str, choices: Sequence[Choice], text: str = "") -> None:
         super().__init__()
         self._title = title
         self.choices = tuple(choices)
+        self.shown = self.choices
+        self._search = ""
         self._text = text
+        self._box = Vertical(classes="dialog")
+        self._list = OptionList(*self._options())
 
     def compose(self) -> ComposeResult:
         """Compose the list; digits precede the first nine lines."""
-        with Vertical(classes="dialog") as box:
+        with self._box as box:
             box.border_title = self._title
-            box.border_subtitle = "Enter or a digit: choose   Esc: close"
+            box.border_subtitle = "Enter or a digit: choose   letters: search   Esc: close"
             if self._text:
                 yield Static(Text(self._text), classes="dialog-text")
-            yield OptionList(*[self._option(place) for place in range(len(self.choices))])
+            yield self._list
             yield from self.compose_below()
         yield StopBar()
 
@@ -57,22 +67,58 @@ class Choose(ModalScreen[str | None]):
         """Compose what is below the list: nothing here."""
         yield from ()
 
+    def remark(self, value: str, remark: str) -> None:
+        """Change the remark of a line."""
+        self.choices = tuple(
+            replace(each, remark=remark) if each.value == value else each for each in self.choices
+        )
+        marked = self._list.highlighted
+        self._show()
+        if marked is not None and marked < len(self.shown):
+            self._list.highlighted = marked
+
+    def action_shorten(self) -> None:
+        """Remove the last character that is searched for."""
+        self._search_for(self._search[:-1])
+
+    def _search_for(self, text: str) -> None:
+        self._search = text
+        self._show()
+        self._list.highlighted = 0 if self.shown else None
+
+    def _show(self) -> None:
+        words = self._search.lower().split()
+        self.shown = tuple(
+            each
+            for each in self.choices
+            if all(word in f"{each.label} {each.remark}".lower() for word in words)
+        )
+        self._box.border_title = f"{self._title}: {self._search}" if self._search else self._title
+        self._list.set_options(self._options())
+
+    def _options(self) -> list[Option]:
+        return [self._option(place) for place in range(len(self.shown))]
+
     def _option(self, place: int) -> Option:
-        choice = self.choices[place]
+        choice = self.shown[place]
         digit = f"{place + 1} " if place < 9 else "  "
         remark = f"  {choice.remark}" if choice.remark else ""
         label = shortened(choice.label, WIDTH - 6 - len(remark))
         return Option(Text.assemble((digit, "bold #e8c468"), label, (remark, "#9aa4af")))
 
     def on_key(self, event: events.Key) -> None:
-        """Choose the line of a digit."""
-        if event.key.isdigit() and 1 <= int(event.key) <= min(9, len(self.choices)):
+        """Choose the line of a digit; search for other characters."""
+        if event.key.isdigit() and 1 <= int(event.key) <= min(9, len(self.shown)):
             event.stop()
-            self.dismiss(self.choices[int(event.key) - 1].value)
+            self.dismiss(self.shown[int(event.key) - 1].value)
+        elif event.is_printable and event.character and not event.character.isdigit():
+            event.stop()
+            event.prevent_default()
+            self._search_for(self._search + event.character)
 
     def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
         """Choose the marked line at Enter."""
-        self.dismiss(self.choices[event.option_index].value)
+        self.dismiss(self.shown[event.option_index].value)
 
 
 class _TextDialog(ModalScreen[T]):
@@ -158,14 +204,21 @@ KEYS = (
     ("^C ^C", "as ^X; when nothing runs, quit"),
     ("s", "send a signal"),
     ("m", "start a mission, chosen from the files there are"),
+    ("d", "command a vehicle: go to, hold, return, land, ..."),
     ("t", "take a vehicle to steer by hand, or give it back"),
     ("i", "decide about an error that stops a task (!)"),
     ("r", "look at another run"),
+    ("g", "the map; g or Esc leaves it"),
+    ("arrows", "move the map; else the mission"),
+    ("+ - 0", "map: nearer, farther, everything"),
+    (". ,", "map: follow the next vehicle, the one before"),
     ("c", "the schedule: start, hold, release, cancel"),
     ("f", "who is in shared space, and which tasks wait"),
     ("a", "alerts, which stay until they are seen here"),
     ("/", "log: only lines with a text; Esc: all"),
-    ("Up, PgUp", "move through the mission, through the log"),
+    ("PgUp PgDn", "move through the log"),
+    ("Shift-Up", "move through a long question"),
+    ("?", "these keys"),
     ("q", "quit"),
 )
 

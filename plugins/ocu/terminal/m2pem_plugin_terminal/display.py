@@ -9,6 +9,7 @@ from contextlib import suppress
 from textual import work
 from textual.app import App, ComposeResult
 from textual.containers import Horizontal, VerticalScroll
+from textual.filter import LineFilter
 from textual.theme import Theme
 from textual.widgets import Static
 
@@ -31,9 +32,11 @@ from m2pem.api.run_view import Behavior, FinishedToken
 from m2pem.api.runs import LOGGED, SCHEDULE
 from m2pem.errors import M2pemError
 from m2pem_plugin_terminal.alerts import Alerts
+from m2pem_plugin_terminal.ascii_only import AsciiFilter, ascii_only
 from m2pem_plugin_terminal.formatting import clock_time
 from m2pem_plugin_terminal.handover import taken
 from m2pem_plugin_terminal.log_pane import Line, LogPane, line_of
+from m2pem_plugin_terminal.map_pane import MapPane
 from m2pem_plugin_terminal.mission_pane import FADES_FOR_S, Done, mission_tree, shown_when_done
 from m2pem_plugin_terminal.prompt_pane import PromptPane
 from m2pem_plugin_terminal.status_lines import DoublePress, NoticeLine, StopBar, header
@@ -41,8 +44,17 @@ from m2pem_plugin_terminal.vehicles_pane import Vehicles
 
 REFRESH_S = 0.25
 
+VEHICLES_AT_ONCE = 25
+"""With that many vehicles, the table is updated at every second tick; with twice as many, at every
+third."""
+
 STANDBYS_EVERY_S = 2.0
 """Between two questions to the executive, who stands by."""
+
+WIDE_CELLS = 120
+"""A wider terminal shows the map beside the mission; on others it takes the place of the panes."""
+NARROW_CELLS = 66
+"""A narrower terminal shows the vehicles below the mission."""
 
 LOG_LINES = 2000
 
@@ -114,6 +126,7 @@ class Display(App[None], Listener, inherit_bindings=False):
         self.run_shown: RunId = ""
         self.stop_press = DoublePress(now)
         self._vehicles = Vehicles(control.fleet(), control.speed())
+        self._ticks = 0
         self._time_s = 0.0
         self._asking_time = False
         self._holders: Mapping[ResourceId, str] = {}
@@ -126,6 +139,9 @@ class Display(App[None], Listener, inherit_bindings=False):
         self._mission = VerticalScroll(self._tree, id="mission", can_focus=False)
         self._fleet = Static(id="fleet")
         self._around = VerticalScroll(self._fleet, id="vehicles", can_focus=False)
+        self._ascii = [AsciiFilter()] if ascii_only() else []
+        self.map_pane = MapPane(control.fleet(), ascii=bool(self._ascii))
+        self.map_active = False
         self.alerts = Alerts(lambda: time.strftime("%H:%M:%S"))
         self._notice = NoticeLine(now, self.alerts.hint)
         self.prompt_pane = PromptPane(now)
@@ -136,7 +152,7 @@ class Display(App[None], Listener, inherit_bindings=False):
     def compose(self) -> ComposeResult:
         """Compose the panes from top to bottom."""
         yield self._header
-        yield Horizontal(self._mission, self._around, id="middle")
+        yield Horizontal(self._mission, self.map_pane, self._around, id="middle")
         yield self.prompt_pane
         yield self.log_pane
         yield self._notice
@@ -148,10 +164,37 @@ class Display(App[None], Listener, inherit_bindings=False):
         self.theme = THEME.name
         self._mission.border_title = "Mission"
         self._around.border_title = "Vehicles"
+        self._arrange()
+        with suppress(M2pemError):  # an executive in another process does not list them
+            for name, each in self.control.geometries().items():
+                self.map_pane.scene.hand_over(name, each.geometry)
         self.run_worker(self._follow())
         self.run_worker(self._follow_telemetry())
         self.run_worker(self._follow_standbys())
         self.set_interval(REFRESH_S, self.show)
+
+    def get_line_filters(self) -> Sequence[LineFilter]:
+        """Write in ASCII where the terminal shows nothing else."""
+        return [*super().get_line_filters(), *self._ascii]
+
+    def on_resize(self) -> None:
+        """Arrange the panes for the new width."""
+        self._arrange()
+
+    def activate_map(self, active: bool) -> None:
+        """Let the arrow keys move the map; on a terminal that is not wide, show it."""
+        self.map_active = active
+        self.map_pane.set_active(active)
+        self._arrange()
+        self.call_after_refresh(self.show)
+
+    def _arrange(self) -> None:
+        wide = self.size.width >= WIDE_CELLS
+        alone = self.map_active and not wide
+        self.map_pane.display = wide or alone
+        for pane in (self._mission, self._around, self.log_pane):
+            pane.display = not alone
+        self.screen_stack[0].set_class(self.size.width < NARROW_CELLS, "narrow")
 
     async def _follow(self) -> None:
         try:
@@ -165,6 +208,7 @@ class Display(App[None], Listener, inherit_bindings=False):
         try:
             async for state in self.control.telemetry():
                 self._vehicles.update(state, self.now())
+                self.map_pane.update_state(state)
         except M2pemError as error:
             self.say(f"The telemetry has failed: {error}", alarm=True)
 
@@ -202,16 +246,24 @@ class Display(App[None], Listener, inherit_bindings=False):
         if view is not None:
             width = self._mission.scrollable_content_region.width
             self._tree.update(mission_tree(view, self.logs[view.run].done, now, time_s, width))
-        width = self._around.scrollable_content_region.width
-        self._fleet.update(
-            self._vehicles.table(now, width, self._behavior_name, taken(self._holders))
-        )
+        self._show_vehicles(now)
+        if self.map_pane.display:
+            self.map_pane.draw(self._vehicles.silent(now))
         self.prompt_pane.show(self.follower.prompts, self._label, self.run_shown)
         self._notice.show()
         paused = view is not None and view.status is RunStatus.PAUSED
         for each in self.screen_stack:
             for bar in each.query(StopBar):
                 bar.show(self.stop_press, paused)
+
+    def _show_vehicles(self, now: float) -> None:
+        """Update the table; a long one less often, as all of it is laid out anew."""
+        self._ticks += 1
+        every = 1 + len(self.control.fleet().vehicles) // VEHICLES_AT_ONCE
+        if self._around.display and self._ticks % every == 0:
+            width = self._around.scrollable_content_region.width
+            holders = taken(self._holders)
+            self._fleet.update(self._vehicles.table(now, width, self._behavior_name, holders))
 
     async def _ask_time(self, view: RunView) -> None:
         try:
@@ -269,7 +321,8 @@ class Display(App[None], Listener, inherit_bindings=False):
             self.say(f"{view.run} has begun; press r to show it")
 
     def recorded(self, view: RunView, stamped: StampedRecord, *, is_new: bool) -> None:
-        """Log a record."""
+        """Log a record, and keep what it says of places."""
+        self.map_pane.scene.record(view.run, stamped.record)
         at = self.now() if is_new else self.now() - FADES_FOR_S
         line = self._run_log(view.run).add(view, stamped, at)
         if line is not None and is_new and view.run == self.run_shown:

@@ -54,10 +54,10 @@ class ChooseMission(Choose):
 
     def on_option_list_option_highlighted(self, event: OptionList.OptionHighlighted) -> None:
         """Preview the marked mission."""
-        self._show(self.choices[event.option_index])
+        self._preview_of(self.shown[event.option_index])
 
     @work(exclusive=True, exit_on_error=False)
-    async def _show(self, choice: Choice) -> None:
+    async def _preview_of(self, choice: Choice) -> None:
         file = choice.value
         if file not in self._previews:
             self._text_below.update(Text(f"{choice.label} {WAIT}", "#9aa4af"))

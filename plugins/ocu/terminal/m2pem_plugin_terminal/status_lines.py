@@ -33,7 +33,7 @@ HINTS = (
     ("t", "Take"),
     ("m", "Start"),
     ("r", "Runs"),
-    ("/", "Filter"),
+    ("g", "Map"),
     ("?", "Help"),
     ("q", "Quit"),
 )

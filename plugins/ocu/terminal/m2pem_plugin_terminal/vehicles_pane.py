@@ -71,6 +71,15 @@ class Vehicles:
             return
         self._latest[state.resource] = _Latest(state, now)
 
+    def silent(self, now: float) -> set[str]:
+        """Return the vehicles that have sent nothing for their `lost_after`."""
+        return {
+            vehicle.id
+            for vehicle in self._fleet.vehicles.values()
+            if (latest := self._latest.get(vehicle.id)) is not None
+            and (self._ended or now - latest.at > (vehicle.lost_after_s or SILENT_AFTER_S))
+        }
+
     def table(
         self, now: float, width: int, named: Callable[[str], str], taken: Mapping[str, str]
     ) -> Text:

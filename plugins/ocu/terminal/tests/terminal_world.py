@@ -101,8 +101,15 @@ def scout(battery: float, **more: Any) -> VehicleState:
 class Terminal:
     """One operator's terminal: keys go in, and what is on the screen comes out."""
 
-    def __init__(self, app: TerminalApp, pilot: Pilot[None], operator: "Hand") -> None:
+    def __init__(
+        self,
+        app: TerminalApp,
+        pilot: Pilot[None],
+        operator: "Hand",
+        size: tuple[int, int] = SIZE,
+    ) -> None:
         self.app = app
+        self._size = size
         self.pilot = pilot
         self._operator = operator
 
@@ -140,7 +147,7 @@ class Terminal:
     @property
     def screen(self) -> str:
         """The characters on the screen, line by line."""
-        return "\n".join(characters(self.app.export_screenshot(), *SIZE))
+        return "\n".join(characters(self.app.export_screenshot(), *self._size))
 
     def line(self, text: str) -> str:
         """The first line that has a text in it."""
@@ -189,11 +196,14 @@ class World:
 
     @asynccontextmanager
     async def terminal(
-        self, by: str = "anna@gcs1", control: MissionControl | None = None
+        self,
+        by: str = "anna@gcs1",
+        control: MissionControl | None = None,
+        size: tuple[int, int] = SIZE,
     ) -> AsyncIterator[Terminal]:
         app = TerminalApp(control or self.control, now=self.hand.now, by=by)
-        async with app.run_test(size=SIZE) as pilot:
-            yield Terminal(app, pilot, self.hand)
+        async with app.run_test(size=size) as pilot:
+            yield Terminal(app, pilot, self.hand, size)
 
 
 @pytest.fixture

@@ -76,3 +76,17 @@ async def test_somebody_else_answered_and_things_are_done(world: World, terminal
         world.fake.report("r1.b1", state, "ROUTE_BLOCKED" if state == "FAILED" else "")
     await terminal.until_shown("FAILED", "r1 failed", "drive_stop ended FAILED")
     await compare(terminal, "failed")
+
+
+AREA = [[-77.3180, 38.1078], [-77.3158, 38.1078], [-77.3158, 38.1090], [-77.3180, 38.1090]]
+ROAD = [[-77.3192, 38.1075], [-77.3170, 38.1082], [-77.3150, 38.1080], [-77.3138, 38.1092]]
+
+
+async def test_the_map(world: World, terminal: Terminal) -> None:
+    area = {"type": "Polygon", "coordinates": [[*AREA, AREA[0]]]}
+    await world.control.set_geometry("field", area, by="bob")
+    await world.control.set_geometry("road", {"type": "LineString", "coordinates": ROAD}, by="bob")
+    await world.control.execute_behavior("uav", "goto", {"target": [38.1091, -77.3145]}, by="bob")
+    await terminal.press("g")
+    await terminal.until_shown("Map of 2 vehicles", "field", "✕", "Question")
+    await compare(terminal, "map")
