@@ -19,9 +19,10 @@ if TYPE_CHECKING:
 @journal_option
 @format_option
 def alerts(over: bool, journal: str | None, output: str) -> None:
-    """List the alerts: what operators must know now, the most severe first.
+    """List what operators must know now.
 
-    Those of all executives on this host, each with who has acknowledged it and who takes care.
+    The alerts of all executives on this host, the most severe first, each with who has acknowledged
+    it and who takes care.
     """
     found = [each for socket in executives_here(journal) for each in _of(socket, over=over)]
     if output == "json":
@@ -32,15 +33,15 @@ def alerts(over: bool, journal: str | None, output: str) -> None:
 
 @click.command(epilog=example("m2pem acknowledge a3"))
 @click.argument("alert_ids", metavar="[ALERT]...", nargs=-1)
-@click.option("--all", "everything", is_flag=True, help="All that nobody has acknowledged.")
+@click.option("--all", "everything", is_flag=True, help="All that are not acknowledged.")
 @journal_option
 @by_option
 def acknowledge(
     alert_ids: tuple[str, ...], everything: bool, journal: str | None, by: str | None
 ) -> None:
-    """Note that you have seen alerts: they call nobody any more.
+    """Note that you have seen alerts.
 
-    What was said once is over then. What is still so, such as a lost link, stays in the list.
+    They call no operator any more. What was said once is over then. What is still so, such as a lost link, stays in the list.
     """
     if everything == bool(alert_ids):
         raise click.UsageError("name alerts, or give --all")
@@ -50,21 +51,21 @@ def acknowledge(
 @click.command(epilog=example("m2pem own a3"))
 @click.argument("alert_ids", metavar="ALERT...", nargs=-1, required=True)
 @click.option("--owner", metavar="NAME", help="Who takes care  [default: who asks].")
-@click.option("--nobody", is_flag=True, help="Nobody takes care any more.")
+@click.option("--release", is_flag=True, help="Give it up: it has no owner any more.")
 @journal_option
 @by_option
 def own(
     alert_ids: tuple[str, ...],
     owner: str | None,
-    nobody: bool,
+    release: bool,
     journal: str | None,
     by: str | None,
 ) -> None:
     """Note who takes care of alerts."""
-    if nobody and owner:
-        raise click.UsageError("--nobody has no --owner")
-    if nobody:
-        _steer(journal, "own_alert", alert_ids, "nobody takes care", by, owner="")
+    if release and owner:
+        raise click.UsageError("--release has no --owner")
+    if release:
+        _steer(journal, "own_alert", alert_ids, "given up", by, owner="")
     else:
         done = f"{owner or 'you'} take{'s' if owner else ''} care"
         more = {"owner": owner} if owner else {}

@@ -12,7 +12,7 @@ from m2pem.executive.alert_list import WRITTEN_WITHIN_S, AlertList
 log = logging.getLogger("m2pem.alerts")
 
 LOOK_EVERY_S = 0.5
-TOLD_EVERY_S = 0.1
+PUBLISHED_EVERY_S = 0.1
 """However many alerts come, operators are told no more often that the list has changed."""
 
 WRITE_AGAIN_S = 5.0
@@ -31,9 +31,9 @@ async def watch_alerts(
             known = alerts.changes
             publish(AlertsChanged())
         changed.clear()
-        await asyncio.sleep(TOLD_EVERY_S)
+        await asyncio.sleep(PUBLISHED_EVERY_S)
         with suppress(TimeoutError):
-            async with asyncio.timeout(LOOK_EVERY_S - TOLD_EVERY_S):
+            async with asyncio.timeout(LOOK_EVERY_S - PUBLISHED_EVERY_S):
                 await changed.wait()
 
 

@@ -2,7 +2,7 @@
 import { effect } from "@preact/signals";
 import L from "leaflet";
 import { useEffect, useRef } from "preact/hooks";
-import { Graticule } from "../operate/map/graticule";
+import { Graticule } from "../map/graticule";
 import { session } from "../shared/session";
 import { theme } from "../shared/theme";
 import type { Fleet, Geometry } from "../shared/types";

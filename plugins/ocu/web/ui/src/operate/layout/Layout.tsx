@@ -11,7 +11,6 @@ import { DrawForm } from "../map/DrawForm";
 import { MapPane } from "../map/MapPane";
 import { OutlinePane } from "../outline/OutlinePane";
 import { plotsShown } from "../plots/shown";
-import { useMedia } from "./media";
 import { Pane } from "./Pane";
 import { TimelinePane } from "../timeline/TimelinePane";
 import { VehiclesPane } from "../vehicles/VehiclesPane";

@@ -3,7 +3,7 @@ import { useMemo, useRef } from "preact/hooks";
 import { clock } from "../../shared/format";
 import { fill, strings } from "../../strings";
 import { useOperating } from "../context";
-import { useMedia } from "../layout/media";
+import { useMedia } from "../../shared/useMedia";
 import { usePaced } from "../layout/pace";
 import { Pane } from "../layout/Pane";
 import { marks, rangeOf } from "../timeline/scale";

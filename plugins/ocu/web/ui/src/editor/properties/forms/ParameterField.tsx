@@ -16,7 +16,8 @@ const isKind = (kind: string): kind is (typeof GEOMETRIES)[number] =>
   (GEOMETRIES as readonly string[]).includes(kind);
 
 export interface ParameterFieldProps {
-  editor: Pick<EditorContext, "catalogue">;
+  /** `plan`: the map on which a place can be picked. */
+  editor: Pick<EditorContext, "catalogue"> & Partial<Pick<EditorContext, "plan">>;
   parameter: Parameter;
   value: string;
   write(value: string): void;
@@ -45,13 +46,14 @@ export function ParameterField({ editor, parameter, value, write, error }: Param
     );
   const { kind } = parameter;
   if (kind !== "position" && !isKind(kind)) return field;
-  const pick = (
+  const { plan } = editor;
+  const pick = plan && (
     <button
       type="button"
       class="m2-link-button"
       onClick={() => {
-        editor.plan.show(true);
-        editor.plan.picking.value = { kind, label: titleOf(parameter.name), write };
+        plan.show(true);
+        plan.picking.value = { kind, label: titleOf(parameter.name), write };
       }}
     >
       {strings.plan.pick}
