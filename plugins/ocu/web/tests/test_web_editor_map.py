@@ -1,5 +1,10 @@
 """The editor's map: drawing, picking and changing routes, areas and points of the mission's own."""
 
+import json
+import re
+from pathlib import Path
+from typing import Any
+
 import pytest
 from playwright.async_api import Locator, Page, expect
 from web_axe import Accessibility
@@ -32,6 +37,17 @@ async def draw(page: Page, *places: tuple[float, float]) -> None:
     await page.mouse.click(*await spot(page, *places[-1]))
 
 
+async def drag_vertex(page: Page, index: int, east_px: float) -> None:
+    """Move a vertex of what is selected to the east."""
+    box = await plan(page).locator(".map-vertex").nth(index).bounding_box()
+    assert box
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    await page.mouse.move(x, y)
+    await page.mouse.down()
+    await page.mouse.move(x + east_px, y, steps=5)
+    await page.mouse.up()
+
+
 async def test_a_target_is_drawn_on_the_map_changed_saved_and_undone(desk: Desk) -> None:
     page = await desk.home()
     drawing = await new_mission(page, "lane")
@@ -49,13 +65,7 @@ async def test_a_target_is_drawn_on_the_map_changed_saved_and_undone(desk: Desk)
     await name.fill("lane")
     await name.press("Enter")
     await expect(page.locator("#m2-parameter-route")).to_have_value("lane")
-    vertex = plan(page).locator(".map-vertex").nth(1)
-    box = await vertex.bounding_box()
-    assert box
-    await page.mouse.move(box["x"] + 11, box["y"] + 11)
-    await page.mouse.down()
-    await page.mouse.move(box["x"] + 61, box["y"] + 11, steps=5)
-    await page.mouse.up()
+    await drag_vertex(page, 1, east_px=50)
     await plan(page).get_by_label("Altitude for all, m").fill("25")
     await plan(page).get_by_role("button", name="Set", exact=True).click()
     await page.get_by_role("button", name="Blocks", exact=True).click()
@@ -82,6 +92,12 @@ async def test_a_target_is_drawn_on_the_map_changed_saved_and_undone(desk: Desk)
     await expect(plan(page).locator(".plan-badge")).to_have_count(0)
     await page.get_by_role("button", name="Undo", exact=False).first.click()
     await expect(plan(page).locator(".plan-badge")).to_have_count(1)
+
+    run = (await desk.ask("POST", "/api/runs", {"mission": "lane"}))["run"]
+    other = await desk.another()
+    await other.goto(f"{desk.executive.origin}/runs/{run}")
+    await expect(other.locator(".map-name", has_text=re.compile("^lane$"))).to_be_attached()
+    await desk.until(f"/api/runs/{run}", lambda said: said["status"] == "running")
 
 
 @pytest.mark.parametrize("dark", [False, True])
@@ -122,3 +138,61 @@ async def test_the_map_needs_no_mouse_has_no_violation_and_fits_a_phone(
     await toggle.click()
     await expect(page.locator("#m2-canvas")).to_be_visible()
     eyes.assert_well()
+
+
+def read(path: Path) -> Any:
+    """A file that the page gave."""
+    return json.loads(path.read_text())
+
+
+FILE = {
+    "type": "FeatureCollection",
+    "features": [
+        {
+            "type": "Feature",
+            "properties": {"name": "west gate"},
+            "geometry": {"type": "Point", "coordinates": [-77.3192, 38.1075]},
+        },
+        {
+            "type": "Feature",
+            "properties": {"name": "route_alpha"},
+            "geometry": {
+                "type": "LineString",
+                "coordinates": [[-77.3192, 38.1075], [-77.3182, 38.1085, 12]],
+            },
+        },
+        {"type": "Feature", "properties": {}, "geometry": {"type": "Sphere"}},
+    ],
+}
+
+
+async def test_a_file_is_looked_at_taken_and_exported(desk: Desk) -> None:
+    page = await desk.home()
+    drawing = await new_mission(page, "taken")
+    await page.get_by_role("button", name="Map", exact=True).click()
+    content = json.dumps(FILE).encode()
+    await (
+        plan(page)
+        .locator("input[type=file]")
+        .set_input_files(
+            {"name": "site.geojson", "mimeType": "application/geo+json", "buffer": content}
+        )
+    )
+    form = plan(page).get_by_role("form", name="From site.geojson")
+    await expect(form.get_by_label("Name: Point 1")).to_have_value("west_gate")
+    await expect(form).to_contain_text("Sphere")
+    await form.get_by_label("Name: Point 1").fill("gate")
+    await form.get_by_role("button", name="Add to the mission").click()
+    await expect(plan(page).get_by_role("form", name="Point gate")).to_be_visible()
+    await drawing.save()
+    own = load_mission(desk.executive.missions / "taken.bpmn").geometries
+    assert sorted(own) == ["gate", "route_alpha"]
+
+    await plan(page).get_by_role("button", name="Files").click()
+    async with page.expect_download() as given:
+        await page.get_by_role("menuitem", name="Export: GeoJSON").click()
+    written = read(await (await given.value).path())
+    routes = {each["properties"]["name"]: each for each in written["features"]}
+    assert routes["route_alpha"]["geometry"]["coordinates"][1] == [-77.3182, 38.1085, 12]
+    assert "route_bravo" in routes  # the fleet's
+    assert (await given.value).suggested_filename == "taken.geojson"

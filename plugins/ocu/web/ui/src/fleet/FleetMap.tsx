@@ -2,7 +2,7 @@
 import { effect } from "@preact/signals";
 import L from "leaflet";
 import { useEffect, useRef } from "preact/hooks";
-import { Graticule } from "../map/graticule";
+import { baseMap } from "../map/baseMap";
 import { session } from "../shared/session";
 import { theme } from "../shared/theme";
 import type { Fleet, Geometry } from "../shared/types";
@@ -19,14 +19,11 @@ import {
   selected,
   targets,
 } from "./state";
-import "leaflet/dist/leaflet.css";
 import "../operate/map/map.css";
 
 const text = strings.fleet.map;
 
-const MAX_ZOOM = 22;
 const NEAR_ZOOM = 17;
-const FENCE = "#c2262e";
 const DRAWN = "#56687a";
 
 export interface FleetMapProps {
@@ -45,7 +42,10 @@ export function FleetMap({ fleet, geometries, rows, picksOnce }: FleetMapProps) 
   const view = useRef<{ map: L.Map; layer: FleetLayer; fitted: boolean }>();
 
   useEffect(() => {
-    const map = mapOf(host.current!, fleet);
+    // The canvas of vehicles is drawn for one zoom.
+    const map = baseMap(host.current!, fleet, session.peek()?.tiles ?? null, {
+      zoomAnimation: false,
+    });
     const layer = new FleetLayer().addTo(map);
     view.current = { map, layer, fitted: false };
     middle.current = () => {
@@ -139,37 +139,6 @@ export function FleetMap({ fleet, geometries, rows, picksOnce }: FleetMapProps) 
       )}
     </div>
   );
-}
-
-function mapOf(host: HTMLElement, { origin, fence }: Fleet): L.Map {
-  const tiles = session.peek()?.tiles ?? null;
-  const map = L.map(host, {
-    center: [origin.lat, origin.lon],
-    zoom: NEAR_ZOOM,
-    maxZoom: MAX_ZOOM,
-    preferCanvas: true,
-    attributionControl: tiles !== null,
-    zoomSnap: 0.5,
-    // The canvas of vehicles is drawn for one zoom.
-    zoomAnimation: false,
-  });
-  map.attributionControl?.setPrefix(false);
-  if (tiles) {
-    const attribution = document.createElement("span");
-    attribution.textContent = tiles.attribution;
-    L.tileLayer("/tiles/{z}/{x}/{y}.png", {
-      maxNativeZoom: tiles.max_zoom,
-      maxZoom: MAX_ZOOM,
-      attribution: attribution.innerHTML,
-    }).addTo(map);
-  }
-  L.control.scale({ imperial: false }).addTo(map);
-  new Graticule(map);
-  if (fence) {
-    const style = { color: FENCE, weight: 2, dashArray: "6 6", fill: false, interactive: false };
-    L.geoJSON(fence, { style }).addTo(map);
-  }
-  return map;
 }
 
 function layersOf(geometries: readonly Geometry[]): L.LayerGroup {

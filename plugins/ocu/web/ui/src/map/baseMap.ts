@@ -14,7 +14,12 @@ export interface Tiles {
 
 const FENCE = "#c2262e";
 
-export function baseMap(host: HTMLElement, fleet: Fleet, tiles: Tiles | null): L.Map {
+export function baseMap(
+  host: HTMLElement,
+  fleet: Fleet,
+  tiles: Tiles | null,
+  options: L.MapOptions = {},
+): L.Map {
   const { lat, lon } = fleet.origin;
   const map = L.map(host, {
     center: [lat, lon],
@@ -23,15 +28,15 @@ export function baseMap(host: HTMLElement, fleet: Fleet, tiles: Tiles | null): L
     preferCanvas: true,
     attributionControl: tiles !== null,
     zoomSnap: 0.5,
+    ...options,
   });
   map.attributionControl?.setPrefix(false);
   if (tiles) {
-    const options = {
+    L.tileLayer("/tiles/{z}/{x}/{y}.png", {
       maxNativeZoom: tiles.max_zoom,
       maxZoom: 22,
       attribution: escaped(tiles.attribution),
-    };
-    L.tileLayer("/tiles/{z}/{x}/{y}.png", options).addTo(map);
+    }).addTo(map);
   }
   L.control.scale({ imperial: false }).addTo(map);
   new Graticule(map);

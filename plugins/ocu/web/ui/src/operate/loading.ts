@@ -1,5 +1,6 @@
 // What has to be read before a run or rehearsal can be shown.
 import { signal, type Signal } from "@preact/signals";
+import { geometriesInFile, withOwn } from "../map/ownGeometry";
 import { get } from "../shared/api";
 import type { Fleet, Geometry, RunRecord, RunSummary } from "../shared/types";
 import { missionModel, type MissionModel } from "./mission/missionModel";
@@ -41,7 +42,12 @@ export async function loadStage(source: Source): Promise<Stage> {
       return { name, qualifier, xml, definitions: await readDefinitions(xml) };
     }),
   );
-  return { mission: missionModel(sources, answer.process), fleet, geometries: signal(geometries) };
+  // The mission's own file is the first: what it has stands in place of what others have.
+  const own = sources
+    .map(({ xml }) => geometriesInFile(xml))
+    .reduceRight((others, these) => withOwn(these, others), []);
+  const mission = missionModel(sources, answer.process);
+  return { mission, fleet, geometries: signal(withOwn(own, geometries)) };
 }
 
 /** All records, page by page; `progress` is called with how many there are so far. */

@@ -222,7 +222,7 @@ function Tools({ editor, take, fit }: ToolsProps) {
       </select>
       <IconButton icon="fit" label={words.fit} act={fit} />
       <Menu
-        label={words.export}
+        label={words.files}
         class="plain"
         items={[
           { label: words.import, act: () => file.current?.click() },

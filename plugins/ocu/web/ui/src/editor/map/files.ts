@@ -33,11 +33,10 @@ export async function readFile(plan: MapPlan, file: File): Promise<void> {
   }
 }
 
-/** With names that are free, and that tasks can use. */
+/** With names that are free. */
 export function incomingOf(plan: MapPlan, file: string, read: Read): Incoming {
   const taken: string[] = [];
-  const drawings = read.geometries.map(({ name: said, kind, geojson: feature }) => {
-    const name = usable(said) || kind;
+  const drawings = read.geometries.map(({ name, kind, geojson: feature }) => {
     const isFree = plan.isFree(name) && !taken.includes(name);
     const free = isFree ? name : plan.freeName(`${name}-`, taken);
     taken.push(free);
@@ -48,14 +47,6 @@ export function incomingOf(plan: MapPlan, file: string, read: Read): Incoming {
   );
   return { file, drawings, problems };
 }
-
-/** Letters that a name may not have become dashes. */
-const usable = (name: string): string =>
-  name
-    .normalize("NFKD")
-    .replace(/[^\w.-]+/g, "-")
-    .replace(/^-+|-+$/g, "")
-    .slice(0, 80);
 
 /** All that the map shows, in one file. */
 export async function exportAs({ catalogue, mission }: EditorContext, format: Format): Promise<void> {

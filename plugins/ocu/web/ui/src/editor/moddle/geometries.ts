@@ -1,18 +1,12 @@
 // The routes, areas and points that a mission has itself: m2pem:geometry in a process's extension
 // elements (docs/missions.md).
-import type { AltitudeFrame, Geometry } from "../../shared/types";
+import { ownGeometry } from "../../map/ownGeometry";
+import type { Geometry } from "../../shared/types";
 import { behaviorOf, serviceOf, setBehavior, setService } from "./behavior";
 import { extensions, replaced, type Change } from "./extensions";
 import { isA, list, successor, text, type Factory, type ModdleElement } from "./moddle";
 
 const TYPE = "m2pem:Geometry";
-const FRAMES: readonly string[] = ["relative", "amsl", "terrain"];
-const KINDS: Record<string, Geometry["kind"]> = {
-  Point: "point",
-  LineString: "route",
-  MultiPoint: "route",
-  Polygon: "area",
-};
 
 export interface NamedFeature {
   name: string;
@@ -26,7 +20,7 @@ export const processesIn = (definitions: ModdleElement | undefined): ModdleEleme
 export function geometriesOf(definitions: ModdleElement | undefined): Geometry[] {
   const found = processesIn(definitions)
     .flatMap((process) => extensions(process, TYPE))
-    .flatMap((element) => geometryOf(element) ?? []);
+    .flatMap((each) => ownGeometry(text(each, "name"), text(each, "body")) ?? []);
   return found.sort((one, other) => one.name.localeCompare(other.name));
 }
 
@@ -102,29 +96,4 @@ function written(
       ? geometry
       : { type: "Feature", properties: { altitude_frame: frame }, geometry };
   return successor(factory, TYPE, { name, body: JSON.stringify(value) }, before);
-}
-
-function geometryOf(element: ModdleElement): Geometry | undefined {
-  const name = text(element, "name");
-  try {
-    const read = JSON.parse(text(element, "body")) as GeoJSON.Feature | GeoJSON.Geometry;
-    const feature = read.type === "Feature" ? read : null;
-    const geometry = feature ? feature.geometry : (read as GeoJSON.Geometry);
-    const kind = KINDS[geometry.type];
-    const frame = String(feature?.properties?.altitude_frame ?? "relative");
-    if (!kind || !name || !FRAMES.includes(frame)) return undefined;
-    if (!("coordinates" in geometry) || !isPlaced(geometry.coordinates)) return undefined;
-    const altitude_frame = frame as AltitudeFrame;
-    return { name, kind, geometry, altitude_frame, from: "mission", by: "", at_us: null };
-  } catch {
-    return undefined;
-  }
-}
-
-/** Whether all of it are numbers: Leaflet throws at anything else. */
-function isPlaced(coordinates: unknown): boolean {
-  if (!Array.isArray(coordinates) || coordinates.length === 0) return false;
-  if (typeof coordinates[0] === "number")
-    return coordinates.length >= 2 && coordinates.every((each) => Number.isFinite(each));
-  return coordinates.every(isPlaced);
 }

@@ -1,5 +1,6 @@
 // What this fleet has and can do: behaviors, services, vehicles, payloads, teams, routes and areas.
 import { computed, signal, type ReadonlySignal, type Signal } from "@preact/signals";
+import { withOwn } from "../../map/ownGeometry";
 import { get } from "../../shared/api";
 import type { Behavior, Fleet, Geometry } from "../../shared/types";
 import type { BehaviorUse, ResourceKind } from "../moddle/behavior";
@@ -33,10 +34,7 @@ export class Catalogue {
     geometries: Geometry[],
   ) {
     this.shared = signal(geometries);
-    this.geometries = computed(() => {
-      const own = new Set(this.own.value.map(({ name }) => name));
-      return [...this.own.value, ...this.shared.value.filter(({ name }) => !own.has(name))];
-    });
+    this.geometries = computed(() => withOwn(this.own.value, this.shared.value));
   }
 
   static async load(): Promise<Catalogue> {

@@ -16,6 +16,7 @@ import {
   undone,
   type Draft,
 } from "../../map/draft";
+import { withOwn } from "../../map/ownGeometry";
 import { VertexList } from "../../map/VertexList";
 import "./draw.css";
 
@@ -43,7 +44,10 @@ export function DrawForm({ draft }: { draft: Draft }) {
     if (!done) return;
     toast(fill(text.saved, { name }), "good");
     drawn.value = null;
-    await attempt(async () => (geometries.value = await get<Geometry[]>("/geometries")));
+    const own = geometries.value.filter(({ from }) => from === "mission");
+    await attempt(
+      async () => (geometries.value = withOwn(own, await get<Geometry[]>("/geometries"))),
+    );
   };
 
   return (

@@ -18,6 +18,7 @@ export interface MapListener {
 
 const OF_FLEET = "#56687a";
 const OF_OPERATOR = "#8347c7";
+const OF_MISSION = "#0b63ce";
 /** From how large on a geometry's name is shown. */
 const NAMED_PX = 120;
 const NAMED_ZOOM = 17;
@@ -192,7 +193,7 @@ export class MapView {
 }
 
 function layerOf({ kind, from, geometry }: Geometry): L.GeoJSON {
-  const color = from === "fleet" ? OF_FLEET : OF_OPERATOR;
+  const color = { fleet: OF_FLEET, operator: OF_OPERATOR, mission: OF_MISSION }[from];
   const style: L.PathOptions = {
     color,
     weight: kind === "route" ? 3 : 2,
