@@ -18,6 +18,7 @@ UNDONE = {
     "origin_of_salvaged_runs": ("DROP TABLE origin",),
     "approvals": ("DROP TABLE approvals", "DROP TABLE edits"),
     "alerts": ("DROP TABLE alerts",),
+    "drawings": ("DROP TABLE drawings",),
     "fleets": ("DROP TABLE fleets",),
     "notifications": ("DROP FUNCTION m2pem_tell CASCADE",),
     "pages": ("ALTER TABLE fleets DROP COLUMN page",),

@@ -14,6 +14,7 @@ from rest_world import As, app_of
 from m2pem.api import (
     OPERATIONS,
     AlertSeverity,
+    HandedOver,
     MissionControl,
     OperatorAlert,
     RunStatus,
@@ -98,6 +99,7 @@ QUERIES = {
     "fleet": "/api/fleet",
     "catalogue": "/api/behaviors",
     "standbys": "/api/standbys",
+    "geometry_versions": "/api/geometries/gate/versions",
 }
 NOT_SERVED = {
     "approval": "GET /api/missions/{name}/approval is of a mission of the server's folder",
@@ -112,6 +114,7 @@ NOT_SERVED = {
     "check": "POST /api/checks brings the BPMN of a draft",
     "missions": "GET /api/missions lists the server's folder",
     "preview_start": "POST /api/checks has the findings",
+    "geometry_users": "PUT /api/geometries/{name} is refused with them",
     "preview_take": "no page takes a vehicle, so that there is nothing to warn of",
     "wait": "a page follows the end of a run over its WebSocket",
     "subscribe": "the WebSocket sends what is committed, folded into views of runs",
@@ -134,6 +137,8 @@ def control() -> Mock:
     entry = ScheduledMission(SENT["entry"], "M", "P", When(), "", ScheduledStatus.SCHEDULED)
     control.scheduled = AsyncMock(return_value=Schedule((entry,)))
     control.holders = AsyncMock(return_value={SENT["resource"]: ""})
+    control.geometries.return_value = {"gate": HandedOver(SENT["geometry"], "anna", 0)}
+    control.geometry_versions = AsyncMock(return_value=[])
     alert = OperatorAlert(SENT["alert"], AlertSeverity.WARNING, "QUESTION", "asks: Go?", 0, 0)
     control.alerts = AsyncMock(return_value=[alert])
     control.runs = AsyncMock(return_value=[RunSummary("r1", "M", "P", RunStatus.RUNNING, 0)])
