@@ -99,7 +99,7 @@ QUERIES = {
     "fleet": "/api/fleet",
     "catalogue": "/api/behaviors",
     "standbys": "/api/standbys",
-    "geometry_versions": "/api/geometries/gate/versions",
+    "geometry_versions": "/api/geometries/{name}/versions",
 }
 NOT_SERVED = {
     "approval": "GET /api/missions/{name}/approval is of a mission of the server's folder",
