@@ -29,6 +29,10 @@ async function give<T>(limit_ms: number, send: (options: Options) => Promise<T>)
 export const start = <T>(path: string, body: unknown): Promise<T> =>
   give(START_MS, (options) => post<T>(path, body, options));
 
+/** Put something in place of what is there. */
+export const replace = (path: string, body: unknown): Promise<unknown> =>
+  give(ANSWER_MS, (options) => put(path, body, options));
+
 /** Give a command; false: it was not carried out, which is said. `body`: of a PUT, if `replaces`. */
 export async function command(path: string, body?: unknown, replaces = false): Promise<boolean> {
   try {

@@ -139,6 +139,8 @@ export const operate = {
     },
     needsName: "It needs a name: letters, digits, - _ .",
     saved: "{name} can be used in the mission now.",
+    used: "{runs}: the mission uses {name}. Tasks that have not begun get the new one. Another name leaves it as it is.",
+    replace: "Replace it",
     clickHint: "Click the map to add vertices, drag them to move.",
     notKnown:
       "No positions of vehicles were recorded: the page was not served while the run went on, or the run ended before there were any.",

@@ -1,8 +1,8 @@
 // To draw with the keyboard: the vertices as numbers, and what the geometry is called.
 import { useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
-import { get } from "../../shared/api";
-import { command } from "../../shared/command";
+import { ApiError, get } from "../../shared/api";
+import { replace } from "../../shared/command";
 import { attempt, toast } from "../../shared/Toasts";
 import { fill, strings } from "../../strings";
 import type { AltitudeFrame, Geometry } from "../../shared/types";
@@ -28,6 +28,8 @@ export function DrawForm({ draft }: { draft: Draft }) {
   const { scene, geometries, draft: drawn, middle } = useOperating();
   const runOnly = useSignal(false);
   const saving = useSignal(false);
+  // The runs that use the name, once the executive has said so.
+  const usedBy = useSignal<string[]>([]);
   const name = useRef<HTMLInputElement>(null);
   useEffect(() => name.current?.focus(), []);
   const problem = problemOf(draft);
@@ -37,11 +39,22 @@ export function DrawForm({ draft }: { draft: Draft }) {
 
   const save = async () => {
     const { name } = draft;
-    const body = { geometry: featureOf(draft), ...(runOnly.value && run ? { run } : {}) };
+    const body = {
+      geometry: featureOf(draft),
+      force: usedBy.value.length > 0,
+      ...(runOnly.value && run ? { run } : {}),
+    };
     saving.value = true;
-    const done = await command(`/geometries/${encodeURIComponent(name)}`, body, true);
-    saving.value = false;
-    if (!done) return;
+    try {
+      await replace(`/geometries/${encodeURIComponent(name)}`, body);
+    } catch (error) {
+      const runs = error instanceof ApiError ? error.problem.runs : undefined;
+      if (Array.isArray(runs)) usedBy.value = runs.map(String);
+      else toast(error instanceof Error ? error.message : String(error), "bad");
+      return;
+    } finally {
+      saving.value = false;
+    }
     toast(fill(text.saved, { name }), "good");
     drawn.value = null;
     const own = geometries.value.filter(({ from }) => from === "mission");
@@ -71,7 +84,10 @@ export function DrawForm({ draft }: { draft: Draft }) {
             value={draft.name}
             placeholder={text.nameHint}
             spellcheck={false}
-            onInput={(event) => change({ ...draft, name: event.currentTarget.value })}
+            onInput={(event) => {
+              usedBy.value = [];
+              change({ ...draft, name: event.currentTarget.value });
+            }}
           />
         </label>
         <label>
@@ -107,6 +123,9 @@ export function DrawForm({ draft }: { draft: Draft }) {
         move={(index, to) => change(moved(draft, index, to))}
         remove={(index) => change(removed(draft, index))}
       />
+      {usedBy.value.length > 0 && !runOnly.value && (
+        <p role="alert">{fill(text.used, { name: draft.name, runs: usedBy.value.join(", ") })}</p>
+      )}
       <div class="draw-row draw-actions">
         <button
           type="button"
@@ -128,7 +147,7 @@ export function DrawForm({ draft }: { draft: Draft }) {
           {text.cancel}
         </button>
         <button class="primary" disabled={problem !== null || saving.value}>
-          {text.finish}
+          {usedBy.value.length > 0 && !runOnly.value ? text.replace : text.finish}
         </button>
       </div>
       <p class="hint" role="status">
