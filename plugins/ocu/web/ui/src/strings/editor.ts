@@ -98,6 +98,7 @@ export const editor = {
     adHoc: "What is done",
     general: "General",
   },
+  names: { by: "by {who}", ask: "Ask: {question}", call: "Call {called}" },
   fields: { required: "Required" },
   durations: {
     example: "5 min",

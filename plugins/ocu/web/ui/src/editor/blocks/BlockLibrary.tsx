@@ -6,7 +6,7 @@ import type { Element } from "../session/services";
 import { blocksOf, GROUPS, matching, type Block } from "./blocks";
 import { iconSvg } from "./icons";
 import { draggingOf, makeShape } from "./making";
-import { takesPlace } from "./putting";
+import { takesPlace, type Tools } from "./putting";
 
 const words = strings.editor.blocks;
 
@@ -51,15 +51,19 @@ export function BlockLibrary({ session }: { session: EditorSession }) {
 
 function BlockButton({ session, block }: { session: EditorSession; block: Block }) {
   const shape = () =>
-    makeShape(session.service("edits").factory, session.service("elementFactory"), block);
+    makeShape(
+      session.service("edits").factory,
+      session.service("elementFactory"),
+      session.catalogue,
+      block,
+    );
   const drag = (event: Event) =>
     session.service("create").start(event, shape(), draggingOf(block));
   const click = (event: MouseEvent) => {
     const [selected, ...more] = session.selected.value;
     const isAimed = selected && !more.length && mayFollow(session, selected);
     // What is open, and what has a course that goes on, says where the block goes.
-    if (isAimed && takesPlace(session.service("fragments"), session.service("edits"), selected, block))
-      return;
+    if (isAimed && takesPlace(toolsOf(session), selected, block)) return;
     // A mouse carries the block to its place; a keyboard or a finger cannot.
     const isMouse = event.detail > 0 && (event as PointerEvent).pointerType !== "touch";
     if (isMouse) drag(event);
@@ -82,6 +86,14 @@ function BlockButton({ session, block }: { session: EditorSession; block: Block 
       {block.title}
     </button>
   );
+}
+
+function toolsOf(session: EditorSession): Tools {
+  return {
+    catalogue: session.catalogue,
+    edits: session.service("edits"),
+    fragments: session.service("fragments"),
+  };
 }
 
 function mayFollow(session: EditorSession, element: Element): boolean {

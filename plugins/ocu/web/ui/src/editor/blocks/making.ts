@@ -5,6 +5,8 @@ import type { Factory, ModdleElement } from "../moddle/moddle";
 import { promptOf, setPrompt } from "../moddle/prompts";
 import type { Element, ElementFactory } from "../session/services";
 import { strings } from "../../strings";
+import type { Catalogue } from "../session/catalogue";
+import { nameOf } from "./naming";
 import type { Block, TaskContent } from "./blocks";
 import type { Fragment } from "./control/fragment";
 
@@ -38,12 +40,18 @@ export function contentChanges(
   });
 }
 
-export function makeShape(factory: Factory, elementFactory: ElementFactory, block: Block): Element {
+export function makeShape(
+  factory: Factory,
+  elementFactory: ElementFactory,
+  catalogue: Catalogue,
+  block: Block,
+): Element {
   const { content } = block;
   if (content.kind === "fragment") return openPlace(factory, elementFactory, content.fragment);
   const type = typeOf(content);
   const task = factory.create(type, { name: block.title });
   written(contentChanges(factory, content, task));
+  task.set("name", nameOf(catalogue, task) || block.title);
   return elementFactory.createShape({ type, businessObject: task }) as Element;
 }
 

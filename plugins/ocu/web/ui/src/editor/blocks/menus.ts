@@ -48,14 +48,14 @@ export class BlockMenus {
 
   constructor(
     private readonly popupMenu: PopupMenu,
-    private readonly catalogue: Catalogue,
+    readonly catalogue: Catalogue,
     private readonly elementFactory: ElementFactory,
     private readonly create: Create,
     private readonly autoPlace: Services["autoPlace"],
     private readonly rules: Rules,
     private readonly mouse: Mouse,
-    private readonly edits: Edits,
-    private readonly fragments: Fragments,
+    readonly edits: Edits,
+    readonly fragments: Fragments,
   ) {
     this.blocks = blocksOf(catalogue);
     this.register("bpmn-create", () => this.entries("create", (block) => this.creating(block)));
@@ -101,7 +101,7 @@ export class BlockMenus {
   }
 
   private shape(block: Block): Element {
-    return makeShape(this.edits.factory, this.elementFactory, block);
+    return makeShape(this.edits.factory, this.elementFactory, this.catalogue, block);
   }
 
   private creating(block: Block): Actions {
@@ -117,7 +117,7 @@ export class BlockMenus {
     return {
       click: () => {
         this.popupMenu.close();
-        if (!takesPlace(this.fragments, this.edits, source, block)) {
+        if (!takesPlace(this, source, block)) {
           this.autoPlace.append(source, this.shape(block));
         }
       },
@@ -131,7 +131,7 @@ export class BlockMenus {
   private replacing(element: Element, block: Block): Actions {
     const replace = () => {
       this.popupMenu.close();
-      becomeBlock(this.fragments, this.edits, element, block);
+      becomeBlock(this, element, block);
     };
     return { click: replace, dragstart: replace };
   }

@@ -1,6 +1,8 @@
 // Changes of the mission that are undone and redone as one.
+import { isNamedByItself, nameOf } from "../blocks/naming";
 import type { Change } from "../moddle/extensions";
 import type { Factory, ModdleElement } from "../moddle/moddle";
+import type { Catalogue } from "./catalogue";
 import type { BpmnReplace, CommandStack, Element, Modeling } from "./services";
 
 const CHANGE = "m2pem.change";
@@ -19,13 +21,22 @@ interface ReplaceContext {
 }
 
 class ChangeHandler {
-  static readonly $inject = ["modeling"];
+  static readonly $inject = ["modeling", "catalogue"];
 
-  constructor(private readonly modeling: Modeling) {}
+  constructor(
+    private readonly modeling: Modeling,
+    private readonly catalogue: Catalogue,
+  ) {}
 
   preExecute({ element, changes }: ChangeContext): void {
+    const object = element.businessObject as ModdleElement;
+    const isNamed = isNamedByItself(this.catalogue, object);
     for (const { target, properties, shown } of changes) {
       this.modeling.updateModdleProperties((shown as Element) ?? element, target, properties);
+    }
+    const name = isNamed ? nameOf(this.catalogue, object) : "";
+    if (name && name !== object.get("name")) {
+      this.modeling.updateProperties(element as never, { name });
     }
   }
 }

@@ -1,8 +1,6 @@
 // Puts fragments into the diagram, each as one step that is undone as one: behind an element, in the
 // way of a flow, in a place that is still open, or on an activity.
-import { strings } from "../../../strings";
-import { behaviorOf } from "../../moddle/behavior";
-import { isA, text, type Factory, type ModdleElement } from "../../moddle/moddle";
+import { isA, type Factory, type ModdleElement } from "../../moddle/moddle";
 import { overlap, type Box } from "../../session/boxes";
 import type {
   Canvas,
@@ -16,6 +14,7 @@ import type {
 } from "../../session/services";
 import { centre, FragmentParts, isActivity, type Flow, type Shape } from "./drawing";
 import { extentOf, HOST, type Fragment } from "./fragment";
+import { isOpenPlace } from "./open";
 
 const PUT = "m2pem.fragment";
 const DISTANCE = 50;
@@ -36,12 +35,8 @@ interface Modeler {
   getDefinitions(): ModdleElement;
 }
 
-/** A script task whose author has still to say what is done. */
-export function isOpen(element: Element | undefined): boolean {
-  const object = element?.businessObject as ModdleElement | undefined;
-  if (!object || !isA(object, "bpmn:ScriptTask") || behaviorOf(object)) return false;
-  return text(object, "script") === "" && text(object, "name").startsWith(strings.control.open);
-}
+export const isOpen = (element: Element): boolean =>
+  isOpenPlace(element.businessObject as ModdleElement);
 
 class PutHandler {
   static readonly $inject = ["modeling", "spaceTool", "canvas", "bpmnFactory", "elementFactory", "bpmnjs"];
