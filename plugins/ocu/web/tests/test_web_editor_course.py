@@ -1,8 +1,9 @@
 """The editor's blocks for the course of a mission: each puts in a piece of BPMN that is correct."""
 
+import re
 from typing import Any
 
-from playwright.async_api import expect
+from playwright.async_api import Page, expect
 from web_desk import IN_ONE_LOOP, Desk
 from web_drawing import Drawing, new_mission
 
@@ -66,3 +67,47 @@ async def findings(desk: Desk, mission: str) -> list[dict[str, Any]]:
     """What the check finds in a saved mission."""
     said = await desk.ask("POST", "/api/checks", {"mission": mission})
     return list(said["findings"])
+
+
+async def test_one_vehicle_in_two_branches_is_found_while_drawing_and_explained(desk: Desk) -> None:
+    page = await desk.home()
+    drawing = await new_mission(page, "twice")
+    await drawing.append("Start", "Terminate end event", "Over")
+    await put(drawing, "Start", "At the same time")
+    # The blocks take the places that are open, and call themselves by what they do.
+    blocks = page.get_by_role("region", name="Blocks")
+    for part in ("first", "at the same time"):
+        await drawing.select(await task(page, f"Choose what is done {part}"))
+        await blocks.get_by_role("button", name="Reverse", exact=True).click()
+        await drawing.fill("Distance", "20 m")
+        await drawing.who("evsg1")
+    assert await task(page, "Reverse by evsg1")
+
+    await page.get_by_role("tab", name=re.compile("Problems")).click()
+    problems = page.get_by_role("tabpanel", name=re.compile("Problems"))
+    await expect(problems).to_contain_text("evsg1 may still do Reverse by evsg1 at that time")
+
+    await page.get_by_role("tab", name="Run", exact=True).click()
+    await page.get_by_role("button", name="Rehearse", exact=True).click()
+    outcome = page.get_by_role("region", name="What came of it")
+    await expect(outcome).to_contain_text("Its vehicle was still busy with another task")
+    await expect(outcome).to_contain_text("Behaviors without a script end as the simulated")
+    await outcome.get_by_role("button", name="one-behavior").click()
+    pointed = page.locator(".m2v-pointed")
+    await expect(pointed).to_contain_text("one-behavior violated")
+    await expect(pointed).to_be_in_viewport()
+    await page.get_by_text("What this assumes").click()
+    await expect(page.get_by_text("Timers come in any order")).to_be_visible()
+
+
+TASK = ".djs-shape"
+
+
+async def task(page: Page, name: str) -> str:
+    """The element that is called so."""
+    # A name is drawn in lines, which have no space between them.
+    words = re.sub(r"\s", "", name)
+    for each in await page.locator(f"{TASK}[data-element-id^=Activity]").all():
+        if words in re.sub(r"\s", "", await each.text_content() or ""):
+            return await each.get_attribute("data-element-id") or ""
+    raise AssertionError(f"nothing is called {name}")

@@ -1,9 +1,10 @@
 // Tabs beside the canvas. Panels stay mounted, so that nothing that was typed or found is lost.
-import { useRef, useState } from "preact/hooks";
+import { useEffect, useRef, useState } from "preact/hooks";
 import { remember, remembered } from "../../shared/memory";
 import { strings } from "../../strings";
 import type { EditorContext, Panel } from "./panel";
 import { panels } from "./panels";
+import { FIRST_PANEL, showPanel, shownPanel } from "./shown";
 
 const words = strings.editor.panel;
 const LEAST = 240;
@@ -12,7 +13,8 @@ const USUAL = 380;
 const STEP = 24;
 
 export function SidePanel({ editor }: { editor: EditorContext }) {
-  const [shown, setShown] = useState("properties");
+  const shown = shownPanel.value;
+  useEffect(() => showPanel(FIRST_PANEL), [editor]);
   const [width, setWidth] = useState(() => remembered("editor-panel-width", USUAL));
   const resize = (next: number) => {
     const bounded = Math.min(MOST, Math.max(LEAST, next));
@@ -22,7 +24,7 @@ export function SidePanel({ editor }: { editor: EditorContext }) {
   const focus = (at: number) => {
     const next = panels[at];
     if (!next) return;
-    setShown(next.id);
+    showPanel(next.id);
     document.getElementById(`m2-panel-tab-${next.id}`)?.focus();
   };
   return (
@@ -35,7 +37,7 @@ export function SidePanel({ editor }: { editor: EditorContext }) {
             editor={editor}
             panel={panel}
             isShown={panel.id === shown}
-            show={() => setShown(panel.id)}
+            show={() => showPanel(panel.id)}
             step={(offset) => focus((index + offset + panels.length) % panels.length)}
             focus={(at) => focus(at < 0 ? panels.length + at : at)}
           />

@@ -3,6 +3,8 @@ import { fill, strings } from "../../../strings";
 import type { RunSummary } from "../../../shared/types";
 import { PROMPTS, SERVICES, WAITS, type Span } from "../../../records/spans";
 import type { EditorContext } from "../panel";
+import { Explained } from "./Explained";
+import type { Unsaid } from "./unsaid";
 
 const words = strings.run;
 const STATUS = strings.operate.run.status;
@@ -12,9 +14,10 @@ export interface OutcomeProps {
   id: string;
   summary: RunSummary;
   spans: readonly Span[];
+  unsaid: Unsaid;
 }
 
-export function Outcome({ editor, id, summary, spans }: OutcomeProps) {
+export function Outcome({ editor, id, summary, spans, unsaid }: OutcomeProps) {
   const { status, detail, records, started_us, ended_us } = summary;
   const seconds = ended_us === null ? 0 : (ended_us - started_us) / 1e6;
   const good = status === "completed" || status === "terminated";
@@ -33,6 +36,7 @@ export function Outcome({ editor, id, summary, spans }: OutcomeProps) {
           {words.watch}
         </a>
       </div>
+      <Explained editor={editor} summary={summary} unsaid={unsaid} />
       {spans.length > 0 && <Bars editor={editor} spans={spans} end={seconds} />}
     </section>
   );

@@ -86,6 +86,7 @@ function Rehearse({ editor }: { editor: EditorContext }) {
             id={job.id.value}
             summary={told.summary}
             spans={rehearsal.spans.value}
+            unsaid={rehearsal.unsaid.value}
           />
         )}
       </div>

@@ -8,6 +8,7 @@ import { Job, type JobTold } from "../job";
 import { keptOf } from "../kept";
 import type { EditorContext } from "../panel";
 import { askingTasks, commandingTasks, servingTasks } from "../drawn";
+import { Unsaid } from "./unsaid";
 import { EMPTY, isComplete, yamlOf, type Script } from "./answers";
 
 export interface RehearsalTold extends JobTold {
@@ -31,6 +32,7 @@ export class Rehearsal {
   readonly unread = signal<string | null>(null);
   readonly job = new Job<RehearsalTold>("/rehearsals");
   readonly spans = signal<readonly Span[]>([]);
+  readonly unsaid = signal(new Unsaid());
   readonly isReady = computed(() => this.raw.value !== null || isComplete(this.script.value));
 
   text(): string {
@@ -76,14 +78,20 @@ export class Rehearsal {
 
   private async readSpans(id: string): Promise<void> {
     const spans = new Spans();
+    const unsaid = new Unsaid();
     let after: number | null = 0;
     for (let count = 0; after !== null && count < MOST_RECORDS; count += PAGE) {
       const path = `/rehearsals/${encodeURIComponent(id)}/records?after=${after}&limit=${PAGE}`;
       const page: RecordPage = await get<RecordPage>(path);
-      page.records.forEach((record) => spans.add(record));
+      page.records.forEach((record) => {
+        spans.add(record);
+        unsaid.add(record);
+      });
       after = page.next;
     }
-    if (this.job.id.value === id) this.spans.value = spans.all;
+    if (this.job.id.value !== id) return;
+    this.spans.value = spans.all;
+    this.unsaid.value = unsaid;
   }
 }
 

@@ -1,6 +1,8 @@
 // The report: what holds, what does not, and up to what.
+import { useEffect, useRef } from "preact/hooks";
 import { fill, strings } from "../../../strings";
 import type { EditorContext } from "../panel";
+import { Assumed } from "./Assumed";
 import { counted, tell, type Outcome, type Report, type Told } from "./report";
 import type { Verification } from "./verification";
 
@@ -24,6 +26,7 @@ export function Answers({ editor, verification }: PartProps) {
         {stale && <p class="m2v-stale-note">{words.stale}</p>}
         <Summary report={report} />
       </div>
+      <Assumed report={report} inOrder={verification.inOrder.value} />
       {required.length > 0 && (
         <AnswerList title={words.requirements} told={required} verification={verification} />
       )}
@@ -86,6 +89,7 @@ interface AnswerListProps {
 function AnswerList({ title, told, verification }: AnswerListProps) {
   const bad = told.filter(({ outcome }) => outcome !== "holds");
   const good = told.filter(({ outcome }) => outcome === "holds");
+  const isPointed = good.some(({ answer }) => answer.property === verification.pointed.value);
   const shown = (each: Told) => (
     <AnswerLine key={each.answer.property} told={each} verification={verification} />
   );
@@ -94,7 +98,7 @@ function AnswerList({ title, told, verification }: AnswerListProps) {
       <h2>{title}</h2>
       {bad.length > 0 && <ul class="m2v-answers">{bad.map(shown)}</ul>}
       {good.length > 0 && (
-        <details open={bad.length === 0}>
+        <details open={bad.length === 0 || isPointed}>
           <summary>{fill(words.counts.holds, { count: good.length })}</summary>
           <ul class="m2v-answers">{good.map(shown)}</ul>
         </details>
@@ -105,8 +109,13 @@ function AnswerList({ title, told, verification }: AnswerListProps) {
 
 function AnswerLine({ told, verification }: { told: Told; verification: Verification }) {
   const { answer, outcome, violations } = told;
+  const line = useRef<HTMLLIElement>(null);
+  const isPointed = verification.pointed.value === answer.property;
+  useEffect(() => {
+    if (isPointed) line.current?.scrollIntoView({ block: "center" });
+  }, [isPointed]);
   return (
-    <li>
+    <li ref={line} class={isPointed ? "m2v-pointed" : undefined}>
       <Sign outcome={outcome} />
       <div>
         <p>

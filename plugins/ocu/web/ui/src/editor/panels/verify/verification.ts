@@ -30,6 +30,8 @@ export class Verification {
   /** The violation that is looked at, and after which of its steps. */
   readonly opened = signal<Violation | null>(null);
   readonly step = signal(0);
+  /** The property that somebody wants to see; "": none. */
+  readonly pointed = signal("");
 
   async begin(editor: EditorContext): Promise<void> {
     let meaning = "";
