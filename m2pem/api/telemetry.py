@@ -39,7 +39,11 @@ class LinkState(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class VehicleState:
-    """A vehicle at one moment. None: not known. `time_us`: microseconds since the Unix epoch."""
+    """A vehicle at one moment. None: not known. `time_us`: microseconds since the Unix epoch.
+
+    `failsafe_problems`: how its own failsafes differ from what the fleet file says, in words;
+    empty: they do not; None: they were not compared.
+    """
 
     resource: ResourceId
     time_us: int
@@ -56,6 +60,7 @@ class VehicleState:
     not_ready_reasons: tuple[str, ...] = ()
     link: LinkState = LinkState.CONNECTED
     behavior: str = ""
+    failsafe_problems: tuple[str, ...] | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -121,6 +121,7 @@ class MavlinkArbiter:
         self._controllers: dict[ResourceId, VehicleController] = {}
         self._takeover_monitors: list[TakeoverMonitor] = []
         self._fences: dict[ResourceId, Fence] = {}
+        self._failsafe_problems: dict[ResourceId, tuple[str, ...]] = {}
         self._pending: dict[BehaviorId, Behavior] = {}
         self._queried: set[BehaviorId] = set()
         self._tasks: list[asyncio.Task[None]] = []
@@ -389,12 +390,25 @@ class MavlinkArbiter:
         )
 
     async def _check(self, vehicle: "Vehicle") -> None:
-        """Log the differences between the fleet file and the vehicle's failsafes, once it is
-        identified."""
+        """Log and publish the differences between the fleet file and the vehicle's failsafes, once
+        it is identified."""
         await vehicle.until(lambda: vehicle.identity is not None)
-        if self._vehicle_connections is not None and self._connections[vehicle.resource].failsafe:
-            for finding in await self._vehicle_connections.findings(vehicle):
+        resource = vehicle.resource
+        if self._vehicle_connections is not None and self._connections[resource].failsafe:
+            found = await self._vehicle_connections.findings(vehicle)
+            for finding in found:
                 self._context.logger.warning("%s", finding)
+            self._failsafe_problems[resource] = tuple(
+                each.removeprefix(f"{resource}: ") for each in found
+            )
+            self._publish(self._controllers[resource])
+
+    def _publish(self, controller: "VehicleController") -> None:
+        vehicle = controller.vehicle
+        problems = self._failsafe_problems.get(vehicle.resource)
+        self._states.put(
+            replace(vehicle.telemetry(), behavior=controller.behavior, failsafe_problems=problems)
+        )
 
     async def _monitor_vehicle(self, resource: ResourceId) -> None:
         """Publish the state of a vehicle, and report its behavior LOST when it falls silent."""
@@ -424,7 +438,7 @@ class MavlinkArbiter:
             new_refusal = vehicle.warn_of_refused_frames()
             if new_refusal or vehicle.state.changes != published or vehicle.link_state != link:
                 published, link = vehicle.state.changes, vehicle.link_state
-                self._states.put(replace(vehicle.telemetry(), behavior=controller.behavior))
+                self._publish(controller)
             left_s = bound_s - silent_s
             await clock.sleep(min(TELEMETRY_EVERY_S, left_s) if left_s > 0 else TELEMETRY_EVERY_S)
 
@@ -448,9 +462,7 @@ class MavlinkArbiter:
             nonlocal shown
             if (state.custom_mode, state.armed) != shown:
                 shown = state.custom_mode, state.armed
-                self._states.put(
-                    replace(controller.vehicle.telemetry(), behavior=controller.behavior)
-                )
+                self._publish(controller)
 
         controller.vehicle.watch(look)
 

@@ -450,6 +450,7 @@ def test_what_is_held_on_the_ground_and_disarms_itself_takes_off_after_the_hold(
 def test_a_failsafe_that_is_not_the_fleets_is_told_at_connect(failsafe, caplog) -> None:
     async def main(bench) -> None:
         await bench.clock.sleep(2)
+        assert bench.states[-1].failsafe_problems == (("FS_GCS_ENABLE is 0",) if failsafe else None)
 
     caplog.set_level("WARNING")
     body = Body(findings=["v: FS_GCS_ENABLE is 0"])

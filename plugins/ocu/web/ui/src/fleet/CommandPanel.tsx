@@ -100,16 +100,8 @@ function Details({ row }: { row: Row }) {
       {row.status?.unavailable && !row.operator && (
         <p class="warn">{fill(details.unavailable, { why: row.status.unavailable })}</p>
       )}
-      {row.reasons.length > 0 && (
-        <div class={row.ready === false ? "warn" : ""}>
-          {details.reasons}:
-          <ul>
-            {row.reasons.map((reason) => (
-              <li key={reason}>{reason}</li>
-            ))}
-          </ul>
-        </div>
-      )}
+      <Reasons title={details.reasons} reasons={row.reasons} />
+      <Reasons title={details.failsafeProblems} reasons={row.failsafeProblems ?? []} />
       <dl class="fleet-facts">
         {facts
           .filter(([, value]) => value)
@@ -120,6 +112,20 @@ function Details({ row }: { row: Row }) {
             </div>
           ))}
       </dl>
+    </div>
+  );
+}
+
+function Reasons({ title, reasons }: { title: string; reasons: readonly string[] }) {
+  if (reasons.length === 0) return null;
+  return (
+    <div class="warn">
+      {title}:
+      <ul>
+        {reasons.map((reason) => (
+          <li key={reason}>{reason}</li>
+        ))}
+      </ul>
     </div>
   );
 }

@@ -304,6 +304,15 @@ function Cell({ row, column }: { row: Row; column: Column }) {
       );
     case "link":
       return <td class={row.health === "lost" ? "fleet-link bad" : "fleet-link"}>{content}</td>;
+    case "failsafe": {
+      const differs = (row.failsafeProblems?.length ?? 0) > 0;
+      const why = [content, ...(row.failsafeProblems ?? [])].join("\n");
+      return (
+        <td class={differs ? "fleet-failsafe bad" : "fleet-failsafe"} title={why}>
+          {content}
+        </td>
+      );
+    }
     default:
       return (
         <td class={`fleet-${column}`} title={content || undefined}>

@@ -240,8 +240,7 @@ function drawVehicle(
   const isHollow = health === "lost" || health === "unheard" || manned;
   context.fillStyle = isHollow ? colours.paper : colours[health];
   context.strokeStyle = isHollow ? colours[health] : colours.paper;
-  context.lineWidth = isHollow ? 2.5 : 1.5;
-  if (health === "lost") context.setLineDash([3, 2]);
+  context.lineWidth = 1.5;
   context.fill(shape);
   context.stroke(shape);
   context.restore();

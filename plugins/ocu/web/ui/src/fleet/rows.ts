@@ -70,6 +70,8 @@ export interface Row {
   arbiter: string;
   host: string;
   failsafe: string;
+  /** How the vehicle's own differ from that; null: they were not compared. */
+  failsafeProblems: readonly string[] | null;
   link: "connected" | "degraded" | "lost" | "unknown";
   /** Seconds since its last state; null: there was none. */
   age_s: number | null;
@@ -136,6 +138,7 @@ function rowOf(
     arbiter,
     host,
     failsafe: isPayload ? "" : failsafe,
+    failsafeProblems: vehicle?.failsafe_problems ?? null,
     link: state?.link ?? ("unknown" as const),
     age_s,
     battery,

@@ -27,6 +27,7 @@ export const state = (resource: string, more: Partial<VehicleState> = {}): Vehic
   not_ready_reasons: [],
   link: "connected",
   behavior: "",
+  failsafe_problems: null,
   ...more,
 });
 

@@ -30,7 +30,7 @@ export function cellOf(row: Row, column: Column): string {
     case "height":
       return row.height_m === null ? "" : `${row.height_m.toFixed(1)} m`;
     case "failsafe":
-      return row.isPayload ? "" : row.failsafe || text.noFailsafe;
+      return row.isPayload ? "" : failsafeOf(row);
     case "position":
       return row.latitude === null || row.longitude === null
         ? ""
@@ -43,10 +43,18 @@ export function armedOf({ armed }: Row): string {
   return armed ? text.armed : text.disarmed;
 }
 
+function failsafeOf({ failsafe, failsafeProblems }: Row): string {
+  if (!failsafe) return text.noFailsafe;
+  if (failsafeProblems === null) return failsafe;
+  const { failsafeCompared, failsafeDiffers } = text;
+  return fill(failsafeProblems.length > 0 ? failsafeDiffers : failsafeCompared, { failsafe });
+}
+
 function linkOf({ link, age_s }: Row): string {
   if (age_s === null) return text.links.unknown;
-  const how = text.links[link];
-  return age_s > STALE_S ? `${how}, ${fill(text.silent, { age: age(age_s) })}` : how;
+  const silent = age_s > STALE_S ? fill(text.silent, { age: age(age_s) }) : "";
+  if (!silent) return text.links[link];
+  return link === "lost" ? `${text.links.lost}, ${silent}` : silent;
 }
 
 /** Without the run that commands it. */

@@ -302,6 +302,8 @@ export interface VehicleState {
   not_ready_reasons: string[];
   link: "connected" | "degraded" | "lost";
   behavior: string;
+  /** How its failsafes differ from what the fleet file says; null: they were not compared. */
+  failsafe_problems?: string[] | null;
 }
 
 export interface PayloadState {

@@ -65,6 +65,8 @@ export const fleet = {
   heldBehavior: "held",
   executiveHost: "this executive's",
   noFailsafe: "not stated",
+  failsafeCompared: "{failsafe}: the vehicle is set so",
+  failsafeDiffers: "{failsafe}: the vehicle is NOT set so",
   armed: "armed",
   disarmed: "disarmed",
   manned: "manned",
@@ -83,6 +85,7 @@ export const fleet = {
   details: {
     choose: "Choose a vehicle in the table or on the map, or select several.",
     reasons: "Why it is not ready",
+    failsafeProblems: "How its failsafes differ",
     readiness: "Readiness",
     ready: "ready",
     notReady: "not ready",
