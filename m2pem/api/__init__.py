@@ -85,6 +85,14 @@ if TYPE_CHECKING:
         OPERATIONS,
         Operation,
     )
+    from m2pem.api.people import (
+        ABSENT_AFTER_S,
+        MAX_NOTE_CHARACTERS,
+        PRESENCE_EVERY_S,
+        OpenControlRequest,
+        OperatorPresence,
+        OperatorsChanged,
+    )
     from m2pem.api.remaining import (
         RemainingRoute,
         RemainingSurvey,
@@ -143,7 +151,7 @@ if TYPE_CHECKING:
     from m2pem.bpmn import parse_mission
     from m2pem.engine.records import Record
     from m2pem.findings import Finding, Severity
-    from m2pem.fleet.approval import file_digest
+    from m2pem.fleet.approval import file_digest, person_of
     from m2pem.fleet.behaviors import SHARED
     from m2pem.fleet.endurance import lasts_s
     from m2pem.fleet.fleet import Fleet
@@ -220,6 +228,10 @@ _MODULES = {
     "m2pem.api.operations": (
         "MAX_DATA_VALUES MAX_NAME_CHARACTERS MAX_REASON_CHARACTERS OPERATIONS Operation"
     ),
+    "m2pem.api.people": (
+        "ABSENT_AFTER_S MAX_NOTE_CHARACTERS PRESENCE_EVERY_S OpenControlRequest OperatorPresence"
+        " OperatorsChanged"
+    ),
     "m2pem.api.remaining": (
         "RemainingRoute RemainingSurvey RemainingWork raw_parameters restored_work"
     ),
@@ -255,8 +267,8 @@ _MODULES = {
     "m2pem.fleet.behaviors": "SHARED",
     "m2pem.geo.cameras": "ImagePlan SurveyCamera image_plan",
     "m2pem.geo.fence": "Fence",
-    "m2pem.fleet.approval": "file_digest",
     "m2pem.fleet.endurance": "lasts_s",
+    "m2pem.fleet.approval": "file_digest person_of",
     "m2pem.fleet.fleet": "Fleet",
     "m2pem.geo.geojson": "GeometryError as_geojson kind_of parse_geojson",
     "m2pem.geo.geometry_files": (
@@ -275,10 +287,17 @@ _MODULES = {
 _LAZY = {name: module for module, names in _MODULES.items() for name in names.split()}
 
 __all__ = [
+    "ABSENT_AFTER_S",
+    "MAX_NOTE_CHARACTERS",
+    "OpenControlRequest",
+    "OperatorPresence",
+    "OperatorsChanged",
+    "PRESENCE_EVERY_S",
     "EarlierApproval",
     "GivenApproval",
     "MissionApproval",
     "file_digest",
+    "person_of",
     "read_rules",
     "read_template",
     "Unknown",

@@ -23,6 +23,7 @@ from m2pem.api.authoring import (
     SearchProgress,
 )
 from m2pem.api.health import ExecutiveAddress, HealthCheck
+from m2pem.api.people import OpenControlRequest, OperatorPresence, OperatorsChanged
 from m2pem.api.runs import (
     Alert,
     GeometryVersion,
@@ -55,6 +56,7 @@ ControlEvent: TypeAlias = Union[
     AlertsChanged,
     ScheduleChanged,
     SharedSpaceChanged,
+    OperatorsChanged,
 ]
 """What a subscriber gets: records and prompts in order, after they were committed, alerts and
 changes of the schedule at once, those of shared space within a second."""
@@ -345,6 +347,63 @@ class MissionControl(Protocol):
 
     async def give_back(self, resource: str, *, by: str = "") -> None:
         """Give it back to the missions; signals with `m2pem:returned` of it are thrown."""
+        ...
+
+    async def request_control(self, resource: str, *, by: str = "") -> None:
+        """Ask the operator who has taken a vehicle or payload for it.
+
+        Within the fleet's `hand_over: answer_within` the holder gives it or refuses; afterwards it
+        stays, or goes to `by`, as the fleet says. All operators are told.
+
+        Raises:
+            OperatorError: no other operator has it, or one asks for it already.
+        """
+        ...
+
+    async def answer_control(self, resource: str, *, give: bool, by: str = "") -> None:
+        """Give a vehicle or payload to the operator who asks for it, or refuse. Who has asked
+        withdraws the request by refusing.
+
+        Raises:
+            OperatorError: nobody asks for it, or `by` does not have it.
+        """
+        ...
+
+    async def control_requests(self) -> Sequence[OpenControlRequest]:
+        """Who asks whom for which vehicle or payload now."""
+        ...
+
+    async def announce_presence(
+        self,
+        client: str,
+        *,
+        unit: str,
+        role: str = "",
+        run: RunId = "",
+        page: str = "",
+        by: str = "",
+    ) -> None:
+        """An operator is present at a unit with the id `client`. Units say so each
+        `PRESENCE_EVERY_S`; after `ABSENT_AFTER_S` without it the operator counts as gone.
+
+        `run`, `page`: what the unit shows; `role`: what it lets the operator do.
+        """
+        ...
+
+    async def end_presence(self, client: str) -> None:
+        """The operator of the unit `client` has left."""
+        ...
+
+    async def operators(self) -> Sequence[OperatorPresence]:
+        """Which operators are present, at which units."""
+        ...
+
+    async def add_note(self, run: RunId, text: str, *, by: str = "") -> None:
+        """Write a note into a run's log: a record, which every operator sees.
+
+        Raises:
+            OperatorError: it is empty or too long (`MAX_NOTE_CHARACTERS`), or the run has ended.
+        """
         ...
 
     async def holders(self) -> Mapping[ResourceId, str]:

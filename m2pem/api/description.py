@@ -160,6 +160,31 @@ def _operator_gave_back(_: RunView, record: r.OperatorGaveControlBack) -> _Sente
     return f"{record.resource} given back{_by(record)}", Importance.NORMAL
 
 
+def _control_requested(_: RunView, record: r.ControlRequested) -> _Sentence:
+    return f"{record.by} asks {record.holder} for {record.resource}", Importance.WARNING
+
+
+_ENDED_REQUESTS = {
+    r.RequestOutcome.GIVEN: "gives it",
+    r.RequestOutcome.REFUSED: "refuses",
+    r.RequestOutcome.WITHDRAWN: "asks no longer",
+    r.RequestOutcome.RETURNED: "has given it back to the missions",
+}
+
+
+def _control_request_ended(_: RunView, record: r.ControlRequestEnded) -> _Sentence:
+    asked = f"{record.requested_by} asked for {record.resource}"
+    if record.outcome is r.RequestOutcome.EXPIRED:
+        return f"{asked}: nobody answered, it stays", Importance.WARNING
+    if not record.by:
+        return f"{asked}: nobody answered, it goes to {record.requested_by}", Importance.WARNING
+    return f"{asked}: {record.by} {_ENDED_REQUESTS[record.outcome]}", Importance.NORMAL
+
+
+def _operator_note(_: RunView, record: r.OperatorNote) -> _Sentence:
+    return f"{record.by or 'an operator'}: {record.text}", Importance.NORMAL
+
+
 def _geometry_received(_: RunView, record: r.GeometryReceived) -> _Sentence:
     return f"{record.name} received{_by(record)}", Importance.NORMAL
 
@@ -435,6 +460,9 @@ _SENTENCES: dict[type, Callable[[RunView, Any], _Sentence]] = {
     r.InputSeen: _input_seen,
     r.OperatorTookControl: _operator_took,
     r.OperatorGaveControlBack: _operator_gave_back,
+    r.ControlRequested: _control_requested,
+    r.ControlRequestEnded: _control_request_ended,
+    r.OperatorNote: _operator_note,
     r.GeometryReceived: _geometry_received,
     r.TokenEntered: _token_entered,
     r.TokenLeft: _token_left,
@@ -492,7 +520,14 @@ _KINDS: dict[type, Kind] = {
             r.InputDeferred,
             r.InputSeen,
         ),
-        Kind.OPERATORS: (r.OperatorTookControl, r.OperatorGaveControlBack, r.GeometryReceived),
+        Kind.OPERATORS: (
+            r.OperatorTookControl,
+            r.OperatorGaveControlBack,
+            r.ControlRequested,
+            r.ControlRequestEnded,
+            r.OperatorNote,
+            r.GeometryReceived,
+        ),
         Kind.BEHAVIORS: (
             r.AllocationRequested,
             r.AllocationDelayed,

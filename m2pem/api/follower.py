@@ -14,6 +14,7 @@ from m2pem.api import records as r
 from m2pem.api.alerts import AlertsChanged
 from m2pem.api.allocation import SharedSpaceChanged
 from m2pem.api.control import ControlEvent, MissionControl
+from m2pem.api.people import OperatorsChanged
 from m2pem.api.run_view import RunView
 from m2pem.api.runs import (
     Alert,
@@ -81,6 +82,10 @@ class Listener:
     def shared_space_changed(self) -> None:
         """Who is in shared space, or waits for it, has changed; `MissionControl.shared_space` has
         it."""
+
+    def operators_changed(self) -> None:
+        """Who is present, or asks for control, has changed; `MissionControl.operators` and
+        `control_requests` have it."""
 
 
 class Follower:
@@ -220,6 +225,8 @@ class Follower:
                 self.listener.alerts_changed()
             case SharedSpaceChanged():
                 self.listener.shared_space_changed()
+            case OperatorsChanged():
+                self.listener.operators_changed()
 
     async def _take_record(self, stamped: StampedRecord) -> None:
         view = self.views.get(stamped.run)

@@ -27,6 +27,7 @@ from m2pem.api.approval import MissionApproval
 from m2pem.api.authoring import MissionFiles
 from m2pem.api.control import MissionControl
 from m2pem.api.health import ExecutiveAddress, HealthCheck
+from m2pem.api.people import OpenControlRequest, OperatorPresence, OperatorsChanged
 from m2pem.api.runs import (
     Alert,
     GeometryVersion,
@@ -174,7 +175,7 @@ class DeleteGeometry(OfGeometry, frozen=True):
 
 
 class Resource(Params, frozen=True):
-    """As `MissionControl.take` and `MissionControl.give_back`."""
+    """As `MissionControl.take`, `give_back` and `request_control`."""
 
     resource: str
     by: str = ""
@@ -184,6 +185,39 @@ class Preview(Params, frozen=True):
     """As `MissionControl.preview_take`."""
 
     resource: str
+
+
+class AnswerControl(Params, frozen=True):
+    """As `MissionControl.answer_control`."""
+
+    resource: str
+    give: bool
+    by: str = ""
+
+
+class AnnouncePresence(Params, frozen=True):
+    """As `MissionControl.announce_presence`."""
+
+    client: str
+    unit: str
+    role: str = ""
+    run: str = ""
+    page: str = ""
+    by: str = ""
+
+
+class EndPresence(Params, frozen=True):
+    """As `MissionControl.end_presence`."""
+
+    client: str
+
+
+class AddNote(Params, frozen=True):
+    """As `MissionControl.add_note`."""
+
+    run: str
+    text: str
+    by: str = ""
 
 
 class Page(Params, frozen=True):
@@ -334,6 +368,7 @@ Event = (
     | AlertsChanged
     | ScheduleChanged
     | SharedSpaceChanged
+    | OperatorsChanged
 )
 State = VehicleState | PayloadState | TeamState
 STREAMED: dict[str, type] = {kind.__name__: kind for kind in get_args(Event | State)}
@@ -376,6 +411,13 @@ OPERATIONS: dict[str, Operation] = {
         Operation("take", Resource),
         Operation("preview_take", Preview, list[TakeEffect]),
         Operation("give_back", Resource),
+        Operation("request_control", Resource),
+        Operation("answer_control", AnswerControl),
+        Operation("control_requests", Nothing, list[OpenControlRequest]),
+        Operation("announce_presence", AnnouncePresence),
+        Operation("end_presence", EndPresence),
+        Operation("operators", Nothing, list[OperatorPresence]),
+        Operation("add_note", AddNote),
         Operation("holders", Nothing, dict[ResourceId, str]),
         Operation("missions", Nothing, list[str], alone=True),
         Operation("preview_start", Check, StartPreview, alone=True),

@@ -54,6 +54,9 @@ COMMANDS = {
     "stop": "Stop a run that is running on this host, or all of them.",
     "pause": "Pause a run that is running on this host.",
     "continue": "Let a run on this host go on after a pause.",
+    "hand-over": "Give a vehicle or payload to the operator who asks for it, or refuse.",
+    "operators": "List the operators who are present, and who asks whom for what.",
+    "note": "Write a note into the log of a run that is running on this host.",
     "switchover": "Have the executive of this host leave its runs to the one that stands by.",
     "attach": "Serve an operator of an executive that is running on this host.",
     "plugins": "List the plugins and what they provide.",
@@ -65,13 +68,14 @@ COMMANDS = {
 """Built-in commands and the first lines of their help."""
 
 
-_RUN_CONTROL = frozenset({"answer", "continue", "pause", "signal", "stop"})
+_RUN_CONTROL = frozenset({"answer", "continue", "note", "pause", "signal", "stop"})
 _MODULES = {
     **dict.fromkeys(_RUN_CONTROL, "run_control"),
     "resolve": "incidents",
     "give-back": "take",
     "acknowledge": "alerts",
     "own": "alerts",
+    "hand-over": "take",
 }
 
 

@@ -5,8 +5,10 @@ import importlib
 import logging
 import sys
 from collections.abc import Awaitable, Callable, Sequence
+from contextlib import suppress
 from functools import partial
 from typing import cast
+from uuid import uuid4
 
 import click
 
@@ -14,8 +16,10 @@ from m2pem.api.capabilities import ocu_capabilities
 from m2pem.api.control import MissionControl
 from m2pem.api.health import ExecutiveAddress
 from m2pem.api.ocu import StandbyOcu
+from m2pem.api.operator import operator_name
+from m2pem.api.people import PRESENCE_EVERY_S
 from m2pem.cli.notes import note
-from m2pem.errors import PluginError
+from m2pem.errors import M2pemError, PluginError
 from m2pem.plugins import PluginManager
 
 log = logging.getLogger("m2pem.ocu")
@@ -99,8 +103,11 @@ class Operators:
                 left()
 
         for name, factory in self._factories.items():
-            task = asyncio.create_task(self._serve(name, factory(control).serve()), name=name)
             had_terminal = ocu_capabilities(factory).takes_terminal
+            serving: Awaitable[None] = factory(control).serve()
+            if had_terminal or name == PLAIN:  # others have operators of their own
+                serving = _present(control, name, serving)
+            task = asyncio.create_task(self._serve(name, serving), name=name)
             task.add_done_callback(partial(ended, had_terminal=had_terminal))
             self._tasks.append(task)
 
@@ -122,3 +129,22 @@ class Operators:
             log.exception("the operator control unit %s broke; missions go on without it", name)
             return False
         return True
+
+
+async def _present(control: MissionControl, unit: str, serving: Awaitable[None]) -> None:
+    """Announce that the operator of this terminal is present, for as long as a unit serves."""
+    client = f"{unit}-{uuid4()}"
+
+    async def announce() -> None:
+        while True:
+            with suppress(M2pemError):  # of a remote executive that is gone, the unit tells
+                await control.announce_presence(client, unit=unit, by=operator_name())
+            await asyncio.sleep(PRESENCE_EVERY_S)
+
+    announcing = asyncio.create_task(announce(), name=f"presence at {unit}")
+    try:
+        await serving
+    finally:
+        announcing.cancel()
+        with suppress(M2pemError):
+            await control.end_presence(client)

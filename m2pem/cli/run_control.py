@@ -217,6 +217,19 @@ def signal(
     steer(journal, run_id, "signal", by, done, id=signal_id, data=data)
 
 
+@click.command(epilog=example("m2pem note r1 'wind picks up'"))
+@run_argument
+@click.argument("text")
+@journal_option
+@by_option
+def note(run_id: str, text: str, journal: str | None, by: str | None) -> None:
+    """Write a note into the log of a run that is running on this host.
+
+    Every operator sees it, and the journal keeps it with your name.
+    """
+    steer(journal, run_id, "add_note", by, f"{run_id}: the note is written", text=text)
+
+
 @click.command(epilog=example("m2pem pause r1"))
 @run_argument
 @journal_option

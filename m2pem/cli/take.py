@@ -16,9 +16,10 @@ if TYPE_CHECKING:
 @click.command(epilog=example("m2pem take uav1"))
 @click.argument("resource")
 @click.option("--yes", is_flag=True, help="Take it without asking, whatever this ends.")
+@click.option("--ask", "asks", is_flag=True, help="Ask the operator who has it to hand it over.")
 @journal_option
 @by_option
-def take(resource: str, yes: bool, journal: str | None, by: str | None) -> None:
+def take(resource: str, yes: bool, asks: bool, journal: str | None, by: str | None) -> None:
     """Take a vehicle or payload from the missions, to steer it by hand.
 
     First it is said which tasks this ends, and whether their missions go on; then it is asked.
@@ -29,6 +30,10 @@ def take(resource: str, yes: bool, journal: str | None, by: str | None) -> None:
     from m2pem.errors import OperatorError
 
     path = _executive_of(resource, journal)
+    if asks:
+        ask(path, "request_control", resource=resource, by=by or operator_name())
+        note(f"{resource} is asked for; `m2pem operators` shows who is asked, and how long")
+        return
     agreed: list[TakeEffect] = []
     while not yes and (effects := _effects(path, resource)) != agreed:
         for each in effects:
@@ -60,6 +65,23 @@ def give_back(resource: str, journal: str | None, by: str | None) -> None:
     path = _executive_of(resource, journal)
     ask(path, "give_back", resource=resource, by=by or operator_name())
     note(f"{resource} is given back")
+
+
+@click.command(epilog=example("m2pem hand-over uav1"))
+@click.argument("resource")
+@click.option("--refuse", is_flag=True, help="Keep it; of one who has asked: ask no longer.")
+@journal_option
+@by_option
+def hand_over(resource: str, refuse: bool, journal: str | None, by: str | None) -> None:
+    """Give a vehicle or payload to the operator who asks for it, or refuse."""
+    from m2pem.api.operator import operator_name
+    from m2pem.cli.notes import note
+    from m2pem.control_socket.client import ask
+
+    path = _executive_of(resource, journal)
+    give = not refuse
+    ask(path, "answer_control", resource=resource, give=give, by=by or operator_name())
+    note(f"{resource} is handed over" if give else f"{resource} is not handed over")
 
 
 def _effects(path: Path, resource: str) -> "list[TakeEffect]":

@@ -18,6 +18,8 @@ from m2pem.engine.elements.behaviors import (
     behavior_missing,
     behavior_preempted,
     behavior_reported,
+    control_request_ended,
+    control_requested,
     control_returned,
     control_taken,
     recovery_answered,
@@ -41,7 +43,7 @@ from m2pem.engine.triggering import (
 )
 from m2pem.mission.elements import Activity
 
-_THROW_NOTHING = (i.Continue, i.StopRun, i.PauseRun, i.ClaimRun, i.GeometrySet)
+_THROW_NOTHING = (i.Continue, i.StopRun, i.PauseRun, i.ClaimRun, i.GeometrySet, i.OperatorNoted)
 
 
 def decide(x: Steps, item: i.Input) -> None:
@@ -261,11 +263,18 @@ def _remember_id(x: Steps, number: str) -> None:
         x.emit(r.InputSeen(number))
 
 
+def _note(x: Steps, item: i.OperatorNoted) -> None:
+    x.emit(r.OperatorNote(item.text, item.by))
+
+
 _DECIDERS: dict[type, Callable[[Steps, Any], None]] = {
     i.ResourceReturned: resource_returned,
     i.BehaviorPreempted: behavior_preempted,
     i.ControlTaken: control_taken,
     i.ControlReturned: control_returned,
+    i.ControlRequested: control_requested,
+    i.ControlRequestEnded: control_request_ended,
+    i.OperatorNoted: _note,
     i.StartRun: _start,
     i.ClaimRun: _claim,
     i.StopRun: _stop,

@@ -249,6 +249,41 @@ class ControlReturned(_Input, frozen=True):
     by: str
 
 
+class RequestOutcome(StrEnum):
+    """How a request for control has ended."""
+
+    GIVEN = "given"
+    REFUSED = "refused"
+    EXPIRED = "expired"
+    WITHDRAWN = "withdrawn"
+    RETURNED = "returned"
+
+
+class ControlRequested(_Input, frozen=True):
+    """An operator asks the one who has a vehicle or payload, `holder`, for it."""
+
+    resource: str
+    by: str
+    holder: str
+
+
+class ControlRequestEnded(_Input, frozen=True):
+    """A request for control has ended. `requested_by`: the operator who asked; if it is GIVEN, that
+    operator has the resource from now on. `by`: who ended it; "": its time was over."""
+
+    resource: str
+    requested_by: str
+    outcome: RequestOutcome
+    by: str = ""
+
+
+class OperatorNoted(_Input, frozen=True):
+    """An operator writes a note into the run's log."""
+
+    text: str
+    by: str
+
+
 class GeometrySet(_Input, frozen=True):
     """An OCU sends a route, area or point under a name (paper, section 4.3). GeoJSON."""
 
@@ -281,5 +316,8 @@ Input: TypeAlias = Union[
     BehaviorPreempted,
     ControlTaken,
     ControlReturned,
+    ControlRequested,
+    ControlRequestEnded,
+    OperatorNoted,
     GeometrySet,
 ]

@@ -5,7 +5,8 @@
 
 * NEW takes only StartRun.
 * PAUSED takes ResumeRun, StopRun, GiveUp and what changes nothing in the mission (a claim, a
-  geometry). It ignores ticks. Every other input is deferred: journaled now, decided at resume.
+  geometry, a note). It ignores ticks. Every other input is deferred: journaled now, decided at
+  resume.
 * ENDED takes only claims, and what ends behaviors that are still being cancelled.
 * An input that is not taken is ignored with a reason; it is never an error.
 
@@ -22,6 +23,7 @@ from m2pem.engine.inputs import (
     GeometrySet,
     GiveUp,
     Input,
+    OperatorNoted,
     PauseRun,
     ResourceFault,
     ResumeRun,
@@ -53,6 +55,7 @@ _EXCEPTIONS: dict[RunStatus, dict[type, Admission]] = {
         GiveUp: Admission.DECIDE,
         ClaimRun: Admission.DECIDE,
         GeometrySet: Admission.DECIDE,
+        OperatorNoted: Admission.DECIDE,
     },
     RunStatus.ENDED: {
         BehaviorReported: Admission.DECIDE,

@@ -264,6 +264,14 @@ class Behavior:
 
 
 @dataclass(frozen=True, slots=True)
+class ControlRequest:
+    """An operator asks the one who has a resource, `holder`, for it."""
+
+    by: str
+    holder: str
+
+
+@dataclass(frozen=True, slots=True)
 class OutOfReach:
     """A behavior that ended as LOST, and that its resource may still do. `native_ref`: the
     arbiter's own reference to it."""
@@ -391,6 +399,8 @@ class RunState:
     """Every resource that a behavior of the run has had."""
     taken: dict[str, str] = field(default_factory=dict)
     """Resources that operators have taken, and who has each."""
+    control_requests: dict[str, ControlRequest] = field(default_factory=dict)
+    """Requests for resources that operators have taken, by resource."""
     lost: dict[str, OutOfReach] = field(default_factory=dict)
     """Resources that ended as LOST, and what they may still do: until they have returned, or do
     something else for the run."""

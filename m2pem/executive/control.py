@@ -25,6 +25,7 @@ from m2pem.api.authoring import (
 )
 from m2pem.api.control import ControlEvent
 from m2pem.api.health import ExecutiveAddress, HealthCheck
+from m2pem.api.people import MAX_NOTE_CHARACTERS, OpenControlRequest, OperatorPresence
 from m2pem.api.runs import (
     GeometryVersion,
     HandedOver,
@@ -55,6 +56,7 @@ from m2pem.errors import (
 from m2pem.executive.alert_list import AlertList
 from m2pem.executive.direct_behaviors import DirectBehaviors
 from m2pem.executive.ended_runs import explain_end, in_words, refuse_ended
+from m2pem.executive.handover import UNNAMED_OPERATOR
 from m2pem.executive.health import ExecutiveHealth
 from m2pem.executive.incidents import Foresee, IncidentChoices, open_incidents
 from m2pem.executive.journal_loss import PROMPT as LOSS_PROMPT
@@ -379,7 +381,52 @@ class Control:
 
     async def give_back(self, resource: str, *, by: str = "") -> None:
         """Give it back to the missions."""
-        await self._supervisor.handover.give_back(resource, by, self._supervisor.runners.values())
+        supervisor = self._supervisor
+        await supervisor.handover.give_back(resource, by, supervisor.runners.values())
+        await supervisor.control_requests.returned(resource, by)
+
+    async def request_control(self, resource: str, *, by: str = "") -> None:
+        """Ask the operator who has a vehicle or payload for it."""
+        await self._supervisor.control_requests.ask(resource, by)
+
+    async def answer_control(self, resource: str, *, give: bool, by: str = "") -> None:
+        """Give a vehicle or payload to the operator who asks for it, or refuse."""
+        await self._supervisor.control_requests.answer(resource, by, give=give)
+
+    async def control_requests(self) -> Sequence[OpenControlRequest]:
+        """Who asks whom for which vehicle or payload."""
+        return self._supervisor.control_requests.all()
+
+    async def announce_presence(
+        self,
+        client: str,
+        *,
+        unit: str,
+        role: str = "",
+        run: RunId = "",
+        page: str = "",
+        by: str = "",
+    ) -> None:
+        """An operator is present at a unit."""
+        presence = OperatorPresence(by or UNNAMED_OPERATOR, unit, role, run, page)
+        self._supervisor.presence.announce(client, presence)
+
+    async def end_presence(self, client: str) -> None:
+        """An operator is not present at a unit any more."""
+        self._supervisor.presence.leave(client)
+
+    async def operators(self) -> Sequence[OperatorPresence]:
+        """Who is present."""
+        return self._supervisor.presence.present()
+
+    async def add_note(self, run: RunId, text: str, *, by: str = "") -> None:
+        """Write a note into a run's log."""
+        note = text.strip()
+        if not note or len(note) > MAX_NOTE_CHARACTERS:
+            raise OperatorError(
+                f"a note has 1 to {MAX_NOTE_CHARACTERS} characters, and this one {len(note)}"
+            )
+        await self._ask("note", run, i.OperatorNoted(note, by or UNNAMED_OPERATOR))
 
     async def holders(self) -> Mapping[ResourceId, str]:
         """Who has each resource."""

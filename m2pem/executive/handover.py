@@ -105,6 +105,11 @@ class Handover:
             if not runner.done.is_set():
                 await runner.submit(ControlReturned(resource, by or UNNAMED_OPERATOR))
 
+    def pass_on(self, resource: ResourceId, to: str) -> None:
+        """Another operator has a resource from now on that an operator has."""
+        self.taken[resource] = to
+        self._withdraw(resource)
+
     def by_name(self, lent: Collection[ResourceId] = ()) -> dict[str, str]:
         """What is taken, and by whom: for a run that begins, without what is lent to that run."""
         return {

@@ -15,10 +15,12 @@ from m2pem.engine import commands as c
 from m2pem.engine.inputs import (
     BehaviorMissing,
     ClaimRun,
+    ControlRequestEnded,
     ControlTaken,
     GeometrySet,
     Input,
     PauseRun,
+    RequestOutcome,
     ResourceFault,
 )
 from m2pem.engine.run import MissionRun
@@ -69,8 +71,11 @@ def claim(
     if loss is not None:
         runner.post(PauseRun(paused_by(loss)))
     for resource, operator in taken.items():
-        if resource not in runner.run.state.taken:
+        known = runner.run.state.taken.get(resource)
+        if known is None:
             runner.post(ControlTaken(resource, operator))
+        elif known != operator:  # by another run: this one did not get its end
+            runner.post(ControlRequestEnded(resource, operator, RequestOutcome.GIVEN))
     for geometry in given:
         runner.post(geometry)
 

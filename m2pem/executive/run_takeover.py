@@ -14,6 +14,7 @@ from m2pem.engine.commands import Command
 from m2pem.engine.inputs import StopRun
 from m2pem.engine.run import MissionRun
 from m2pem.errors import JournalError, M2pemError, OperatorError
+from m2pem.executive.control_requests import control_of
 from m2pem.executive.recovery import claim, replay, take_over
 from m2pem.executive.runner import Runner
 from m2pem.executive.supervisor import Supervisor
@@ -93,7 +94,9 @@ class RunTakeover:
         last_us = await replay(supervisor.journal, run, supervisor.settings.on_records)
         runner = supervisor.add(run, epoch)
         await supervisor.dispatcher.fence(number, epoch)
-        supervisor.handover.take_up(run.state.taken)
+        taken_before, requests = control_of(run.state)
+        supervisor.handover.take_up(taken_before)
+        supervisor.control_requests.take_up(requests)
         outage_s = self._outage_s(number, last_us)
         lent = supervisor.handover.lent_to(run.state)
         taken = {

@@ -16,6 +16,7 @@ from m2pem.api.allocation import SharedSpaceState
 from m2pem.api.arbiter import BehaviorId, BehaviorReport
 from m2pem.api.clock import Clock
 from m2pem.api.epoch_fence import run_of
+from m2pem.api.people import OperatorsChanged
 from m2pem.api.runs import LEFT_ARMED, Alert, RunId
 from m2pem.api.service import ServiceContext
 from m2pem.api.telemetry import TeamState, Telemetry
@@ -42,6 +43,7 @@ from m2pem.executive.behavior_lifecycle import (
 )
 from m2pem.executive.behavior_reports import reported
 from m2pem.executive.control_events import ControlEvents, RecordObservers
+from m2pem.executive.control_requests import CONTROL_REQUEST, ControlRequests
 from m2pem.executive.counts import RunCounts
 from m2pem.executive.dispatcher import Dispatcher
 from m2pem.executive.drawings import Drawings
@@ -54,6 +56,7 @@ from m2pem.executive.lost_marks import LostMarks
 from m2pem.executive.lost_resources import LostResources
 from m2pem.executive.outages import OUTAGE_S, Outages, StallMonitor
 from m2pem.executive.ownership import Ownership
+from m2pem.executive.presence import Presence
 from m2pem.executive.recovery import look_again, replaced_by
 from m2pem.executive.returns import Returns, still_lost
 from m2pem.executive.runner import OnRecords, RunContext, RunLimit, Runner
@@ -180,6 +183,16 @@ class Supervisor:
         """Says which other executive may serve the fleet, or ""; None: none can."""
         self.emergency = EmergencyCommands(self.dispatcher, events, self.marks)
         self.handover = Handover(arbiters, self.availability)
+        self.presence = Presence(clock.now_us, lambda: events.publish(OperatorsChanged()))
+        self.control_requests = ControlRequests(
+            arbiters.fleet,
+            self.handover,
+            clock,
+            self.runners.values,
+            self.presence.is_gone,
+            lambda text: events.publish(Alert("", CONTROL_REQUEST, text)),
+            lambda: events.publish(OperatorsChanged()),
+        )
         self.losses = JournalLossPrompts(
             journal,
             arbiters,
@@ -275,6 +288,7 @@ class Supervisor:
 
     async def end_calls(self) -> None:
         """Let go of lost resources, services and calls of arbiters, once every run has ended."""
+        self.control_requests.close()
         self.allocator.close()
         await self._lost_resources.close()
         await self._services.close()

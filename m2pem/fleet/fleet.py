@@ -35,6 +35,13 @@ class OnConflict(StrEnum):
     WAIT = "wait"
 
 
+class Unanswered(StrEnum):
+    """What becomes of a request for control that its holder does not answer in time."""
+
+    KEEP = "keep"
+    GIVE = "give"
+
+
 class LostMemberPolicy(StrEnum):
     """What a team's behavior does when a member is lost."""
 
@@ -137,9 +144,10 @@ class Fleet:
     the mission does not say; "": all. `operators`: the names of those who have each role; none:
     every operator has every role. `approval_persons`: how many persons other than its last editor
     must have approved a mission before it starts; 0: none. `approval_role`: which operators may
-    approve; "": all. `hosts`: the other computers that arbiters run
-    on, by name. `faces`: the settings of each face; no run depends on them, and no journal has
-    them.
+    approve; "": all. `control_answer_s`: how long an operator who is asked for a vehicle or payload
+    may take to answer; `control_unanswered`: what becomes of it then. `hosts`: the other computers
+    that arbiters run on, by name. `faces`: the settings of each face; no run depends on them, and
+    no journal has them.
     """
 
     name: str
@@ -170,6 +178,8 @@ class Fleet:
     operators: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     approval_persons: int = 0
     approval_role: str = ""
+    control_answer_s: float = 30.0
+    control_unanswered: Unanswered = Unanswered.KEEP
     hosts: Mapping[str, Host] = field(default_factory=dict)
     faces: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 

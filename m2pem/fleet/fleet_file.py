@@ -15,12 +15,14 @@ from m2pem.fleet.fleet import (
     Payload,
     SharedSpace,
     Team,
+    Unanswered,
     Vehicle,
 )
 from m2pem.fleet.fleet_schema import (
     AllocationModel,
     DeconflictionModel,
     FleetModel,
+    HandOverModel,
     HostModel,
     ScheduleModel,
     VehicleModel,
@@ -263,6 +265,7 @@ def _build(source: YamlSource, model: FleetModel, geometries: dict[str, Geometry
     }
     apart = model.deconfliction
     said = apart or DeconflictionModel()
+    handing_over = model.hand_over or HandOverModel()
     costs = model.allocation or AllocationModel()
     later = model.schedule or ScheduleModel()
     return Fleet(
@@ -294,6 +297,8 @@ def _build(source: YamlSource, model: FleetModel, geometries: dict[str, Geometry
         operators={role: tuple(names) for role, names in model.operators.items()},
         approval_persons=model.approval.persons if model.approval else 0,
         approval_role=(model.approval.role if model.approval else None) or "",
+        control_answer_s=handing_over.answer_within,
+        control_unanswered=Unanswered(handing_over.unanswered),
         hosts={name: _host(source, name, each) for name, each in model.hosts.items()},
         faces={name: settings or {} for name, settings in model.faces.items()},
     )

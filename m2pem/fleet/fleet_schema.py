@@ -328,6 +328,19 @@ class ApprovalModel(_Model):
     ] = None
 
 
+class HandOverModel(_Model):
+    """How operators ask each other for vehicles and payloads."""
+
+    answer_within: Annotated[
+        Annotated[Duration, Field(gt=0)],
+        Field(description="How long an operator who is asked for one may take to answer."),
+    ] = 30.0
+    unanswered: Annotated[
+        Literal["keep", "give"],
+        Field(description="Whether one that nobody answers for stays, or goes to who asks."),
+    ] = "keep"
+
+
 class FleetModel(_Model):
     """A fleet of m2pem: vehicles, payloads, teams and named geometries."""
 
@@ -372,6 +385,10 @@ class FleetModel(_Model):
     approval: Annotated[
         ApprovalModel | None,
         Field(description="Missions start only when persons have approved exactly their content."),
+    ] = None
+    hand_over: Annotated[
+        HandOverModel | None,
+        Field(description="How operators ask each other for vehicles and payloads."),
     ] = None
     faces: Annotated[
         dict[Name, dict[str, Any] | None],

@@ -20,12 +20,17 @@ CALLS = [
         {"id": "Home", "data": {"a.b": 3}},
         "r1: signal 'Home' is sent",
     ),
+    ("note r1 windy", "add_note", {"text": "windy"}, "r1: the note is written"),
     ("pause r1", "pause", {}, "r1 is paused"),
     ("continue r1", "resume", {}, "r1 goes on"),
     ("stop r1 --reason rain", "stop", {"reason": "rain"}, "stopped: r1"),
 ]
 
 OTHERWISE = {
+    "request_control": "m2pem take --ask",
+    "answer_control": "m2pem hand-over",
+    "control_requests": "m2pem operators",
+    "operators": "m2pem operators",
     "approval": "m2pem approve --show",
     "approve": "m2pem approve, which tests/cli/test_approve.py tries",
     "withdraw_approval": "m2pem approve --withdraw",
@@ -75,6 +80,8 @@ OTHERWISE = {
     "switch_over": "m2pem switchover, which tests/e2e/test_switchover.py tries",
 }
 NO_COMMAND = {
+    "announce_presence": "operator control units announce who is present",
+    "end_presence": "operator control units announce who is present",
     "note_edit": "editors note who saves a mission",
     "execute_behavior": "programs command vehicles through faces; an operator starts missions",
     "message": "programs send messages: over the control socket, REST or ROS",

@@ -3,6 +3,7 @@
 from m2pem.engine import records as r
 from m2pem.engine.apply.tasks import end_loss
 from m2pem.engine.state import (
+    ControlRequest,
     RunState,
     RunStatus,
 )
@@ -68,7 +69,16 @@ def control_taken(state: RunState, record: r.OperatorTookControl) -> None:
 
 def control_returned(state: RunState, record: r.OperatorGaveControlBack) -> None:
     del state.taken[record.resource]
+    state.control_requests.pop(record.resource, None)
     end_loss(state, record.resource, TAKEN_OVER)
+
+
+def control_requested(state: RunState, record: r.ControlRequested) -> None:
+    state.control_requests[record.resource] = ControlRequest(record.by, record.holder)
+
+
+def control_request_ended(state: RunState, record: r.ControlRequestEnded) -> None:
+    state.control_requests.pop(record.resource, None)
 
 
 def geometry_received(state: RunState, record: r.GeometryReceived) -> None:

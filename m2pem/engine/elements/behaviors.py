@@ -26,7 +26,7 @@ from m2pem.engine.elements.allocations import (
 from m2pem.engine.elements.losses import end_work, what_is_done
 from m2pem.engine.execution import Execution
 from m2pem.engine.keeping import end_keeping
-from m2pem.engine.records import RunOutcome, Trigger
+from m2pem.engine.records import RequestOutcome, RunOutcome, Trigger
 from m2pem.engine.scopes import end_run
 from m2pem.engine.state import Behavior, BehaviorPhase, RunState, Token
 from m2pem.engine.throwing import catcher_of_error, throw_error
@@ -402,3 +402,26 @@ def control_returned(x: Execution, item: i.ControlReturned) -> None:
         if signal.returned == item.resource:
             x.emit(r.SignalThrown(signal.id, by=item.by))
             throw_signal(x, signal.id, {})
+
+
+def control_requested(x: Execution, item: i.ControlRequested) -> None:
+    """Note that an operator asks another one for a resource."""
+    if x.state.taken.get(item.resource) != item.holder:
+        x.ignore(f"{item.resource} is not with {item.holder}")
+        return
+    x.emit(r.ControlRequested(item.resource, item.by, item.holder))
+
+
+def control_request_ended(x: Execution, item: i.ControlRequestEnded) -> None:
+    """Note how a request for a resource has ended; if it is given, another operator has it."""
+    asked = x.state.control_requests.get(item.resource)
+    given = (
+        item.outcome is RequestOutcome.GIVEN
+        and x.state.taken.get(item.resource, item.requested_by) != item.requested_by
+    )
+    if asked is None and not given:
+        x.ignore(f"nobody asks for {item.resource}")
+        return
+    x.emit(r.ControlRequestEnded(item.resource, item.requested_by, item.outcome, item.by))
+    if given:
+        x.emit(r.OperatorTookControl(item.resource, item.requested_by))

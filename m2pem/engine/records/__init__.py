@@ -10,6 +10,7 @@ that contains `element`.
 
 from typing import TypeAlias, Union
 
+from m2pem.engine.inputs import RequestOutcome
 from m2pem.engine.records.base import RunOutcome, TokenOutcome, Trigger
 from m2pem.engine.records.compensation import (
     CompensationBegan,
@@ -36,11 +37,14 @@ from m2pem.engine.records.incidents import (
     IncidentUpdated,
 )
 from m2pem.engine.records.run import (
+    ControlRequested,
+    ControlRequestEnded,
     GeometryReceived,
     InputDeferred,
     InputIgnored,
     InputSeen,
     OperatorGaveControlBack,
+    OperatorNote,
     OperatorTookControl,
     RunClaimed,
     RunEnded,
@@ -123,6 +127,9 @@ __all__ = [
     "InstanceOutput",
     "KeepingEnded",
     "MessageThrown",
+    "ControlRequestEnded",
+    "ControlRequested",
+    "OperatorNote",
     "OperatorGaveControlBack",
     "OperatorTookControl",
     "PromptAnswered",
@@ -134,6 +141,7 @@ __all__ = [
     "ResourcesAllocated",
     "RunClaimed",
     "RunEnded",
+    "RequestOutcome",
     "RunOutcome",
     "RunPaused",
     "RunResumed",
@@ -169,6 +177,9 @@ Record: TypeAlias = Union[
     InputSeen,
     OperatorTookControl,
     OperatorGaveControlBack,
+    ControlRequested,
+    ControlRequestEnded,
+    OperatorNote,
     GeometryReceived,
     ScopeOpened,
     ScopeClosed,

@@ -1,6 +1,6 @@
 """Records about the run as a whole."""
 
-from m2pem.engine.inputs import Input
+from m2pem.engine.inputs import Input, RequestOutcome
 from m2pem.engine.records.base import BaseRecord, RunOutcome
 from m2pem.mission.values import Value
 
@@ -81,6 +81,31 @@ class OperatorGaveControlBack(BaseRecord, frozen=True):
     """The operator has released control of `resource` to the missions."""
 
     resource: str
+    by: str
+
+
+class ControlRequested(BaseRecord, frozen=True):
+    """An operator has asked `holder` for `resource`."""
+
+    resource: str
+    by: str
+    holder: str
+
+
+class ControlRequestEnded(BaseRecord, frozen=True):
+    """A request for control has ended. `requested_by`: who asked. `by`: who ended it; "": its time
+    was over. If it is GIVEN, `OperatorTookControl` follows."""
+
+    resource: str
+    requested_by: str
+    outcome: RequestOutcome
+    by: str = ""
+
+
+class OperatorNote(BaseRecord, frozen=True):
+    """An operator wrote a note into the run's log."""
+
+    text: str
     by: str
 
 

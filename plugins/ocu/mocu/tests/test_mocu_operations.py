@@ -71,6 +71,13 @@ SERVED_OTHERWISE = {
     "fleet": "/diagnostics names its vehicles and payloads",
 }
 NOT_SERVED = {
+    "request_control": "operators over ROS take what is free; take_vehicle names the holder",
+    "answer_control": "operators over ROS give back what they have",
+    "control_requests": "topic events says who asks whom",
+    "announce_presence": "no node of an operator says who looks at it",
+    "end_presence": "no node of an operator says who looks at it",
+    "operators": "the page and m2pem operators list them",
+    "add_note": "notes are written on the page, or with m2pem note; topic events has them",
     "approval": "start_mission answers with who must approve",
     "approve": "persons approve on the page, or with m2pem approve",
     "withdraw_approval": "persons do it on the page, or with m2pem approve --withdraw",

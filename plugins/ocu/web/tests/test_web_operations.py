@@ -8,7 +8,7 @@ import httpx
 import pytest
 from fastapi import FastAPI
 from m2pem_plugin_web.live.standbys import Standbys
-from m2pem_plugin_web.rest import alerts, incidents, schedule, standbys, steering
+from m2pem_plugin_web.rest import alerts, incidents, people, schedule, standbys, steering
 from rest_world import As, app_of
 
 from m2pem.api import (
@@ -56,6 +56,9 @@ COMMANDS: dict[str, tuple[str, str, Any]] = {
     "start_scheduled": ("POST", "/api/schedule/s1/start", None),
     "hold_schedule": ("POST", "/api/schedule/s1/hold", {"reason": "rain"}),
     "release_schedule": ("POST", "/api/schedule/s1/release", None),
+    "request_control": ("POST", "/api/resources/ugv1/camera/request", None),
+    "answer_control": ("POST", "/api/resources/ugv1/camera/hand-over", {"give": True}),
+    "add_note": ("POST", "/api/runs/r1/notes", {"text": "windy"}),
     "take": ("POST", "/api/resources/ugv1/camera/take", None),
     "give_back": ("POST", "/api/resources/ugv1/camera/give-back", None),
 }
@@ -78,6 +81,8 @@ SENT = {
     "entry": "s1",
     "alert": "a1",
     "owner": "otto",
+    "give": True,
+    "text": "windy",
     "by": "a commander",
 }
 """What the requests of `COMMANDS` say, by the parameter of the operation."""
@@ -91,6 +96,8 @@ QUERIES = {
     "prompts": "/api/prompts",
     "incidents": "/api/incidents",
     "alerts": "/api/alerts",
+    "operators": "/api/operators",
+    "control_requests": "/api/operators",
     "holders": "/api/resources",
     "holder_labels": "/api/resources",
     "unavailable": "/api/resources",
@@ -102,6 +109,8 @@ QUERIES = {
     "geometry_versions": "/api/geometries/{name}/versions",
 }
 NOT_SERVED = {
+    "announce_presence": "the WebSocket of a page announces its user",
+    "end_presence": "the WebSocket of a page announces its user",
     "approval": "GET /api/missions/{name}/approval is of a mission of the server's folder",
     "approve": "POST /api/missions/{name}/approval",
     "withdraw_approval": "POST /api/missions/{name}/approval/withdraw",
@@ -155,6 +164,7 @@ def app(control: Mock) -> FastAPI:
         schedule.router(control, Mock()),
         incidents.router(control),
         alerts.router(control),
+        people.router(control),
         standbys.router(Standbys(control)),
     )
 

@@ -14,6 +14,7 @@ from typing import Any
 import msgspec
 
 from m2pem.api import (
+    PRESENCE_EVERY_S,
     SCHEDULE,
     Alert,
     BehaviorState,
@@ -79,6 +80,28 @@ class Hub(Listener):
             tasks.create_task(self.fleet.follow(), name="web: telemetry")
             tasks.create_task(self._pace(), name="web: frames")
             tasks.create_task(self.standbys.run(), name="web: standbys")
+            tasks.create_task(self._announce_presence(), name="web: presence")
+
+    async def _announce_presence(self) -> None:
+        while True:
+            for viewer in list(self.viewers):
+                await self._present(viewer)
+            await asyncio.sleep(PRESENCE_EVERY_S)
+
+    async def _present(self, viewer: Viewer) -> None:
+        if viewer.person is None:
+            return
+        run = viewer.live.view.run if viewer.live is not None else ""
+        role, name = str(viewer.person.role), viewer.person.name
+        with suppress(M2pemError):
+            await self._control.announce_presence(
+                viewer.id, unit="page", role=role, run=run, by=name
+            )
+
+    async def left(self, viewer: Viewer) -> None:
+        """A browser is not connected any more."""
+        with suppress(M2pemError):
+            await self._control.end_presence(viewer.id)
 
     async def _follow(self) -> None:
         while True:
@@ -101,6 +124,7 @@ class Hub(Listener):
             live.begin_changes()
         viewer.unsent = Unsent()
         viewer.watch(live)
+        await self._present(viewer)
 
     # --- at once --------------------------------------------------------------------------------
 
@@ -146,6 +170,10 @@ class Hub(Listener):
     def shared_space_changed(self) -> None:
         """Send at once that shared space is to be read again."""
         self._send_to_all(messages.shared_space_changed())
+
+    def operators_changed(self) -> None:
+        """Send at once that operators are to be read again."""
+        self._send_to_all(messages.operators_changed())
 
     def announce(self, text: str) -> None:
         """Send a text to all operators."""

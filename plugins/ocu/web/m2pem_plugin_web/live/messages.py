@@ -99,6 +99,11 @@ def shared_space_changed() -> dict[str, Any]:
     return {"type": "shared_space"}
 
 
+def operators_changed() -> dict[str, Any]:
+    """Return the message that operators are to be read again: `GET /api/operators`."""
+    return {"type": "operators"}
+
+
 def alive() -> dict[str, Any]:
     """Return the message that an answer takes longer."""
     return {"type": "alive"}

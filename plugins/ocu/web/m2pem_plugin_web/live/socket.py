@@ -76,7 +76,7 @@ def router(hub: Hub, entry: Entry) -> APIRouter:
         if len(hub.viewers) >= MOST_VIEWERS:
             await socket.close(FULL, "too many pages are open")
             return
-        viewer, key = Viewer(), key_of(socket)
+        viewer, key = Viewer(person), key_of(socket)
         hub.viewers.add(viewer)
         try:
             await converse(socket, hub, viewer, lambda: entry.person(socket.cookies, key) == person)
@@ -84,6 +84,7 @@ def router(hub: Hub, entry: Entry) -> APIRouter:
             await _close(socket, leave)
         finally:
             hub.viewers.discard(viewer)
+            await hub.left(viewer)
 
     return routes
 

@@ -7,8 +7,10 @@ bounded by the size of the mission and the fleet.
 import asyncio
 from collections import deque
 from typing import Any
+from uuid import uuid4
 
 from m2pem.api.run_view import NEWEST, Place
+from m2pem_plugin_web.access.roles import Person
 from m2pem_plugin_web.live.live_run import LiveRun
 
 WINDOW = 2
@@ -49,9 +51,11 @@ class Unsent:
 
 
 class Viewer:
-    """The connection to a browser. Times are of the event loop's clock, in seconds."""
+    """The connection to a browser of a person. Times are of the event loop's clock, in seconds."""
 
-    def __init__(self) -> None:
+    def __init__(self, person: Person | None = None) -> None:
+        self.person = person
+        self.id = f"page-{uuid4()}"
         self.live: LiveRun | None = None
         self.watches = False
         """Whether the browser has sent a request."""
