@@ -41,7 +41,8 @@ def acknowledge(
 ) -> None:
     """Note that you have seen alerts.
 
-    They call no operator any more. What was said once is over then. What is still so, such as a lost link, stays in the list.
+    They call no operator any more. What was said once is over then. What is still so, such as a
+    lost link, stays in the list.
     """
     if everything == bool(alert_ids):
         raise click.UsageError("name alerts, or give --all")
