@@ -196,3 +196,22 @@ async def test_a_file_is_looked_at_taken_and_exported(desk: Desk) -> None:
     assert routes["route_alpha"]["geometry"]["coordinates"][1] == [-77.3182, 38.1085, 12]
     assert "route_bravo" in routes  # the fleet's
     assert (await given.value).suggested_filename == "taken.geojson"
+
+
+async def test_a_rehearsal_of_the_draft_is_played_on_the_map(desk: Desk) -> None:
+    page = await desk.edit(tab="Run")
+    await page.get_by_role("button", name="Rehearse").click()
+    outcome = page.get_by_role("region", name="What came of it")
+    await outcome.get_by_role("button", name="Play on the map").click()
+    await expect(plan(page).locator(".vehicle")).not_to_have_count(0)
+    await expect(page.locator(".m2-rehearsed").first).to_be_attached()
+    await plan(page).get_by_role("button", name="Pause").click()
+    await plan(page).get_by_label("Position", exact=True).fill("40")
+    eyes = Accessibility(page)
+    await eyes.look("rehearsal on the map")
+    eyes.assert_well()
+    await picture(page, "rehearsed_on_map")
+    assert page.url.endswith("/missions/vignette1")
+    await plan(page).get_by_role("button", name="End of the rehearsal on the map").click()
+    await expect(plan(page).locator(".vehicle")).to_have_count(0)
+    await expect(page.locator(".m2-rehearsed")).to_have_count(0)

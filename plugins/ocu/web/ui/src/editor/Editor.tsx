@@ -80,6 +80,14 @@ function Workplace({ work, fail }: WorkplaceProps) {
     resized.observe(canvas.current);
     return () => resized.disconnect();
   }, [work]);
+  const showsMap = session.plan.isShown.value;
+  const sheets = useRef(showsMap);
+  useEffect(() => {
+    // The diagram has another room now.
+    if (sheets.current === showsMap) return;
+    sheets.current = showsMap;
+    requestAnimationFrame(() => session.fit());
+  }, [showsMap]);
   useEffect(() => followKeys(work), [work]);
   useEffect(() => {
     // Somebody may have drawn a route or area on the map in the meantime.
@@ -120,13 +128,13 @@ function Workplace({ work, fail }: WorkplaceProps) {
         <div class="m2-drawing">
           <h2 class="m2-hidden">{words.canvas}</h2>
           <DiagramTabs session={session} />
-          <div class={`m2-sheets${session.plan.isShown.value ? " m2-with-map" : ""}`}>
+          <div class={`m2-sheets${showsMap ? " m2-with-map" : ""}`}>
             <Split
               name="editor-map"
               direction="row"
               initial={46}
               label={strings.plan.resize}
-              alone={!session.plan.isShown.value}
+              alone={!showsMap}
             >
               <div
                 id="m2-canvas"
@@ -136,7 +144,7 @@ function Workplace({ work, fail }: WorkplaceProps) {
                 aria-label={words.canvas}
                 onKeyDown={(event) => stepThrough(session, event)}
               />
-              {session.plan.isShown.value && <MapPanel editor={session} />}
+              {showsMap && <MapPanel editor={session} />}
             </Split>
           </div>
         </div>

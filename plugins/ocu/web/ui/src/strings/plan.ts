@@ -59,6 +59,8 @@ export const plan = {
   dragVertex: "Drag to move; right click (long press) deletes it",
   dragPoint: "Drag to move",
   dragAll: "Drag to move all of it",
+  play: "Play on the map",
+  endRehearsal: "End of the rehearsal on the map",
   picking: "Click what “{label}” shall be, or draw it.",
   pickingPlace: "Click the place or point for “{label}”.",
   pick: "Pick on the map",

@@ -12,6 +12,7 @@ import { DraftForm } from "./DraftForm";
 import { exportAs, FORMATS, readFile } from "./files";
 import { GeometryForm } from "./GeometryForm";
 import { IncomingForm } from "./IncomingForm";
+import { RehearsalPlayer } from "./RehearsalPlayer";
 import { colourOf } from "./colours";
 import { PlanMap } from "./planMap";
 import "./plan.css";
@@ -119,6 +120,14 @@ export function MapPanel({ editor }: { editor: EditorContext }) {
       <Tools editor={editor} take={take} fit={() => view.current?.fit()} />
       <Picks editor={editor} />
       <div ref={host} class="map" role="application" aria-label={words.label} />
+      {plan.rehearsal.value && (
+        <RehearsalPlayer
+          key={plan.rehearsal.value.id}
+          editor={editor}
+          rehearsal={plan.rehearsal.value}
+          map={() => view.current}
+        />
+      )}
       {isOver.value && <p class="plan-drop">{words.dropHint}</p>}
       {draft && (
         <DraftForm

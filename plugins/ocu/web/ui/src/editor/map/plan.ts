@@ -2,7 +2,7 @@
 // or point is a step of the diagram's undo and redo.
 import { computed, signal, type ReadonlySignal } from "@preact/signals";
 import { remember, remembered } from "../../shared/memory";
-import type { Geometry } from "../../shared/types";
+import type { Geometry, RunSummary } from "../../shared/types";
 import { draftOf, emptyDraft, featureOf, type Draft, type Kind } from "../../map/draft";
 import { putGeometries, removeGeometry, renameUses, type NamedFeature } from "../moddle/geometries";
 import type { ModdleElement } from "../moddle/moddle";
@@ -26,6 +26,11 @@ export interface Incoming {
   problems: readonly string[];
 }
 
+export interface PlayedRehearsal {
+  id: string;
+  summary: RunSummary;
+}
+
 export class MapPlan {
   readonly isShown = signal(remembered("editor-map", false));
   /** The geometry that is looked at, by its name. */
@@ -34,6 +39,8 @@ export class MapPlan {
   readonly draft = signal<Draft | null>(null);
   readonly picking = signal<Picking | null>(null);
   readonly incoming = signal<Incoming | null>(null);
+  /** Played on the map. */
+  readonly rehearsal = signal<PlayedRehearsal | null>(null);
   readonly commands: ReadonlySignal<readonly MapCommand[]>;
 
   constructor(private readonly editor: EditorContext) {
@@ -46,7 +53,16 @@ export class MapPlan {
   show(isShown: boolean): void {
     this.isShown.value = isShown;
     remember("editor-map", isShown);
-    if (!isShown) this.cancel();
+    if (isShown) return;
+    this.cancel();
+    this.rehearsal.value = null;
+  }
+
+  play(rehearsal: PlayedRehearsal): void {
+    this.show(true);
+    this.cancel();
+    this.selected.value = "";
+    this.rehearsal.value = rehearsal;
   }
 
   cancel(): void {

@@ -14,6 +14,7 @@ import {
 } from "../../map/draft";
 import { distance_m, legs_m, middleOf, writtenLength } from "../../map/measure";
 import { snapped } from "../../map/snap";
+import { VehicleLayer } from "../../operate/map/vehicleLayer";
 import type { Fleet, Geometry } from "../../shared/types";
 import { strings } from "../../strings";
 import type { MapCommand } from "./commands";
@@ -52,6 +53,8 @@ const NAMED_UNUSED_PX = 220;
 const NEAR_PX = 4;
 
 export class PlanMap {
+  /** Of a rehearsal that is played. */
+  readonly vehicles: VehicleLayer;
   private readonly map: L.Map;
   private readonly geometries = L.featureGroup();
   private readonly badges = L.layerGroup();
@@ -76,6 +79,7 @@ export class PlanMap {
     for (const layer of [this.geometries, this.preview, this.badges, this.handles]) {
       layer.addTo(this.map);
     }
+    this.vehicles = new VehicleLayer(this.map, fleet, () => undefined);
     const style = { color: DRAFT, weight: 2, dashArray: "2 6", interactive: false };
     this.band = L.polyline([], style).addTo(this.map);
     this.map.on("click", ({ latlng }) => this.click(latlng));

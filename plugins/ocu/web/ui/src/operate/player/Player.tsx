@@ -20,13 +20,20 @@ const ofSlider = (value: number): number => {
   return near ?? Number(exact.toPrecision(2));
 };
 
-export function Player({ scene }: { scene: ReplayScene }) {
+export interface PlayerProps {
+  scene: ReplayScene;
+  /** It is a part of another page, whose keys and address mean other things. */
+  embedded?: boolean;
+}
+
+export function Player({ scene, embedded = false }: PlayerProps) {
   const playing = scene.playing.value;
   const time = scene.time.value;
   const end = scene.end.value;
   const speed = scene.speed.value;
 
   useEffect(() => {
+    if (embedded) return undefined;
     const press = (event: KeyboardEvent) => {
       if (event.ctrlKey || event.altKey || event.metaKey || isTyping(document.activeElement))
         return;
@@ -37,11 +44,11 @@ export function Player({ scene }: { scene: ReplayScene }) {
     };
     addEventListener("keydown", press);
     return () => removeEventListener("keydown", press);
-  }, [scene]);
+  }, [scene, embedded]);
 
   // Where it rests, not each moment that passes.
   useEffect(() => {
-    if (playing) return;
+    if (playing || embedded) return;
     const timer = setTimeout(() => keepPosition(time), 400);
     return () => clearTimeout(timer);
   }, [playing, time]);

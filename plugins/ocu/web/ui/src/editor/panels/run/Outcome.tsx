@@ -35,6 +35,13 @@ export function Outcome({ editor, id, summary, spans, unsaid }: OutcomeProps) {
         <a class="m2r-watch" href={`/rehearsals/${encodeURIComponent(id)}`} target="_blank">
           {words.watch}
         </a>
+        <button
+          type="button"
+          class="secondary m2r-play"
+          onClick={() => editor.plan.play({ id, summary })}
+        >
+          {strings.plan.play}
+        </button>
       </div>
       <Explained editor={editor} summary={summary} unsaid={unsaid} />
       {spans.length > 0 && <Bars editor={editor} spans={spans} end={seconds} />}
