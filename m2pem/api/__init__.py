@@ -173,6 +173,14 @@ if TYPE_CHECKING:
     from m2pem.geo.polyline import Polyline, Segment
     from m2pem.geo.survey_pattern import Surveyor, SurveyPattern, SurveyRoute, survey_routes
     from m2pem.geo.survey_tracks import SurveyTracks
+    from m2pem.geo.terrain import (
+        TERRAIN_FOLDER,
+        ProfilePoint,
+        Terrain,
+        TerrainError,
+        lowest,
+        profile,
+    )
     from m2pem.mission.behavior import BehaviorType, Decision
     from m2pem.mission.catalogue import (
         BehaviorSpec,
@@ -281,6 +289,7 @@ _MODULES = {
     "m2pem.geo.polyline": "Polyline Segment",
     "m2pem.geo.survey_pattern": "SurveyPattern SurveyRoute Surveyor survey_routes",
     "m2pem.geo.survey_tracks": "SurveyTracks",
+    "m2pem.geo.terrain": ("ProfilePoint TERRAIN_FOLDER Terrain TerrainError lowest profile"),
     "m2pem.suggestions": "did_you_mean",
     "m2pem.units": "US_PER_S Dimension UnitError quantity",
 }
@@ -461,6 +470,12 @@ __all__ = [
     "Surveyor",
     "image_plan",
     "lasts_s",
+    "lowest",
+    "profile",
+    "ProfilePoint",
+    "TERRAIN_FOLDER",
+    "Terrain",
+    "TerrainError",
     "survey_routes",
     "SystemClock",
     "TeamMemberState",

@@ -36,6 +36,7 @@ from m2pem_plugin_web.rest import (
     standbys,
     steering,
     survey_patterns,
+    terrain,
     tracks,
     verifications,
 )
@@ -75,6 +76,7 @@ def routers_of(
         geometry_files.router(control),
         geometries.router(control),
         survey_patterns.router(control),
+        terrain.router(control, settings.terrain),
         standbys.router(hub.standbys),
         map_tiles.router(tiles),
         socket.router(hub, entry),

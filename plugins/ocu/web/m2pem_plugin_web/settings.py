@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from m2pem.api import TERRAIN_FOLDER
 from m2pem.errors import PluginError
 
 HOST = "M2PEM_WEB_HOST"
@@ -46,6 +47,7 @@ class Settings:
     certificate: Path | None = None
     key: Path | None = None
     tiles: Path | None = None
+    terrain: Path | None = None
 
     @property
     def scheme(self) -> str:
@@ -83,6 +85,7 @@ def read_settings(environment: Mapping[str, str] = os.environ) -> Settings:
         certificate=path(CERTIFICATE),
         key=path(KEY),
         tiles=path(TILES),
+        terrain=path(TERRAIN_FOLDER),
     )
     _refuse_what_is_unsafe(settings)
     return settings
@@ -131,6 +134,8 @@ def _refuse_what_is_unsafe(settings: Settings) -> None:
     ):
         if path is not None and not path.is_file():
             raise SettingError(f"{name}={path}: the file does not exist")
+    if settings.terrain is not None and not settings.terrain.is_dir():
+        raise SettingError(f"{TERRAIN_FOLDER}={settings.terrain}: the folder does not exist")
     if is_loopback(settings.host):
         return
     missing = [
