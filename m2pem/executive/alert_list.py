@@ -100,7 +100,9 @@ class AlertList:
         kept = await self._journal.alerts(self._fleet)
         if not kept:
             return
-        over = {each.run for each in await self._journal.runs() if each.outcome or each.gone}
+        over = {
+            each.run for each in await self._journal.runs(files=False) if each.outcome or each.gone
+        }
         for number, text in kept.items():
             self._last = max(self._last, number)
             try:

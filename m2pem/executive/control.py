@@ -558,8 +558,9 @@ class Control:
 
     async def runs(self) -> Sequence[RunSummary]:
         """Every run of the journal but those that it has lost whole."""
-        lines = await self._supervisor.journal.runs()
-        return [summary(line) for line in lines if not line.gone]
+        lines = await self._supervisor.journal.runs(files=False)
+        # Of ten thousand runs it would keep the event loop for a while.
+        return await asyncio.to_thread(lambda: [summary(line) for line in lines if not line.gone])
 
     def prompts(self) -> Sequence[OpenPrompt]:
         """The prompts that are open."""

@@ -4,7 +4,7 @@
 """
 
 from collections.abc import AsyncIterator, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Protocol
@@ -38,6 +38,10 @@ class RunHeader:
     speed: float = 1.0
     created_us: int = 0
     library: tuple[Source, ...] = ()
+
+    def without_files(self) -> "RunHeader":
+        """The same without the files of the mission and without the fleet."""
+        return replace(self, mission=b"", fleet=b"", library=())
 
 
 @dataclass(frozen=True, slots=True)
@@ -276,8 +280,12 @@ class Journal(Protocol):
         """
         ...
 
-    async def runs(self) -> Sequence[RunInfo]:
-        """Return every run, in order of its number."""
+    async def runs(self, *, files: bool = True) -> Sequence[RunInfo]:
+        """Return every run, in order of its number.
+
+        `files`: with the files of its mission and its fleet; without, they are empty in the
+        headers, and ten thousand runs are read in a moment.
+        """
         ...
 
     async def delete(self, runs: Sequence[str], *, by: str, unended: bool = False) -> None:

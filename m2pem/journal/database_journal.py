@@ -50,6 +50,9 @@ T = TypeVar("T")
 
 _BATCH_BYTES = 1 << 20
 _POSITION_COLUMNS = 11
+
+_WITH_FILES = "mission_name, mission, process, fleet, simulated, speed, created_us, library"
+_WITHOUT_FILES = "mission_name, NULL, process, NULL, simulated, speed, created_us, NULL"
 NO_HEADER = RunHeader("", b"", "")
 """The header of a run that the journal has lost whole."""
 
@@ -301,16 +304,16 @@ class DatabaseJournal(ABC):
     def _damaged(self, number: int, seq: int, why: str) -> JournalError:
         return JournalError(f"{self._place}: {run_id(number)}, record {seq}: {why}")
 
-    async def runs(self) -> Sequence[RunInfo]:
+    async def runs(self, *, files: bool = True) -> Sequence[RunInfo]:
         """See `Journal.runs`."""
-        return await self._read(self._infos)
+        return await self._read(lambda: self._infos(_WITH_FILES if files else _WITHOUT_FILES))
 
-    def _infos(self) -> list[RunInfo]:
+    def _infos(self, columns: str) -> list[RunInfo]:
         marks = self._marks.read()
         with self._snapshot():
             lost = find_losses(self._reading, marks)
             rows = self._reading.execute(
-                "SELECT * FROM standings JOIN runs USING (run) ORDER BY run"
+                f"SELECT standings.*, {columns} FROM standings JOIN runs USING (run) ORDER BY run"
             ).fetchall()
             driven = self._driven([row[0] for row in rows])
         infos = {row[0]: _info(row, row[0] in driven, lost.pop(row[0], None)) for row in rows}
@@ -510,13 +513,13 @@ def _info(row: Sequence[Any], driven: bool, loss: Loss | None) -> RunInfo:
     ]
     header = RunHeader(
         mission_name=mission_name,
-        mission=mission,
+        mission=mission or b"",
         process=process,
-        fleet=fleet,
+        fleet=fleet or b"",
         simulated=bool(simulated),
         speed=speed,
         created_us=created_us,
-        library=decode_library(library),
+        library=decode_library(library) if library else (),
     )
     position = position_from(row[:_POSITION_COLUMNS])
     return position.info(run_id(row[0]), header, driven, loss)

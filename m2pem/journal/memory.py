@@ -186,11 +186,15 @@ class MemoryJournal:
         first = bisect_right(found.entries, after_seq, key=attrgetter("seq"))
         return found.entries[first : first + _BATCH_ENTRIES]
 
-    async def runs(self) -> Sequence[RunInfo]:
+    async def runs(self, *, files: bool = True) -> Sequence[RunInfo]:
         """See `Journal.runs`."""
         self._check_open()
         return [
-            found.position.info(run_id(number), found.header, found.driven)
+            found.position.info(
+                run_id(number),
+                found.header if files else found.header.without_files(),
+                found.driven,
+            )
             for number, found in self._runs.items()
         ]
 

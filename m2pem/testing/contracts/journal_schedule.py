@@ -1,6 +1,7 @@
 """The contract of journals: the schedule of missions."""
 
 import asyncio
+from dataclasses import replace
 
 import pytest
 
@@ -176,6 +177,15 @@ class JournalSchedule(JournalFixtures):
             await journal.hold_schedule(PLAN.fleet, None)
             await journal.hold_schedule("another", Hold("anna", "rain", 8))
             assert await journal.create(HEADER, started) == "r1"
+
+    async def test_runs_are_listed_without_their_files(self, open_journal: OpenJournal) -> None:
+        """All else of them is the same."""
+        async with opened(open_journal) as journal:
+            await journal.create(HEADER)
+            (whole,) = await journal.runs()
+            (line,) = await journal.runs(files=False)
+            assert line.header == whole.header.without_files()
+            assert replace(line, header=whole.header) == whole
 
     async def test_alerts_are_kept_for_each_fleet_by_their_numbers(
         self, open_journal: OpenJournal

@@ -30,6 +30,7 @@ from m2pem_plugin_web.rest import (
     missions,
     people,
     rehearsals,
+    run_pages,
     runs,
     schedule,
     session,
@@ -57,6 +58,7 @@ def routers_of(
     return [
         session.router(control, settings, entry, tiles.pictured if tiles is not None else None),
         runs.router(control, folder),
+        run_pages.router(control),
         schedule.router(control, folder),
         tracks.router(control, recorder),
         steering.router(control, hub),

@@ -1,66 +1,292 @@
-// What is and was run, the newest first.
-import { useState } from "preact/hooks";
+// What is and was run: filtered, sorted, by pages, and several of them paused or stopped together.
+import { useEffect, useRef, useState } from "preact/hooks";
+import { get } from "../shared/api";
+import { vehicles } from "../shared/executive";
 import { go } from "../shared/router";
 import { moment } from "../shared/moments";
 import { titleOf } from "../shared/runs";
-import type { RunLine } from "../shared/types";
-import { fill, strings } from "../strings";
+import { may } from "../shared/session";
+import type { RunLine, RunStatus } from "../shared/types";
+import { counted, fill, strings } from "../strings";
+import { BulkDialog } from "./BulkDialog";
 import { Link } from "./Link";
-import { useList } from "./useList";
+import { useIncidents, type IncidentLine } from "./incidents";
+import {
+  ALL_RUNS,
+  mayDo,
+  PAGE,
+  pathOf,
+  sortedBy,
+  type Deed,
+  type RunQuery,
+  type SortedBy,
+} from "./runQuery";
 
 const words = strings.home;
-const SHOWN = 12;
-const GOING_ON = new Set(["running", "paused"]);
+const texts = strings.runs;
+const EVERY_MS = 5000;
+const TYPED_MS = 250;
+const STATUSES = Object.keys(strings.operate.run.status) as RunStatus[];
+const TIMES = [
+  [0, texts.anyTime],
+  [3600, texts.lastHour],
+  [86_400, texts.lastDay],
+  [7 * 86_400, texts.lastWeek],
+] as const;
+const DEEDS: readonly Deed[] = ["pause", "resume", "stop"];
+
+interface RunsPage {
+  runs: RunLine[];
+  total: number;
+  all: number;
+}
 
 export function RunList() {
-  const { lines, failed } = useList<RunLine>("/runs");
-  const [all, setAll] = useState(false);
-  const sorted = [...(lines ?? [])].sort(
-    (a, b) =>
-      Number(GOING_ON.has(b.status)) - Number(GOING_ON.has(a.status)) ||
-      b.began_us - a.began_us,
+  const [query, setQuery] = useState<RunQuery>(ALL_RUNS);
+  const [selected, setSelected] = useState<ReadonlyMap<string, RunLine>>(new Map());
+  const [asked, setAsked] = useState<Deed | null>(null);
+  const { page, failed, refresh } = usePage(query);
+  const incidents = useIncidents();
+  // What was typed is asked for later: it must not bring back the filters of before.
+  const change = (more: Partial<RunQuery>) => setQuery((now) => ({ ...now, page: 0, ...more }));
+  const lines = page?.runs ?? [];
+  const total = page?.total ?? 0;
+  const chosen = [...selected.values()].map(
+    (run) => lines.find((each) => each.run === run.run) ?? run,
   );
-  const shown = all ? sorted : sorted.slice(0, SHOWN);
+  const select = (run: RunLine, on: boolean) => {
+    const next = new Map(selected);
+    if (on) next.set(run.run, run);
+    else next.delete(run.run);
+    setSelected(next);
+  };
+  const steers = may("operator");
+  const selectable = lines.filter(({ status }) => mayDo("stop", status));
   return (
     <section aria-labelledby="runs-head">
       <div class="home-head">
-        <h1 id="runs-head">{words.runs}</h1>
+        <h1 id="runs-head">{texts.title}</h1>
+        <Filters query={query} change={change} />
       </div>
       {failed && <p role="alert">{words.failed}</p>}
-      {lines?.length === 0 && <p class="home-none">{words.noRuns}</p>}
-      {shown.length > 0 && (
+      {page?.all === 0 && <p class="home-none">{texts.none}</p>}
+      {page && page.all > 0 && total === 0 && <p class="home-none">{texts.noneFound}</p>}
+      {steers && chosen.length > 0 && (
+        <div class="home-bulk" role="group" aria-label={counted(texts.selected, chosen.length)}>
+          <span role="status">{counted(texts.selected, chosen.length)}</span>
+          {DEEDS.map((deed) => (
+            <button
+              key={deed}
+              type="button"
+              class="secondary"
+              disabled={!chosen.some(({ status }) => mayDo(deed, status))}
+              onClick={() => setAsked(deed)}
+            >
+              {texts[deed]}
+            </button>
+          ))}
+          <button type="button" class="plain" onClick={() => setSelected(new Map())}>
+            {texts.clear}
+          </button>
+        </div>
+      )}
+      {lines.length > 0 && (
         <div class="home-scroll">
           <table class="home-table">
             <thead>
               <tr>
+                {steers && (
+                  <th scope="col" class="home-select">
+                    <input
+                      type="checkbox"
+                      aria-label={texts.selectAll}
+                      disabled={selectable.length === 0}
+                      checked={
+                        selectable.length > 0 && selectable.every(({ run }) => selected.has(run))
+                      }
+                      onChange={(event) => {
+                        const next = new Map(selected);
+                        for (const run of selectable)
+                          if (event.currentTarget.checked) next.set(run.run, run);
+                          else next.delete(run.run);
+                        setSelected(next);
+                      }}
+                    />
+                  </th>
+                )}
                 <th scope="col">{words.run}</th>
-                <th scope="col">{words.mission}</th>
-                <th scope="col">{words.status}</th>
-                <th scope="col">{words.started}</th>
-                <th scope="col">{words.took}</th>
+                <Sorted by="mission" query={query} sort={setQuery} name={words.mission} />
+                <Sorted by="status" query={query} sort={setQuery} name={words.status} />
+                <Sorted by="began" query={query} sort={setQuery} name={words.started} />
+                <Sorted by="took" query={query} sort={setQuery} name={words.took} />
               </tr>
             </thead>
             <tbody>
-              {shown.map((run) => (
-                <RunRow key={run.run} run={run} />
+              {lines.map((run) => (
+                <RunRow
+                  key={run.run}
+                  run={run}
+                  incidents={incidents.filter((each) => each.run === run.run)}
+                  selected={steers ? selected.has(run.run) : null}
+                  select={(on) => select(run, on)}
+                />
               ))}
             </tbody>
           </table>
         </div>
       )}
-      {sorted.length > shown.length && (
-        <button type="button" class="secondary" onClick={() => setAll(true)}>
-          {fill(words.allRuns, { count: sorted.length })}
-        </button>
+      {total > PAGE && <Pages query={query} total={total} turn={(to) => change({ page: to })} />}
+      {asked && (
+        <BulkDialog
+          deed={asked}
+          runs={chosen.filter(({ status }) => mayDo(asked, status))}
+          close={() => {
+            setAsked(null);
+            setSelected(new Map());
+            void refresh();
+          }}
+        />
       )}
     </section>
   );
 }
 
-function RunRow({ run }: { run: RunLine }) {
+interface FiltersProps {
+  query: RunQuery;
+  change(more: Partial<RunQuery>): void;
+}
+
+function Filters({ query, change }: FiltersProps) {
+  const typing = useRef<ReturnType<typeof setTimeout>>();
+  return (
+    <div class="home-filters" role="search">
+      <input
+        type="search"
+        aria-label={texts.find}
+        placeholder={texts.find}
+        defaultValue={query.text}
+        onInput={(event) => {
+          const text = event.currentTarget.value;
+          clearTimeout(typing.current);
+          typing.current = setTimeout(() => change({ text }), TYPED_MS);
+        }}
+      />
+      <select
+        aria-label={texts.status}
+        value={query.status}
+        onChange={(event) => change({ status: event.currentTarget.value })}
+      >
+        <option value="">{texts.anyStatus}</option>
+        <option value="goingOn">{texts.goingOn}</option>
+        <option value="ended">{texts.ended}</option>
+        {STATUSES.map((each) => (
+          <option key={each} value={each}>
+            {strings.operate.run.status[each]}
+          </option>
+        ))}
+      </select>
+      <select
+        aria-label={texts.vehicle}
+        value={query.vehicle}
+        onChange={(event) => change({ vehicle: event.currentTarget.value })}
+      >
+        <option value="">{texts.anyVehicle}</option>
+        {Object.keys(vehicles.value)
+          .sort()
+          .map((each) => (
+            <option key={each} value={each}>
+              {each}
+            </option>
+          ))}
+      </select>
+      <select
+        aria-label={texts.began}
+        value={String(query.within_s)}
+        onChange={(event) => change({ within_s: Number(event.currentTarget.value) })}
+      >
+        {TIMES.map(([seconds, name]) => (
+          <option key={seconds} value={String(seconds)}>
+            {name}
+          </option>
+        ))}
+      </select>
+    </div>
+  );
+}
+
+interface SortedProps {
+  by: SortedBy;
+  query: RunQuery;
+  name: string;
+  sort(query: RunQuery): void;
+}
+
+function Sorted({ by, query, name, sort }: SortedProps) {
+  const isIt = query.sort === by;
+  const now = isIt ? (query.descending ? "descending" : "ascending") : "none";
+  return (
+    <th scope="col" aria-sort={now}>
+      <button type="button" class="home-sort" onClick={() => sort(sortedBy(query, by))}>
+        {name}
+        <span aria-hidden="true">{isIt ? (query.descending ? " ▼" : " ▲") : ""}</span>
+      </button>
+    </th>
+  );
+}
+
+interface PagesProps {
+  query: RunQuery;
+  total: number;
+  turn(page: number): void;
+}
+
+function Pages({ query: { page }, total, turn }: PagesProps) {
+  const from = page * PAGE + 1;
+  const to = Math.min(total, from + PAGE - 1);
+  return (
+    <div class="home-pages">
+      <button type="button" class="secondary" disabled={page === 0} onClick={() => turn(page - 1)}>
+        {texts.previous}
+      </button>
+      <span role="status">
+        {fill(texts.page, { from, to, total: total.toLocaleString() })}
+      </span>
+      <button
+        type="button"
+        class="secondary"
+        disabled={to >= total}
+        onClick={() => turn(page + 1)}
+      >
+        {texts.next}
+      </button>
+    </div>
+  );
+}
+
+interface RunRowProps {
+  run: RunLine;
+  incidents: readonly IncidentLine[];
+  /** null: it cannot be. */
+  selected: boolean | null;
+  select(on: boolean): void;
+}
+
+function RunRow({ run, incidents, selected, select }: RunRowProps) {
   const path = `/runs/${encodeURIComponent(run.run)}`;
   return (
-    <tr onDblClick={() => go(path)}>
+    <tr onDblClick={() => go(path)} aria-selected={selected || undefined}>
+      {selected !== null && (
+        <td class="home-select">
+          {mayDo("stop", run.status) && (
+            <input
+              type="checkbox"
+              aria-label={fill(texts.select, { run: run.run })}
+              checked={selected}
+              onChange={(event) => select(event.currentTarget.checked)}
+            />
+          )}
+        </td>
+      )}
       <td>
         <Link to={path}>{run.run}</Link>
       </td>
@@ -72,11 +298,45 @@ function RunRow({ run }: { run: RunLine }) {
         <span class={`home-chip home-run-${run.status}`} title={run.detail || undefined}>
           {strings.operate.run.status[run.status]}
         </span>
+        {incidents.length > 0 && (
+          <span
+            class="home-chip home-chip-bad"
+            title={incidents.map(({ task, code }) => `${task}: ${code}`).join("; ")}
+          >
+            {counted(texts.incidents, incidents.length)}
+          </span>
+        )}
       </td>
       <td class="home-when">{moment(run.began_us / 1000)}</td>
       <td>{run.took_s === null ? "–" : duration(run.took_s)}</td>
     </tr>
   );
+}
+
+function usePage(query: RunQuery) {
+  const [page, setPage] = useState<RunsPage | null>(null);
+  const [failed, setFailed] = useState(false);
+  const newest = useRef(0);
+  const refresh = async () => {
+    const number = ++newest.current;
+    try {
+      const found = await get<RunsPage>(pathOf(query, Date.now()));
+      // Answers may come in another order than they were asked for.
+      if (number !== newest.current) return;
+      setPage(found);
+      setFailed(false);
+    } catch {
+      if (number === newest.current) setFailed(true);
+    }
+  };
+  useEffect(() => {
+    void refresh();
+    const timer = setInterval(() => {
+      if (!document.hidden) void refresh();
+    }, EVERY_MS);
+    return () => clearInterval(timer);
+  }, [query]);
+  return { page, failed, refresh };
 }
 
 function duration(seconds: number): string {

@@ -8,6 +8,7 @@ import { home } from "./home";
 import { operate } from "./operate";
 import { plots } from "./plots";
 import { plan } from "./plan";
+import { runs } from "./runs";
 import { begin, run } from "./run";
 import { shell, signIn } from "./shell";
 
@@ -22,6 +23,7 @@ export const strings = {
   verify,
   requirements,
   run,
+  runs,
   begin,
   operate,
   plots,

@@ -1,0 +1,159 @@
+"""/api/run-pages: the runs of the journal by pages, filtered and sorted here."""
+
+import asyncio
+import time
+from collections.abc import Callable, Collection, Iterable, Sequence
+from contextlib import suppress
+from enum import StrEnum
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Query
+from pydantic import BaseModel
+
+from m2pem.api import MissionControl, RunStatus, RunSummary
+from m2pem.errors import M2pemError
+from m2pem_plugin_web.access.permissions import Viewer
+from m2pem_plugin_web.problems import RESPONSES
+from m2pem_plugin_web.rest.models import RunModel, run_model
+
+MOST = 200
+FRESH_S = 1.0
+"""For so long the list of runs that was read serves all pages."""
+
+LARGEST = 2**53 - 1
+GOING_ON = frozenset((RunStatus.RUNNING, RunStatus.PAUSED))
+
+
+class SortedBy(StrEnum):
+    """What runs are sorted by. ACTIVE: those that go on first, then by when they began."""
+
+    ACTIVE = "active"
+    BEGAN = "began"
+    MISSION = "mission"
+    STATUS = "status"
+    TOOK = "took"
+
+
+class RunsPage(BaseModel):
+    """A page. `total`: how many runs are like what was asked for; `all`: how many there are."""
+
+    runs: list[RunModel]
+    total: int
+    all: int
+
+
+class RunIndex:
+    """The runs of the journal, read once a second at most, however many pages are open."""
+
+    def __init__(self, control: MissionControl) -> None:
+        self._control = control
+        self._runs: Sequence[RunSummary] = ()
+        self._read_s = float("-inf")
+        self._reading = asyncio.Lock()
+
+    async def runs(self) -> Sequence[RunSummary]:
+        """Every run."""
+        async with self._reading:
+            if time.monotonic() - self._read_s > FRESH_S:
+                self._runs = await self._control.runs()
+                self._read_s = time.monotonic()
+            return self._runs
+
+
+def _began_us(run: RunSummary) -> int:
+    return run.began_us or run.started_us
+
+
+_KEYS: dict[SortedBy, Callable[[RunSummary], Any]] = {
+    SortedBy.ACTIVE: lambda run: (run.status in GOING_ON, _began_us(run)),
+    SortedBy.BEGAN: _began_us,
+    SortedBy.MISSION: lambda run: (run.mission.lower(), _began_us(run)),
+    SortedBy.STATUS: lambda run: (run.status, _began_us(run)),
+    SortedBy.TOOK: lambda run: (run.took_s if run.took_s is not None else -1, _began_us(run)),
+}
+
+
+def found(
+    runs: Iterable[RunSummary],
+    *,
+    statuses: Collection[RunStatus] = (),
+    text: str = "",
+    of: Collection[str] | None = None,
+    since_us: int = 0,
+    until_us: int = LARGEST,
+    sort: SortedBy = SortedBy.ACTIVE,
+    descending: bool = True,
+) -> list[RunSummary]:
+    """Return the runs that are like this, sorted. `text`: in the id, the mission, the process or
+    the detail. `of`: of these runs alone; None: of all."""
+    words = text.casefold().split()
+
+    def wanted(run: RunSummary) -> bool:
+        if statuses and run.status not in statuses:
+            return False
+        if of is not None and run.run not in of:
+            return False
+        if not since_us <= _began_us(run) <= until_us:
+            return False
+        said = f"{run.run} {run.mission} {run.process} {run.detail}".casefold() if words else ""
+        return all(word in said for word in words)
+
+    return sorted(filter(wanted, runs), key=_KEYS[sort], reverse=descending)
+
+
+def router(control: MissionControl) -> APIRouter:
+    """The route of pages of runs."""
+    routes = APIRouter(prefix="/api/run-pages", tags=["runs"], responses=RESPONSES)
+    index = RunIndex(control)
+
+    async def commanding(resource: str) -> set[str]:
+        """The runs that have a vehicle or payload now."""
+        holders = await control.holders()
+        return {
+            holder.partition(".")[0]
+            for each, holder in holders.items()
+            if each == resource or each.startswith(f"{resource}/")
+        }
+
+    async def model(run: RunSummary) -> RunModel:
+        took_s = None
+        if run.status in GOING_ON:
+            with suppress(M2pemError):  # another executive drives it
+                took_s = await control.mission_time_s(run.run)
+        return run_model(run, took_s)
+
+    @routes.get("")
+    async def page(
+        _: Viewer,
+        status: Annotated[list[RunStatus], Query(max_length=len(RunStatus))] = [],  # noqa: B006
+        text: Annotated[str, Query(max_length=200)] = "",
+        vehicle: Annotated[str, Query(max_length=200)] = "",
+        since_us: Annotated[int, Query(ge=0, le=LARGEST)] = 0,
+        until_us: Annotated[int, Query(ge=0, le=LARGEST)] = LARGEST,
+        sort: SortedBy = SortedBy.ACTIVE,
+        descending: bool = True,
+        offset: Annotated[int, Query(ge=0, le=LARGEST)] = 0,
+        limit: Annotated[int, Query(ge=1, le=MOST)] = 25,
+    ) -> RunsPage:
+        """Runs by pages. `text`: all its words are in the id, mission, process or detail.
+        `vehicle`: only the runs that have it, or a payload on it, now."""
+        of = await commanding(vehicle) if vehicle else None
+        runs = await index.runs()
+        lines = await asyncio.to_thread(
+            found,
+            runs,
+            statuses=frozenset(status),
+            text=text,
+            of=of,
+            since_us=since_us,
+            until_us=until_us,
+            sort=sort,
+            descending=descending,
+        )
+        return RunsPage(
+            runs=[await model(each) for each in lines[offset : offset + limit]],
+            total=len(lines),
+            all=len(runs),
+        )
+
+    return routes

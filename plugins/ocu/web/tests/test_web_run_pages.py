@@ -1,0 +1,97 @@
+"""Runs by pages: filtered, sorted, and fast with ten thousand of them."""
+
+from typing import Any
+from unittest.mock import AsyncMock, Mock
+
+import httpx
+import pytest
+from m2pem_plugin_web.rest import run_pages
+from rest_world import As, app_of
+
+from m2pem.api import MissionControl, RunStatus, RunSummary
+
+MANY = 10_000
+ENDS = (RunStatus.COMPLETED, RunStatus.FAILED, RunStatus.STOPPED)
+
+
+def run_of(number: int) -> RunSummary:
+    """r1 ... r10000: one after the other; the last two go on."""
+    began_us = number * 1_000_000
+    names = ("patrol.bpmn", "survey.bpmn")
+    if number > MANY - 2:
+        return RunSummary(f"r{number}", names[number % 2], "P", RunStatus.RUNNING, began_us)
+    ended_us = began_us + number % 7 * 1_000_000
+    status = ENDS[number % 3]
+    detail = "error ROUTE_BLOCKED" if status is RunStatus.FAILED else ""
+    mission = names[number % 2]
+    return RunSummary(f"r{number}", mission, "P", status, began_us, ended_us, 9, detail)
+
+
+@pytest.fixture(scope="module")
+def control() -> Mock:
+    control = Mock(spec=MissionControl)
+    control.runs = AsyncMock(return_value=[run_of(number) for number in range(1, MANY + 1)])
+    control.mission_time_s = AsyncMock(return_value=4.0)
+    control.holders = AsyncMock(
+        return_value={"uav1": "", "uav1/camera": "r9999.b3", "uav2": "r10000.b1", "uav3": "anna"}
+    )
+    return control
+
+
+async def page(control: Mock, query: str) -> Any:
+    app = app_of(Mock(control=control), run_pages.router(control))
+    transport = httpx.ASGITransport(As(app))
+    async with httpx.AsyncClient(transport=transport, base_url="http://test") as http:
+        answer = await http.get(f"/api/run-pages?{query}")
+    assert answer.is_success, answer.text
+    return answer.json()
+
+
+def ids(found: Any) -> list[str]:
+    return [each["run"] for each in found["runs"]]
+
+
+async def test_a_page_has_those_that_go_on_first_then_the_newest(control: Mock) -> None:
+    found = await page(control, "limit=3")
+    assert ids(found) == ["r10000", "r9999", "r9998"]
+    assert (found["total"], found["all"], found["runs"][0]["took_s"]) == (MANY, MANY, 4.0)
+    assert ids(await page(control, "limit=2&offset=9998")) == ["r2", "r1"]
+    assert ids(await page(control, "offset=10000")) == []
+
+
+@pytest.mark.parametrize(
+    ("query", "total"),
+    [
+        ("status=running", 2),
+        ("status=running&status=failed", 2 + 3333),
+        ("text=SURVEY", 5000),
+        ("text=survey+blocked", 1667),
+        ("text=r9999", 1),
+        ("since_us=5000000&until_us=9000000", 5),
+        ("vehicle=uav1", 1),
+        ("vehicle=uav3", 0),
+        ("text=nowhere", 0),
+    ],
+)
+async def test_runs_are_filtered(control: Mock, query: str, total: int) -> None:
+    found = await page(control, query)
+    assert (found["total"], found["all"]) == (total, MANY)
+
+
+async def test_runs_are_sorted_either_way(control: Mock) -> None:
+    assert ids(await page(control, "sort=began&descending=false&limit=2")) == ["r1", "r2"]
+    took = await page(control, "sort=took&limit=1&status=completed")
+    assert took["runs"][0]["took_s"] == 6.0
+    assert (await page(control, "sort=mission&descending=false&limit=1"))["runs"][0][
+        "mission"
+    ] == "patrol.bpmn"
+
+
+async def test_many_pages_read_the_journal_once(control: Mock) -> None:
+    app = app_of(Mock(control=control), run_pages.router(control))
+    control.runs.reset_mock()
+    transport = httpx.ASGITransport(As(app))
+    async with httpx.AsyncClient(transport=transport, base_url="http://test") as http:
+        for offset in (0, 25, 50):
+            await http.get(f"/api/run-pages?offset={offset}")
+    assert control.runs.await_count == 1
