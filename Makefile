@@ -258,7 +258,7 @@ pictures: npm-packages page ## draw the missions and examples, and the web page,
 	node draw_bpmn.mjs ../../docs/tutorials/patrol ../../docs/tutorials/patrol/*.bpmn && \
 	for example in ../../examples/*/; do node draw_bpmn.mjs "$$example" "$$example"*.bpmn; done
 	@$(BIN)/python -m tools.broken_mission_pictures
-	@M2PEM_PICTURES=1 $(BIN)/pytest --quiet plugins/ocu/web/tests/test_web_mission_drawn.py plugins/ocu/web/tests/test_web_plots.py plugins/ocu/web/tests/test_web_fleet_page.py
+	@M2PEM_PICTURES=1 $(BIN)/pytest --quiet plugins/ocu/web/tests/test_web_mission_drawn.py plugins/ocu/web/tests/test_web_plots.py plugins/ocu/web/tests/test_web_cameras.py plugins/ocu/web/tests/test_web_fleet_page.py
 
 PEERS := .conformance
 

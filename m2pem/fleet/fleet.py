@@ -49,6 +49,27 @@ class LostMemberPolicy(StrEnum):
     CONTINUE = "continue"
 
 
+class VideoKind(StrEnum):
+    """How operator control units get the pictures of a camera."""
+
+    HLS = "hls"
+    WEBRTC = "webrtc"
+    """By WHEP."""
+    MJPEG = "mjpeg"
+    IMAGE = "image"
+    """One picture at a time."""
+
+
+@dataclass(frozen=True, slots=True)
+class Video:
+    """Where the pictures of a camera come from; `every_s`: the time between two that are asked for,
+    of `VideoKind.IMAGE`."""
+
+    url: str
+    kind: VideoKind
+    every_s: float = 1.0
+
+
 @dataclass(frozen=True, slots=True)
 class Payload:
     """A payload mounted on a vehicle. `id` is "vehicle/name". `settings` has the vehicle's
@@ -146,8 +167,8 @@ class Fleet:
     must have approved a mission before it starts; 0: none. `approval_role`: which operators may
     approve; "": all. `control_answer_s`: how long an operator who is asked for a vehicle or payload
     may take to answer; `control_unanswered`: what becomes of it then. `hosts`: the other computers
-    that arbiters run on, by name. `faces`: the settings of each face; no run depends on them, and
-    no journal has them.
+    that arbiters run on, by name. `faces`: the settings of each face; `videos`: of cameras that
+    operators can look through. No run depends on them, and no journal has them.
     """
 
     name: str
@@ -182,6 +203,7 @@ class Fleet:
     control_unanswered: Unanswered = Unanswered.KEEP
     hosts: Mapping[str, Host] = field(default_factory=dict)
     faces: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    videos: Mapping[ResourceId, Video] = field(default_factory=dict)
 
     @property
     def detectors(self) -> tuple[ResourceId, ...]:
@@ -241,10 +263,15 @@ _TYPES: dict[str, type[Geometry]] = {
 }
 
 
+_NOT_IN_JOURNALS = ("faces", "videos")
+
+
 def dump(fleet: Fleet) -> bytes:
-    """The whole fleet, with its geometries, without its faces."""
+    """The whole fleet, with its geometries, without its faces and videos."""
     content = {
-        field: getattr(fleet, field) for field in fleet.__dataclass_fields__ if field != "faces"
+        field: getattr(fleet, field)
+        for field in fleet.__dataclass_fields__
+        if field not in _NOT_IN_JOURNALS
     }
     content["geometries"] = {
         name: {"kind": kind_of(geometry), "geometry": geometry}

@@ -1,8 +1,10 @@
 """Loads a fleet file: YAML 1.2, its shape, the names in it, and the geometries that it names."""
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 from pydantic import ValidationError
 
@@ -17,6 +19,8 @@ from m2pem.fleet.fleet import (
     Team,
     Unanswered,
     Vehicle,
+    Video,
+    VideoKind,
 )
 from m2pem.fleet.fleet_schema import (
     AllocationModel,
@@ -26,6 +30,7 @@ from m2pem.fleet.fleet_schema import (
     HostModel,
     ScheduleModel,
     VehicleModel,
+    VideoModel,
 )
 from m2pem.fleet.hosts import CutOffPolicy, Host, WhenCutOff, endpoint_problem
 from m2pem.fleet.yaml_source import YamlSource, note_shape_findings, read_yaml
@@ -36,6 +41,8 @@ from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.elements import ErrorPolicy
 from m2pem.mission.geometry import Area, Coordinate, Geometry, Point, Route
 from m2pem.suggestions import suggest
+
+_ADDRESS = re.compile(r"https?://[A-Za-z0-9.:\[\]-]+([/?][!-~]*)?")
 
 _GEOMETRY_KINDS = {"routes": "route", "areas": "area", "points": "point"}
 
@@ -63,6 +70,7 @@ def load_fleet(path: str | Path) -> Fleet:
         _check_names(source)
         _check_teams(source)
         _check_hosts(source)
+        _check_videos(source)
         _check_roles(source)
         geometries = _read_geometries(source, path.parent)
         _check_fence(source)
@@ -174,6 +182,35 @@ def _check_roles(source: YamlSource) -> None:
             hint = suggest(role, operators, "roles")
             message = f"'operators' names no operator with the role '{role}'"
             source.error(path, "no-operator", message, hint)
+
+
+def _check_videos(source: YamlSource) -> None:
+    for vehicle in source.mapping("vehicles"):
+        for payload in source.mapping("vehicles", vehicle, "payloads"):
+            path = ("vehicles", vehicle, "payloads", payload, "video")
+            video = source.mapping(*path)
+            url = video.get("url")
+            if isinstance(url, str) and url and (wrong := _address_problem(url)):
+                source.error((*path, "url"), "video-url", *wrong)
+            if "every" in video and video.get("kind") != VideoKind.IMAGE:
+                message = "only pictures of kind 'image' are fetched one at a time"
+                source.error((*path, "every"), "video-every", message, "leave 'every' out")
+
+
+def _address_problem(url: str) -> tuple[str, str] | None:
+    """What is wrong with the address of a video, and what would be right."""
+    remedy = "write http://HOST:PORT/PATH"
+    try:
+        parts = urlsplit(url)
+        fits = bool(parts.hostname) and parts.port != 0
+    except ValueError:
+        return f"{url!r} is not an address", remedy
+    if parts.username is not None or parts.password is not None:
+        message = "an address in a fleet has no user and no password: every page would show them"
+        return message, "let a media server on the vehicle's network sign in to the camera"
+    if not fits or not _ADDRESS.fullmatch(url):
+        return f"{url!r} is not an address of http or https", remedy
+    return None
 
 
 def _check_fence(source: YamlSource) -> None:
@@ -301,7 +338,18 @@ def _build(source: YamlSource, model: FleetModel, geometries: dict[str, Geometry
         control_unanswered=Unanswered(handing_over.unanswered),
         hosts={name: _host(source, name, each) for name, each in model.hosts.items()},
         faces={name: settings or {} for name, settings in model.faces.items()},
+        videos={
+            ResourceId(f"{vehicle}/{name}"): _video(payload.video)
+            for vehicle, each in model.vehicles.items()
+            for name, payload in each.payloads.items()
+            if payload.video is not None
+        },
     )
+
+
+def _video(model: VideoModel) -> Video:
+    kind = VideoKind(model.kind)
+    return Video(model.url, kind) if model.every is None else Video(model.url, kind, model.every)
 
 
 def _cut_off(vehicle: VehicleModel) -> CutOffPolicy:

@@ -86,6 +86,22 @@ class OriginModel(_Model):
     ] = 0.0
 
 
+class VideoModel(_Model):
+    """Where operators' pictures of a camera come from."""
+
+    url: Annotated[
+        Text, Field(description="An address (http, https), without a user and a password.")
+    ]
+    kind: Annotated[
+        Literal["hls", "webrtc", "mjpeg", "image"],
+        Field(description="HLS, WebRTC by WHEP, Motion JPEG, or one picture at a time."),
+    ]
+    every: Annotated[
+        Annotated[Duration, Field(gt=0)] | None,
+        Field(description="How long after a picture the next one is fetched, of kind image; 1 s."),
+    ] = None
+
+
 class PayloadModel(_Model):
     """Something mounted on a vehicle that behaviors can command."""
 
@@ -102,6 +118,9 @@ class PayloadModel(_Model):
     detector: Annotated[
         bool, Field(description="Its detections complete the service Detector.")
     ] = False
+    video: Annotated[
+        VideoModel | None, Field(description="What operators see through it on the web page.")
+    ] = None
     tags: Annotated[list[Text], Field(description="Words by which roles ask for it.")] = []
 
 

@@ -1,6 +1,7 @@
 """The ASGI app: checks of requests, the routers, and the page."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
 from typing import Any
 
 from fastapi import APIRouter, FastAPI
@@ -88,10 +89,15 @@ def routers_of(
 
 
 def create_app(
-    routers: Iterable[APIRouter], entry: Entry, settings: Settings, slots: Slots, known: Standbys
+    routers: Iterable[APIRouter],
+    entry: Entry,
+    settings: Settings,
+    slots: Slots,
+    known: Standbys,
+    videos: Mapping[str, str] = MappingProxyType({}),
 ) -> ASGIApp:
     """Create the app. `entry` signs users in; `slots` are the server's connections; the page may
-    ask the pages of `known` whether they serve."""
+    ask the pages of `known` whether they serve, and load what `videos` adds to its policy."""
     # FastAPI makes the routes of a router that is included a second time, which takes longer than
     # all else at the start: the app has them as they are.
     routes = [route for router in routers for route in router.routes]
@@ -106,7 +112,7 @@ def create_app(
         scheme=settings.scheme,
         slots=slots,
     )
-    return SafeHeaders(guard, lambda: known.pages)
+    return SafeHeaders(guard, lambda: known.pages, videos)
 
 
 def _described(app: FastAPI) -> dict[str, Any]:

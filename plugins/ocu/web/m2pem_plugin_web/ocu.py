@@ -44,6 +44,7 @@ class WebOcu:
         self, control: "MissionControl", *, environment: Mapping[str, str] = os.environ
     ) -> None:
         from m2pem_plugin_web.access import page_addresses  # noqa: PLC0415
+        from m2pem_plugin_web.access.video_origins import origins_of  # noqa: PLC0415
         from m2pem_plugin_web.app import create_app, routers_of  # noqa: PLC0415
         from m2pem_plugin_web.live.hub import Hub  # noqa: PLC0415
         from m2pem_plugin_web.server import Server  # noqa: PLC0415
@@ -65,7 +66,9 @@ class WebOcu:
 
             def app() -> "ASGIApp":
                 routers = routers_of(self._services, settings, self.hub, entry, self._recorder)
-                return create_app(routers, entry, settings, self._server.slots, self.hub.standbys)
+                videos = origins_of(control.fleet())
+                slots, standbys = self._server.slots, self.hub.standbys
+                return create_app(routers, entry, settings, slots, standbys, videos)
 
             self._make_app = app
         except BaseException:

@@ -20,7 +20,7 @@ UI = PLUGIN / "ui"
 MOST_BYTES = 520_000
 """Of what a browser loads for any page, compressed, from an empty cache."""
 
-ON_DEMAND = ("readAnswers-*.js", "PlotsPane-*.js", "PlotsPane-*.css")
+ON_DEMAND = ("readAnswers-*.js", "PlotsPane-*.*", "CamerasPane-*.*", "hls.light-*.js")
 """Loaded by no page, but by a button of one."""
 
 NO_PROGRAMS = ("sh", "bash", "env")

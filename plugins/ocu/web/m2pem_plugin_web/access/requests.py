@@ -6,7 +6,9 @@ The order: `SafeHeaders` outside, then `Guard`, then `BoundedBodies`, then `Comp
 import asyncio
 import math
 import time
-from collections.abc import Callable, Collection, Iterable
+from collections import defaultdict
+from collections.abc import Callable, Collection, Iterable, Mapping
+from types import MappingProxyType
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.exceptions import HTTPException
@@ -185,15 +187,17 @@ class BoundedBodies:
 
 
 # Styles: bpmn-js sets some on elements. `self` covers a WebSocket of the same origin. `others` are
-# the pages of executives that stand by.
+# the pages of executives that stand by; `videos` are the cameras' origins, by directive. hls.js
+# hands a video to the browser as a blob.
 POLICY = "; ".join(
     (
         "default-src 'self'",
         "script-src 'self'",
         "style-src 'self' 'unsafe-inline'",
-        "img-src 'self' data: blob:",
+        "img-src 'self' data: blob:{videos[img-src]}",
+        "media-src 'self' blob:{videos[media-src]}",
         "font-src 'self' data:",
-        "connect-src 'self'{others}",
+        "connect-src 'self'{others}{videos[connect-src]}",
         "object-src 'none'",
         "base-uri 'none'",
         "form-action 'self'",
@@ -214,11 +218,18 @@ HEADERS = {
 
 class SafeHeaders:
     """Adds security headers to every response; responses of /api are not cached. `others`: other
-    pages, which a page from here may ask whether they serve."""
+    pages, which a page from here may ask whether they serve; `videos`: what cameras add to
+    directives of the policy."""
 
-    def __init__(self, app: ASGIApp, others: Callable[[], Iterable[str]] = tuple) -> None:
+    def __init__(
+        self,
+        app: ASGIApp,
+        others: Callable[[], Iterable[str]] = tuple,
+        videos: Mapping[str, str] = MappingProxyType({}),
+    ) -> None:
         self._app = app
         self._others = others
+        self._videos = defaultdict(str, videos)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass a request on."""
@@ -231,7 +242,9 @@ class SafeHeaders:
                 headers = MutableHeaders(scope=message)
                 headers.update(HEADERS)
                 others = "".join(f" {page}" for page in self._others())
-                headers["content-security-policy"] = POLICY.format(others=others)
+                headers["content-security-policy"] = POLICY.format(
+                    others=others, videos=self._videos
+                )
                 if scope["path"].startswith("/api"):
                     headers["cache-control"] = "no-store"
             await send(message)

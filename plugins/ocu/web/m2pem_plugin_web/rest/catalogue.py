@@ -52,13 +52,23 @@ class VehicleModel(BaseModel):
     payloads: list[str]
 
 
+class VideoModel(BaseModel):
+    """Where a camera's pictures come from: `kind` is hls, webrtc (WHEP), mjpeg or image, of which
+    one is fetched every `every_s` seconds."""
+
+    url: str
+    kind: str
+    every_s: float
+
+
 class PayloadModel(BaseModel):
-    """What is mounted on a vehicle."""
+    """What is mounted on a vehicle; `video`: null for none."""
 
     id: str
     vehicle: str
     detector: bool
     arbiter: str
+    video: VideoModel | None
 
 
 class TeamModel(BaseModel):
@@ -160,7 +170,11 @@ def _fleet(fleet: Fleet) -> FleetModel:
         ],
         payloads=[
             PayloadModel(
-                id=each.id, vehicle=each.vehicle, detector=each.detector, arbiter=each.arbiter
+                id=each.id,
+                vehicle=each.vehicle,
+                detector=each.detector,
+                arbiter=each.arbiter,
+                video=_video(fleet, each.id),
             )
             for each in fleet.payloads.values()
         ],
@@ -170,6 +184,13 @@ def _fleet(fleet: Fleet) -> FleetModel:
         ],
         fence=as_geojson(fence)["geometry"] if isinstance(fence, Area) else None,
     )
+
+
+def _video(fleet: Fleet, payload: ResourceId) -> VideoModel | None:
+    video = fleet.videos.get(payload)
+    if video is None:
+        return None
+    return VideoModel(url=video.url, kind=video.kind.value, every_s=video.every_s)
 
 
 def behaviors_of(

@@ -56,7 +56,7 @@ export function rows({ vehicles, states = [], payloads = {}, status = {}, silent
     origin: { lat: 0, lon: 0, alt: 0 },
     vehicles,
     payloads: vehicles.flatMap((each) =>
-      each.payloads.map((id) => ({ id, vehicle: each.id, detector: false, arbiter: "onvif" })),
+      each.payloads.map((id) => ({ id, vehicle: each.id, detector: false, arbiter: "onvif", video: null })),
     ),
     teams: [],
     fence: null,

@@ -61,6 +61,13 @@ export interface Behavior {
   teams: string[];
 }
 
+/** Where a camera's pictures come from. `every_s`: of kind image, between two of them. */
+export interface Video {
+  url: string;
+  kind: "hls" | "webrtc" | "mjpeg" | "image";
+  every_s: number;
+}
+
 export interface Fleet {
   name: string;
   origin: { lat: number; lon: number; alt: number };
@@ -75,7 +82,13 @@ export interface Fleet {
     failsafe: string;
     payloads: string[];
   }[];
-  payloads: { id: string; vehicle: string; detector: boolean; arbiter: string }[];
+  payloads: {
+    id: string;
+    vehicle: string;
+    detector: boolean;
+    arbiter: string;
+    video: Video | null;
+  }[];
   teams: { name: string; members: string[]; lead: string }[];
   /** No vehicle may leave it. */
   fence: GeoJSON.Geometry | null;

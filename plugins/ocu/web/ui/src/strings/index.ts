@@ -1,4 +1,5 @@
 // Every text that a person reads, one section a page.
+import { cameras } from "./cameras";
 import { requirements, verify } from "./checks";
 import { control } from "./control";
 import { alerts } from "./alerts";
@@ -28,6 +29,7 @@ export const strings = {
   operate,
   plots,
   fleet,
+  cameras,
 };
 
 /** `{name}` in a text becomes its value. */

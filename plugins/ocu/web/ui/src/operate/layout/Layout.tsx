@@ -1,7 +1,7 @@
 // Where the parts of the page are: beside each other where there is room, behind tabs on a tablet.
 import { lazy, Suspense } from "preact/compat";
 import { Split } from "../../shared/Split";
-import { Tabs } from "../../shared/Tabs";
+import { Tabs, type Tab } from "../../shared/Tabs";
 import { useMedia } from "../../shared/useMedia";
 import { strings } from "../../strings";
 import { useOperating } from "../context";
@@ -18,7 +18,8 @@ import { VehiclesPane } from "../vehicles/VehiclesPane";
 const text = strings.operate.panes;
 const kinds = strings.operate.map.kinds;
 
-/** With what draws them: only those who look at plots load that. */
+/** With what draws and plays them: only those who look at them load that. */
+const Cameras = lazy(() => import("../cameras/CamerasPane"));
 const Plots = lazy(() => import("../plots/PlotsPane"));
 
 const WIDE = "(width >= 1180px)";
@@ -32,6 +33,7 @@ type Parts = { onSeek: ((t: number) => void) | undefined };
 
 function Wide({ onSeek }: Parts) {
   const { draft } = useOperating();
+  const cameras = useCameras();
   const bottom = plotsShown.value
     ? { name: "bottom-plots", initial: 44 }
     : { name: "bottom", initial: 68 };
@@ -48,6 +50,14 @@ function Wide({ onSeek }: Parts) {
             <Pane title={`${strings.operate.map.draw}: ${kinds[draft.value.kind]}`}>
               <DrawForm draft={draft.value} />
             </Pane>
+          ) : cameras ? (
+            <Tabs
+              label={text.vehicles}
+              tabs={[
+                { id: "vehicles", title: text.vehicles, render: () => <VehiclesPane /> },
+                CAMERAS,
+              ]}
+            />
           ) : (
             <VehiclesPane />
           )}
@@ -72,6 +82,22 @@ function TimesPane({ onSeek }: Parts) {
   );
 }
 
+const CAMERAS: Tab = {
+  id: "cameras",
+  title: text.cameras,
+  render: () => (
+    <Suspense fallback={<p class="nothing">{strings.operate.run.loading}</p>}>
+      <Cameras />
+    </Suspense>
+  ),
+};
+
+/** Whether there are cameras to look through: they show what is now, not what was. */
+function useCameras(): boolean {
+  const { scene, fleet } = useOperating();
+  return scene.mode === "live" && fleet.payloads.some(({ video }) => video);
+}
+
 function PlotsPane({ onSeek }: Parts) {
   return (
     <Suspense fallback={<p class="nothing">{strings.operate.run.loading}</p>}>
@@ -81,6 +107,7 @@ function PlotsPane({ onSeek }: Parts) {
 }
 
 function Narrow({ onSeek }: Parts) {
+  const cameras = useCameras();
   return (
     <Split name="narrow" direction="column" initial={52} label={text.resize}>
       <Tabs
@@ -95,6 +122,7 @@ function Narrow({ onSeek }: Parts) {
         tabs={[
           { id: "map", title: text.map, render: () => <MapPane formInside /> },
           { id: "vehicles", title: text.vehicles, render: () => <VehiclesPane /> },
+          ...(cameras ? [CAMERAS] : []),
           { id: "timeline", title: text.timeline, render: () => <TimelinePane onSeek={onSeek} /> },
           { id: "plots", title: text.plots, render: () => <PlotsPane onSeek={onSeek} /> },
           { id: "log", title: text.log, render: () => <LogPane /> },

@@ -1,0 +1,21 @@
+// Texts of cameras' pictures.
+export const cameras = {
+  picture: "What {id} sees",
+  large: "Large",
+  connecting: "connecting…",
+  live: "live",
+  since: "last picture {age} ago",
+  ageless: "shown; age not known",
+  old: "no picture for {age}",
+  failed: "no picture",
+  again: "Again in {seconds} s",
+  noPicture: "The camera’s address gives no picture.",
+  noStream: "The camera’s address is not reachable, or does not let this page read it.",
+  nothingCame: "Connected, but no picture came.",
+  refused: "The camera’s address answered",
+  notMjpeg: "The camera’s address gives no Motion JPEG.",
+  ended: "The stream has ended.",
+  noHls: "This browser plays no HLS.",
+  noPeer: "WebRTC found no way to the camera.",
+  mixed: "The page is served with TLS (https), the camera is not: browsers refuse that.",
+} as const;
