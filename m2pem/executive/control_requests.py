@@ -162,7 +162,7 @@ class ControlRequests:
         if outcome is RequestOutcome.GIVEN:
             self._handover.pass_on(resource, request.by)
         self._changed()
-        self._say(_told(resource, request, outcome, by, gone=self._is_gone(request.holder)))
+        self._say(_sentence(resource, request, outcome, by, gone=self._is_gone(request.holder)))
         ended = i.ControlRequestEnded(resource, request.by, outcome, by)
         for runner in self._going_on():
             if outcome is RequestOutcome.GIVEN and resource not in control_of(runner.run.state)[0]:
@@ -175,7 +175,7 @@ class ControlRequests:
         return [runner for runner in self._runners() if not runner.done.is_set()]
 
 
-def _told(
+def _sentence(
     resource: ResourceId, request: _Open, outcome: RequestOutcome, by: str, *, gone: bool
 ) -> str:
     if by:
