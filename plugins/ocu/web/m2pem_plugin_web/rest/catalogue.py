@@ -198,9 +198,18 @@ def behaviors_of(
 ) -> list[BehaviorModel]:
     """Return every behavior with what can do it; a team can do what all its members can."""
     found: dict[str, tuple[BehaviorSpec, list[str], list[str]]] = {}
+    # Large fleets have few objects, many times: to write each one each time takes a second.
+    written: dict[int, str] = {}
+
+    def key_of(spec: BehaviorSpec) -> str:
+        key = written.get(id(spec))
+        if key is None:
+            key = written[id(spec)] = repr(spec)
+        return key
+
     for resource, specs in catalogue.items():
         for spec in specs:
-            entry = found.setdefault(repr(spec), (spec, [], []))
+            entry = found.setdefault(key_of(spec), (spec, [], []))
             if spec.type is not BehaviorType.TEAM:
                 entry[1].append(resource)
     for team in fleet.teams.values():
@@ -208,7 +217,7 @@ def behaviors_of(
         offered = [_team_behaviors(catalogue.get(each, ())) for each in members]
         for name, spec in offered[0].items():
             if all(name in each for each in offered):
-                found[repr(spec)][2].append(team.name)
+                found[key_of(spec)][2].append(team.name)
     listed = [entry for entry in found.values() if entry[1] or entry[2]]
     listed.sort(key=lambda entry: (entry[0].type, entry[0].name))
     return [_behavior(*entry) for entry in listed]
