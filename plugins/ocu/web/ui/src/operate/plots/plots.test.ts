@@ -4,7 +4,7 @@ import { csvOf } from "./csv";
 import { numbersOf, unitOf, wordsOf } from "./fields";
 import { AGE, historyOf, TelemetryHistory } from "./history";
 import { HistoryRecorder } from "./recorder";
-import { drawn, grid, Series } from "./series";
+import { drawn, extremes, grid, Series } from "./series";
 
 const state = (resource: string, more: Partial<VehicleState> = {}): VehicleState => ({
   resource,
@@ -28,6 +28,10 @@ const filled = (values: number[], most?: number): Series => {
   values.forEach((value, index) => series.push(index, value));
   return series;
 };
+
+/** A series of these very values; a real one does not begin with a gap. */
+const plain = (values: number[]): Series =>
+  ({ valueAt: (index: number) => values[index] }) as unknown as Series;
 
 describe("fields of a state", () => {
   it("are what people know, and every other number", () => {
@@ -74,6 +78,17 @@ describe("a series", () => {
     const kept = Array.from({ length: series.length }, (_, index) => series.valueAt(index));
     expect(Math.max(...kept.filter((value) => !Number.isNaN(value)))).toBe(99);
     expect(kept.some(Number.isNaN)).toBe(true);
+  });
+
+  it.each([
+    [[NaN], [0]],
+    [[1], [0]],
+    [[NaN, 1], [0, 1]],
+    [[2, NaN, 1], [0, 1, 2]],
+    [[3, 3, NaN], [0, 2]],
+    [[2, 5, 1, 4], [1, 2]],
+  ])("has extremes in order of time: %s", (values, wanted) => {
+    expect(extremes(plain(values), 0, values.length)).toEqual(wanted);
   });
 
   it("is drawn with the least and the greatest of each column", () => {

@@ -81,17 +81,32 @@ export class Series {
  * and where a gap begins, if there is one.
  */
 export function extremes(series: Series, from: number, to: number): number[] {
-  let [least, greatest, gap] = [-1, -1, -1];
+  let least = -1;
+  let greatest = -1;
+  let gap = -1;
+  let lowest = Infinity;
+  let highest = -Infinity;
   for (let index = from; index < to; index += 1) {
     const value = series.valueAt(index);
-    if (Number.isNaN(value)) gap = index;
-    else {
-      if (least < 0 || value < series.valueAt(least)) least = index;
-      if (greatest < 0 || value > series.valueAt(greatest)) greatest = index;
+    if (value < lowest) {
+      lowest = value;
+      least = index;
     }
+    if (value > highest) {
+      highest = value;
+      greatest = index;
+    }
+    if (value !== value) gap = index; // NaN
   }
-  const found = [...new Set([least, greatest, gap])].filter((index) => index >= 0);
-  return found.sort((one, other) => one - other);
+  const found: number[] = [];
+  const [first, last] = least < greatest ? [least, greatest] : [greatest, least];
+  // Without a value, both are -1; with one, they are the same.
+  if (gap >= 0 && gap < first) found.push(gap);
+  if (first >= 0) found.push(first);
+  if (gap > first && gap < last) found.push(gap);
+  if (last > first) found.push(last);
+  if (gap > last) found.push(gap);
+  return found;
 }
 
 export interface Range {
@@ -119,13 +134,14 @@ export function drawn(series: Series, { from_s, to_s }: Range, columns: number):
   let from = first;
   for (let column = 0; column < columns && from < end; column += 1) {
     const until_s = from_s + (column + 1) * column_s;
-    let to = from;
-    while (to < end && series.timeAt(to) <= until_s) to += 1;
+    const to = Math.min(end, series.countAt(until_s));
     if (to === from) continue;
-    extremes(series, from, to).forEach((index, place) => {
+    let place = column * PER_COLUMN;
+    for (const index of extremes(series, from, to)) {
       const value = series.valueAt(index);
-      values[column * PER_COLUMN + place] = Number.isNaN(value) ? null : value;
-    });
+      values[place] = Number.isNaN(value) ? null : value;
+      place += 1;
+    }
     from = to;
   }
   values[0] = between(series, first, from_s) ?? values[0];
