@@ -1,4 +1,5 @@
 // The page on which a mission is drawn.
+import { lazy, Suspense } from "preact/compat";
 import { useEffect, useRef, useState } from "preact/hooks";
 import { ApiError } from "../shared/api";
 import { remember, remembered } from "../shared/memory";
@@ -7,7 +8,6 @@ import { Split } from "../shared/Split";
 import { fill, strings } from "../strings";
 import { BlockLibrary } from "./blocks/BlockLibrary";
 import { Questions } from "./dialogs/Questions";
-import { MapPanel } from "./map/MapPanel";
 import { SidePanel } from "./panels/SidePanel";
 import { Catalogue } from "./session/catalogue";
 import { followKeys, stepThrough } from "./session/keyboard";
@@ -25,6 +25,9 @@ import "./canvas.css";
 import "./forms.css";
 
 const words = strings.editor;
+
+/** Leaflet, and what plays rehearsals: for those who look at the map. */
+const MapPanel = lazy(() => import("./map/MapPanel"));
 
 /** Of a tablet held upright: blocks are then in the menus alone, until the user asks for more. */
 const NARROW = 1000;
@@ -144,7 +147,11 @@ function Workplace({ work, fail }: WorkplaceProps) {
                 aria-label={words.canvas}
                 onKeyDown={(event) => stepThrough(session, event)}
               />
-              {showsMap && <MapPanel editor={session} />}
+              {showsMap && (
+                <Suspense fallback={<p class="nothing">{words.loading}</p>}>
+                  <MapPanel editor={session} />
+                </Suspense>
+              )}
             </Split>
           </div>
         </div>

@@ -25,7 +25,7 @@ const ICONS: Record<Kind, string> = {
   point: "M10 17s5-6 5-9.500a5 5 0 0 0-10 0C5 11 10 17 10 17z",
 };
 
-export function MapPanel({ editor }: { editor: EditorContext }) {
+export default function MapPanel({ editor }: { editor: EditorContext }) {
   const { plan, catalogue } = editor;
   const host = useRef<HTMLDivElement>(null);
   const view = useRef<PlanMap>();
