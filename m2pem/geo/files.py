@@ -1,12 +1,13 @@
-"""Reads the file of a route, area or point: GeoJSON, CSV, QGroundControl `.plan`, `.waypoints`."""
+"""Reads the file of one route, area or point, which a fleet names."""
 
 from collections.abc import Mapping
 from pathlib import Path
 
-from m2pem.findings import unreadable_remedy
+from m2pem.findings import Severity, unreadable_remedy
 from m2pem.geo.csv_waypoints import parse_csv
 from m2pem.geo.file_text import decoded, parsed_json
 from m2pem.geo.geojson import GeometryError, kind_of, parse_geojson
+from m2pem.geo.geometry_files import read_geometry_file
 from m2pem.geo.qgroundcontrol import parse_plan, parse_waypoints
 from m2pem.mission.geometry import Area, Point, Route
 from m2pem.units import article
@@ -15,7 +16,10 @@ __all__ = ["GeometryError", "parse_geojson", "read_geometry"]
 
 MAX_BYTES = 5_000_000
 
-_SUFFIXES = (".geojson", ".json", ".plan", ".waypoints", ".csv")
+_OF_MANY = (".kml", ".kmz", ".zip")
+"""Files of any number of geometries: one of the kind that is asked for is expected."""
+
+_SUFFIXES = (".geojson", ".json", ".plan", ".waypoints", ".csv", *_OF_MANY)
 
 
 def read_geometry(path: Path, kind: str) -> Point | Route | Area:
@@ -46,6 +50,8 @@ def _read(path: Path, kind: str) -> Point | Route | Area:
         raise GeometryError(f"cannot be read: {error.strerror}; {remedy}") from None
     if len(content) > MAX_BYTES:
         raise GeometryError(f"is larger than {MAX_BYTES:,} bytes")
+    if path.suffix.lower() in _OF_MANY:
+        return _only_one(path, content, kind)
     text = decoded(content)
     if path.suffix.lower() == ".waypoints":
         return parse_waypoints(text)
@@ -57,3 +63,16 @@ def _read(path: Path, kind: str) -> Point | Route | Area:
     if path.suffix.lower() == ".plan":
         return parse_plan(value, area=kind == "area")
     return parse_geojson(value)
+
+
+def _only_one(path: Path, content: bytes, kind: str) -> Point | Route | Area:
+    file = read_geometry_file(path.name, content)
+    for problem in file.problems:
+        if problem.severity is Severity.ERROR:
+            raise GeometryError(str(problem))
+    found = [each for each in file.geometries if kind_of(each.geometry) == kind]
+    if len(found) != 1:
+        names = ", ".join(each.name for each in found[:5])
+        listed = f" ({names})" if names else ""
+        raise GeometryError(f"has {len(found)} {kind}s{listed}; exactly one is expected")
+    return found[0].geometry

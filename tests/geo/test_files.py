@@ -30,7 +30,7 @@ def test_another_kind_of_geometry_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [
-        ("a.kml", "", "has another suffix than .geojson"),
+        ("a.gpx", "", "has another suffix than .geojson"),
         ("a.geojson", "{\n\n x}", "line 3: is not JSON"),
         ("a.geojson", "[]", "a JSON object is expected"),
         ("a.geojson", '{"type": "Point", "coordinates": [NaN, 1]}', "holds NaN"),
@@ -68,3 +68,22 @@ def test_a_byte_order_mark_does_no_harm(tmp_path: Path) -> None:
     path = tmp_path / "a.geojson"
     path.write_text('{"type": "Point", "coordinates": [1, 2]}', encoding="utf-8-sig")
     assert read_geometry(path, "point") == Point((2.0, 1.0, None))
+
+
+def test_a_kml_file_holds_one_of_the_kind_that_is_asked_for(tmp_path: Path) -> None:
+    def placemark(name: str, kind: str, coordinates: str) -> str:
+        shape = f"<{kind}><coordinates>{coordinates}</coordinates></{kind}>"
+        return f"<Placemark><name>{name}</name>{shape}</Placemark>"
+
+    parts = [placemark("a", "Point", "7,53"), placemark("b", "Point", "8,53")]
+    parts.append(placemark("road", "LineString", "7,53 8,53"))
+    path = tmp_path / "places.kml"
+    path.write_text(f"<kml><Document>{''.join(parts)}</Document></kml>")
+    assert read_geometry(path, "route") == Route(((53.0, 7.0, None), (53.0, 8.0, None)))
+    with pytest.raises(GeometryError, match=r"places.kml: has 2 points \(a, b\); exactly one"):
+        read_geometry(path, "point")
+    with pytest.raises(GeometryError, match="has 0 areas; exactly one is expected"):
+        read_geometry(path, "area")
+    path.write_text("<kml><Placemark><name>x</name></Placemark></kml>")
+    with pytest.raises(GeometryError, match="placemark 'x': has no point, line or polygon"):
+        read_geometry(path, "route")
