@@ -2,6 +2,7 @@
 // way of a flow, in a place that is still open, or on an activity.
 import { isA, type Factory, type ModdleElement } from "../../moddle/moddle";
 import { overlap, type Box } from "../../session/boxes";
+import { fitTo } from "../../session/fitting";
 import type {
   Canvas,
   CommandStack,
@@ -19,6 +20,8 @@ import { isOpenPlace } from "./open";
 const PUT = "m2pem.fragment";
 const DISTANCE = 50;
 const MARGIN = 20;
+/** Names can be read at it. */
+const LEAST_SCALE = 0.5;
 /** After bpmn-js has selected what was dragged to its place. */
 const AFTER_SELECTION = 100;
 
@@ -217,6 +220,9 @@ export class Fragments {
 
   private show(next: Shape): void {
     this.selection.select(next as never);
+    const { width, height, scale, inner } = this.canvas.viewbox();
+    const fitted = scale * Math.min(width / inner.width, height / inner.height);
+    if (fitted < scale && fitted > LEAST_SCALE) return fitTo(this.canvas);
     this.canvas.scrollToElement(next as never, { top: 100, bottom: 100, left: 120, right: 200 });
   }
 
