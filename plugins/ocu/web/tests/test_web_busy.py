@@ -1,6 +1,7 @@
 """Vehicles that another run or an operator has, and runs that ended before they were looked at."""
 
 from playwright.async_api import expect
+from test_web_alerts import look
 from web_desk import IN_ONE_LOOP, OVER, Desk
 from web_running import wait_for_status
 
@@ -75,8 +76,9 @@ async def test_a_start_with_a_busy_vehicle_is_refused_until_it_is_confirmed(desk
     start = page.get_by_role("button", name="Start", exact=True)
     await start.click()
     dialog = page.get_by_role("dialog", name="Vehicles are busy")
-    await expect(dialog).to_contain_text(f"run {driver} uses {VEHICLE}")
-    await expect(dialog).to_contain_text("or stop it")
+    held = dialog.get_by_role("row", name=VEHICLE)
+    await expect(held).to_contain_text(f"{driver}DRIVE ROUTE of {driver}")
+    await look(page, "busy")
     await page.keyboard.press("Enter")  # the focus is not on what starts it
     await dialog.get_by_role("button", name="Do not start").click()
     await expect(dialog).to_have_count(0)
@@ -86,3 +88,25 @@ async def test_a_start_with_a_busy_vehicle_is_refused_until_it_is_confirmed(desk
     await page.wait_for_url("**/runs/*")
     assert run_of(desk) != driver
     assert len(await desk.ask("GET", "/api/runs")) == runs + 1
+    await page.get_by_role("button", name="Stop this run").dblclick()
+    await see_that_it_waits_or_that_the_other_run_is_stopped(desk, driver)
+
+
+async def see_that_it_waits_or_that_the_other_run_is_stopped(desk: Desk, driver: str) -> None:
+    page = desk.page
+    await desk.edit(tab="Run")
+    start = page.get_by_role("button", name="Start", exact=True)
+    dialog = page.get_by_role("dialog", name="Vehicles are busy")
+    await start.click()
+    await dialog.get_by_role("button", name="Wait in the queue").click()
+    queue = page.get_by_role("region", name="Scheduled")
+    await expect(queue.get_by_role("row", name="vignette1")).to_contain_text("waiting")
+    (entry,) = (await desk.ask("GET", "/api/schedule"))["entries"]
+    await desk.ask("POST", f"/api/schedule/{entry['entry']}/cancel")
+    await desk.edit(tab="Run")
+    await start.click()
+    await dialog.get_by_role("button", name=f"Stop {driver}…").click()
+    await dialog.get_by_role("button", name=f"Stop {driver}: its mission ends").click()
+    await dialog.get_by_role("button", name="Start now").click()
+    await page.wait_for_url("**/runs/*")
+    assert run_of(desk) != driver

@@ -3,6 +3,7 @@ import { cameras } from "./cameras";
 import { requirements, verify } from "./checks";
 import { control } from "./control";
 import { alerts } from "./alerts";
+import { busy } from "./busy";
 import { editor } from "./editor";
 import { fleet } from "./fleet";
 import { home } from "./home";
@@ -17,6 +18,7 @@ export const strings = {
   shell,
   signIn,
   home,
+  busy,
   alerts,
   editor,
   plan,

@@ -47,11 +47,6 @@ export const run = {
     yes: "Start: real vehicles move",
     no: "Do not start",
   },
-  busy: {
-    title: "Vehicles are busy",
-    yes: "Start all the same",
-    no: "Do not start",
-  },
   answers: {
     title: "What happens in the rehearsal",
     yaml: "Answers file (YAML)",

@@ -8,6 +8,7 @@ import { beginningOf } from "../begin/beginning";
 import { BeginForm } from "../begin/BeginForm";
 import type { EditorContext, Panel } from "../panel";
 import { ProblemView } from "../ProblemView";
+import { BusyDialog } from "./BusyDialog";
 import { AnswersForm } from "./AnswersForm";
 import { Outcome } from "./Outcome";
 import { rehearsalOf } from "./rehearsal";
@@ -103,7 +104,7 @@ function Start({ editor }: { editor: EditorContext }) {
   const ready = beginningOf(editor).isReadable();
   const busy = starting.isBusy.value;
   const refusal = starting.refusal.value;
-  const busyVehicles = starting.busyVehicles.value;
+  const busyNow = starting.busy.value;
   const start = async (evenIfBusy = false) => {
     setAsks(false);
     const run = await starting.start(editor, evenIfBusy);
@@ -127,31 +128,14 @@ function Start({ editor }: { editor: EditorContext }) {
       </div>
       {!allowed && <p class="m2-note">{words.startNotAllowed}</p>}
       {refusal && <ProblemView editor={editor} title={words.startFailed} refusal={refusal} />}
-      {busyVehicles && (
-        <Dialog
-          title={words.busy.title}
-          onClose={() => (starting.busyVehicles.value = "")}
-          actions={
-            <>
-              <button
-                type="button"
-                class="secondary"
-                onClick={() => (starting.busyVehicles.value = "")}
-              >
-                {words.busy.no}
-              </button>
-              <button
-                type="button"
-                class={simulated ? "primary" : "primary m2r-real"}
-                onClick={() => void start(true)}
-              >
-                {words.busy.yes}
-              </button>
-            </>
-          }
-        >
-          <p>{busyVehicles}</p>
-        </Dialog>
+      {busyNow && (
+        <BusyDialog
+          mission={editor.mission}
+          busy={busyNow}
+          real={!simulated}
+          startNow={(evenIfBusy) => void start(evenIfBusy)}
+          close={() => (starting.busy.value = null)}
+        />
       )}
       {asks && (
         <Dialog

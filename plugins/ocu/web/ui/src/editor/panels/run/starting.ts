@@ -8,27 +8,36 @@ import { refusalOf, type Refusal } from "../job";
 import { keptOf } from "../kept";
 import type { EditorContext } from "../panel";
 
+/** `holders`: the run or operator that has each. `request`: what was asked for. */
+export interface Busy {
+  holders: Record<string, string>;
+  request: object;
+}
+
 export class Starting {
   readonly isBusy = signal(false);
   readonly refusal = signal<Refusal | null>(null);
-  /** Who has vehicles that the mission needs, in the server's words; "": it was not refused so. */
-  readonly busyVehicles = signal("");
+  /** Who has vehicles that the mission needs; null: it was not refused so. */
+  readonly busy = signal<Busy | null>(null);
 
   /** The run that began; undefined: none did, or another start goes on. */
   async start(editor: EditorContext, evenIfBusy = false): Promise<string | undefined> {
     if (this.isBusy.peek()) return undefined;
     this.isBusy.value = true;
     this.refusal.value = null;
-    this.busyVehicles.value = "";
+    this.busy.value = null;
+    let request = {};
     try {
       if (!(await editor.save())) return undefined;
       const { mission } = editor;
       const { version } = await get<MissionFile>(`/missions/${encodeURIComponent(mission)}`);
       const begins = beginningOf(editor).request();
-      const request = { mission, version, ...begins, even_if_busy: evenIfBusy };
-      return (await start<{ run: string }>("/runs", request)).run;
+      request = { mission, version, ...begins };
+      const asked = { ...request, even_if_busy: evenIfBusy };
+      return (await start<{ run: string }>("/runs", asked)).run;
     } catch (error) {
-      if (error instanceof ApiError && error.problem.busy) this.busyVehicles.value = error.message;
+      if (error instanceof ApiError && error.problem.busy)
+        this.busy.value = { holders: error.problem.busy as Record<string, string>, request };
       else this.refusal.value = refusalOf(error);
       return undefined;
     } finally {
