@@ -102,6 +102,7 @@ if TYPE_CHECKING:
     )
     from m2pem.api.run_view import RunView
     from m2pem.api.runs import (
+        NEWS,
         SCHEDULE,
         Alert,
         GeometryVersion,
@@ -245,9 +246,9 @@ _MODULES = {
     ),
     "m2pem.api.run_view": "RunView",
     "m2pem.api.runs": (
-        "SCHEDULE Alert GeometryVersion HandedOver IncidentPreview IncidentVerdict OpenIncident"
-        " OpenPrompt PromptClosed RunId RunStatus RunSummary SimulationResult StampedRecord"
-        " TelemetrySample"
+        "NEWS SCHEDULE Alert GeometryVersion HandedOver IncidentPreview IncidentVerdict"
+        " OpenIncident OpenPrompt PromptClosed RunId RunStatus RunSummary SimulationResult"
+        " StampedRecord TelemetrySample"
     ),
     "m2pem.api.statistics": (
         "DurationCounts ExecutiveStatistics LinkStatistics SubscriptionStatistics"
@@ -315,6 +316,7 @@ __all__ = [
     "EventCondition",
     "EventThrower",
     "AnswerRule",
+    "NEWS",
     "SCHEDULE",
     "WHEN_FREE",
     "When",

@@ -9,8 +9,10 @@ import logging
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
+from m2pem.api.alerts import AlertSeverity
 from m2pem.api.clock import Clock
 from m2pem.api.people import OpenControlRequest
+from m2pem.api.runs import CONTROL_REQUEST, Alert
 from m2pem.engine import inputs as i
 from m2pem.engine.inputs import RequestOutcome
 from m2pem.engine.state import ControlRequest, RunState
@@ -23,9 +25,6 @@ from m2pem.mission.catalogue import ResourceId
 from m2pem.units import US_PER_S
 
 log = logging.getLogger("m2pem.executive")
-
-CONTROL_REQUEST = "CONTROL_REQUEST"
-"""The code of alerts about requests for control."""
 
 
 @dataclass(slots=True)
@@ -40,7 +39,7 @@ class ControlRequests:
     """The requests for control that are open, one of each resource at most.
 
     `runners`: those whose journals say it. `is_gone`: whether an operator is present nowhere.
-    `say`: tells operators. `changed`: is called when there is one more or less.
+    `publish`: tells operators. `changed`: is called when there is one more or less.
     """
 
     def __init__(
@@ -50,7 +49,7 @@ class ControlRequests:
         clock: Clock,
         runners: Callable[[], Iterable[Runner]],
         is_gone: Callable[[str], bool],
-        say: Callable[[str], None],
+        publish: Callable[[Alert], None],
         changed: Callable[[], None],
     ) -> None:
         self._fleet = fleet
@@ -58,7 +57,7 @@ class ControlRequests:
         self._clock = clock
         self._runners = runners
         self._is_gone = is_gone
-        self._say = say
+        self._publish = publish
         self._changed = changed
         self._open: dict[ResourceId, _Open] = {}
 
@@ -94,7 +93,8 @@ class ControlRequests:
         if (other := self._open.get(resource)) is not None:
             raise OperatorError(f"{other.by} asks {holder} for {resource} already")
         self._begin(resource, by, holder)
-        self._say(str(next(each for each in self.all() if each.resource == resource)))
+        text = str(next(each for each in self.all() if each.resource == resource))
+        self._publish(Alert("", CONTROL_REQUEST, text, AlertSeverity.WARNING, (resource,)))
         for runner in self._going_on():
             await runner.submit(i.ControlRequested(resource, by, holder))
 
@@ -162,7 +162,11 @@ class ControlRequests:
         if outcome is RequestOutcome.GIVEN:
             self._handover.pass_on(resource, request.by)
         self._changed()
-        self._say(_sentence(resource, request, outcome, by, gone=self._is_gone(request.holder)))
+        text = _sentence(resource, request, outcome, by, gone=self._is_gone(request.holder))
+        over = not self._open
+        self._publish(
+            Alert("", CONTROL_REQUEST, text, AlertSeverity.NOTICE, (resource,), clears=over)
+        )
         ended = i.ControlRequestEnded(resource, request.by, outcome, by)
         for runner in self._going_on():
             if outcome is RequestOutcome.GIVEN and resource not in control_of(runner.run.state)[0]:

@@ -5,9 +5,10 @@ import time
 from collections.abc import Callable, Collection, Mapping
 
 from m2pem.allocation.assignment import load_solver
+from m2pem.api.alerts import AlertSeverity
 from m2pem.api.allocation import RoleAssignment, StartPreview
 from m2pem.api.authoring import MissionSource, file_of
-from m2pem.api.runs import Alert, RunId
+from m2pem.api.runs import APPROVAL, Alert, RunId
 from m2pem.engine.inputs import StartRun
 from m2pem.engine.run import MissionRun
 from m2pem.engine.state import RunStatus
@@ -33,9 +34,6 @@ from m2pem.mission.mission import Mission
 from m2pem.mission.values import Value
 from m2pem.scheduling.entry import EntryChange
 
-APPROVAL = "APPROVAL"
-"""The code of alerts about approvals."""
-
 
 class RunStarter:
     """Checks missions and begins their runs, which the supervisor drives then."""
@@ -48,7 +46,7 @@ class RunStarter:
             lambda: supervisor.fleet_now.geometries,
             lambda: {name: each.by for name, each in supervisor.drawings.handed_over.items()},
             supervisor.clock.now_us,
-            lambda text: supervisor.events.publish(Alert("", APPROVAL, text)),
+            lambda text: supervisor.events.publish(Alert("", APPROVAL, text, AlertSeverity.NOTICE)),
         )
         # Of two starts at once the second must see what the first one takes.
         self._starting = asyncio.Lock()

@@ -43,7 +43,7 @@ from m2pem.executive.behavior_lifecycle import (
 )
 from m2pem.executive.behavior_reports import reported
 from m2pem.executive.control_events import ControlEvents, RecordObservers
-from m2pem.executive.control_requests import CONTROL_REQUEST, ControlRequests
+from m2pem.executive.control_requests import ControlRequests
 from m2pem.executive.counts import RunCounts
 from m2pem.executive.dispatcher import Dispatcher
 from m2pem.executive.drawings import Drawings
@@ -190,7 +190,7 @@ class Supervisor:
             clock,
             self.runners.values,
             self.presence.is_gone,
-            lambda text: events.publish(Alert("", CONTROL_REQUEST, text)),
+            events.publish,
             lambda: events.publish(OperatorsChanged()),
         )
         self.losses = JournalLossPrompts(

@@ -29,7 +29,7 @@ from m2pem.api import (
     follow,
 )
 from m2pem.api.run_view import Behavior, FinishedToken
-from m2pem.api.runs import LOGGED, SCHEDULE
+from m2pem.api.runs import LOGGED, NEWS
 from m2pem.errors import M2pemError
 from m2pem_plugin_terminal.alerts import Alerts
 from m2pem_plugin_terminal.ascii_only import AsciiFilter, ascii_only
@@ -359,7 +359,7 @@ class Display(App[None], Listener, inherit_bindings=False):
         """Show an alert as an alarm, unless the log shows it, and keep it until it is seen. The log
         of its run has it whole."""
         text = f"{alert.run}: {alert.text}" if alert.run else alert.text
-        if alert.code != SCHEDULE:
+        if alert.code not in NEWS:
             self.alerts.add(text)
         if alert.code == LOGGED:
             return

@@ -6,6 +6,7 @@ import socket
 from pathlib import Path
 
 from playwright.async_api import Browser, Page, expect
+from web_axe import Accessibility
 from web_browsing import KEY, page_at
 from web_desk import IN_ONE_LOOP, Desk, element, named_users, signed_in
 from web_running import answer, wait_for_status
@@ -59,9 +60,32 @@ async def see_who_has_taken_a_vehicle(page: Page, takes: Page) -> None:
     await taken.get_by_role("button", name="Take over", exact=True).click()
     seen = page.locator(".card", has_text="evsg2")
     await expect(seen).to_contain_text("with otto")
-    await expect(seen.get_by_role("button", name="Give back", exact=True)).to_be_disabled()
-    await taken.get_by_role("button", name="Give back", exact=True).click()
-    await expect(seen.get_by_role("button", name="Take over", exact=True)).to_be_enabled()
+    await hand_over(page, takes, "evsg2")
+    await seen.get_by_role("button", name="Give back", exact=True).click()
+    await expect(taken.get_by_role("button", name="Take over", exact=True)).to_be_enabled()
+
+
+async def hand_over(asks: Page, has: Page, vehicle: str) -> None:
+    """Anna sees that Otto is there, asks him for a vehicle, and he gives it; both read a note."""
+    await asks.get_by_role("button", name="2 persons are present").click()
+    present = asks.get_by_role("region", name="Who is present")
+    await expect(present.get_by_text("otto")).to_be_visible()
+    await asks.keyboard.press("Escape")
+    await expect(present).to_have_count(0)
+    card = asks.locator(".card", has_text=vehicle)
+    await card.get_by_role("button", name="Ask for it", exact=True).click()
+    await expect(asks.get_by_text(f"You ask otto for {vehicle}.")).to_be_visible()
+    await expect(has.get_by_text(f"anna asks you for {vehicle}.")).to_be_visible()
+    found = Accessibility(has)
+    await found.look("a request for control", ".control-request")
+    found.assert_well()
+    await has.get_by_role("button", name="Give it", exact=True).click()
+    await expect(has.locator(".control-request")).to_have_count(0)
+    await expect(has.locator(".card", has_text=vehicle)).to_contain_text("with anna")
+    await has.get_by_label("Note for the log").fill("wind picks up")
+    await has.keyboard.press("Enter")
+    log = asks.get_by_role("region", name="Events")
+    await expect(log).to_contain_text("otto: wind picks up")
 
 
 async def test_a_viewer_sees_all_and_finds_nothing_to_steer_with(

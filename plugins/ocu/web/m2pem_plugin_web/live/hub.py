@@ -14,8 +14,8 @@ from typing import Any
 import msgspec
 
 from m2pem.api import (
+    NEWS,
     PRESENCE_EVERY_S,
-    SCHEDULE,
     Alert,
     BehaviorState,
     Listener,
@@ -156,7 +156,7 @@ class Hub(Listener):
     def alerted(self, alert: Alert) -> None:
         """Send the alert at once."""
         text = f"{alert.run}: {alert.text}" if alert.run else alert.text
-        is_news = alert.code == SCHEDULE
+        is_news = alert.code in NEWS
         self._send_to_all(messages.notice(text) if is_news else messages.fault(text))
 
     def alerts_changed(self) -> None:

@@ -1,5 +1,7 @@
 // On every page: which fleet, who looks, whether what moves is real, and how to stop it.
 import { effect } from "@preact/signals";
+import { ControlRequests } from "../people/ControlRequests";
+import { Present } from "../people/Present";
 import { fill, strings } from "../strings";
 import { AlertBell } from "../alerts/AlertBell";
 import { calling } from "../alerts/alerts";
@@ -64,6 +66,7 @@ export function Header() {
           )}
           <span class="space" />
           {who && <Questions />}
+          {who && <Present />}
           {who && <AlertBell />}
           {who && (
             <span class="who" title={text.signedInAs}>
@@ -100,6 +103,7 @@ export function Header() {
         )}
       </header>
       {who && <StopAlert />}
+      {who && <ControlRequests />}
       {who && connection.value === "lost" && (
         <div class="offline" role="alert">
           {text.offline}

@@ -75,6 +75,9 @@ export const alertChanges = signal(0);
 /** Seconds of the executive's clock in a real second. */
 export const speed = signal(1);
 
+/** Rises when it is to be read again who is present, and who asks whom. */
+export const operatorChanges = signal(0);
+
 /** Rises when the schedule is to be read again. */
 export const scheduleChanges = signal(0);
 
@@ -102,6 +105,7 @@ function take(message: ServerMessage): void {
   switch (message.type) {
     case "snapshot":
       alertChanges.value += 1;
+      operatorChanges.value += 1;
       scheduleChanges.value += 1;
       spaceChanges.value += 1;
       speed.value = message.speed;
@@ -146,6 +150,9 @@ function take(message: ServerMessage): void {
       break;
     case "alerts":
       alertChanges.value += 1;
+      break;
+    case "operators":
+      operatorChanges.value += 1;
       break;
     case "schedule":
       scheduleChanges.value += 1;

@@ -366,6 +366,7 @@ export type ServerMessage =
   | { type: "fault"; seq: number; text: string }
   | { type: "notice"; seq: number; text: string }
   | { type: "alerts"; seq: number }
+  | { type: "operators"; seq: number }
   | { type: "schedule"; seq: number }
   | { type: "shared_space"; seq: number }
   | { type: "alive"; seq: number }

@@ -9,6 +9,7 @@ import { fleet } from "./fleet";
 import { home } from "./home";
 import { operate } from "./operate";
 import { plots } from "./plots";
+import { people } from "./people";
 import { plan } from "./plan";
 import { runs } from "./runs";
 import { begin, run } from "./run";
@@ -20,6 +21,7 @@ export const strings = {
   home,
   busy,
   alerts,
+  people,
   editor,
   plan,
   control,

@@ -1,9 +1,11 @@
 // What happened, newest last. Only the lines that are seen are made.
 import { useSignal } from "@preact/signals";
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
+import { NoteForm } from "../../people/NoteForm";
 import { LOG_KINDS, type LogKind, type LogLine } from "../../records/logLine";
 import { clockTenths } from "../../shared/format";
 import { remember, remembered } from "../../shared/memory";
+import { may } from "../../shared/session";
 import { fill, strings } from "../../strings";
 import { useOperating } from "../context";
 import { Pane } from "../layout/Pane";
@@ -97,6 +99,7 @@ export function LogPane() {
         {page.skipped > 0 && <span>{fill(text.skipped, { count: page.skipped })}</span>}
       </div>
       <LineList lines={shown} />
+      {scene.mode === "live" && scene.run && may("operator") && <NoteForm run={scene.run} />}
     </Pane>
   );
 }

@@ -1,6 +1,7 @@
 // Each vehicle: how it is, what it does and for which element, and who has it.
 import { usePaced } from "../layout/pace";
 import { age, heading_deg, speed_m_s, STALE_S } from "../../shared/format";
+import { askFor, requests } from "../../people/people";
 import { may, session } from "../../shared/session";
 import { command } from "../../shared/command";
 import { toast } from "../../shared/Toasts";
@@ -223,12 +224,12 @@ function HandOver({ resource, name }: { resource: string; name?: string }) {
   const label = (act: string) => (name ? `${act} ${name}` : undefined);
   if (isOperator(holder)) {
     const own = holder === session.value?.user;
+    if (!own) return <AskFor resource={resource} holder={holder} kind={kind} name={name} />;
     return (
       <button
         type="button"
         class={kind}
         aria-label={label(text.giveBack)}
-        disabled={!own}
         onClick={() => void ask("give-back", text.given)}
       >
         {text.giveBack}
@@ -244,6 +245,30 @@ function HandOver({ resource, name }: { resource: string; name?: string }) {
       onClick={() => void ask("take", text.taken)}
     >
       {text.take}
+    </button>
+  );
+}
+
+interface AskForProps {
+  resource: string;
+  holder: string;
+  kind: string;
+  name?: string | undefined;
+}
+
+/** Another operator has it. */
+function AskFor({ resource, holder, kind, name }: AskForProps) {
+  const asked = requests.value.some((request) => request.resource === resource);
+  return (
+    <button
+      type="button"
+      class={kind}
+      aria-label={name && `${strings.people.ask} ${name}`}
+      title={fill(strings.people.askHint, { holder })}
+      disabled={asked}
+      onClick={() => void askFor(resource)}
+    >
+      {strings.people.ask}
     </button>
   );
 }

@@ -1,5 +1,6 @@
 // Run: the mission is rehearsed as it is drawn, or saved and started.
 import { useState } from "preact/hooks";
+import { Approval } from "../../../people/Approval";
 import { Dialog } from "../../../shared/Dialog";
 import { go } from "../../../shared/router";
 import { may, session } from "../../../shared/session";
@@ -33,6 +34,7 @@ function RunPanel({ editor }: { editor: EditorContext }) {
         <BeginForm editor={editor} prefix="m2r" />
       </section>
       <Rehearse editor={editor} />
+      <Approval mission={editor.mission} isDirty={editor.isDirty.value} />
       <Start editor={editor} />
     </div>
   );
