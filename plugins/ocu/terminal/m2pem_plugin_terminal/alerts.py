@@ -1,62 +1,132 @@
-"""Alerts that no run has: they stay until an operator has seen them."""
+"""The executive's list of alerts in the terminal: its lines, the bell, deadlines of questions."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
 
-from rich.text import Text
+from m2pem.api import AlertSeverity, OperatorAlert, RunId
+from m2pem.api.alerts import INCIDENT, QUESTION
+from m2pem_plugin_terminal.dialogs import Choice
+from m2pem_plugin_terminal.formatting import clock_time
 
 TITLE = "Alerts"
 NONE = "There are no alerts."
-MOST = 200
-"""Alerts that are kept; of more, the oldest are dropped."""
+
+AGAIN_S = 10.0
+"""The bell rings again for critical alerts that nobody has acknowledged, after so long."""
+
+_MINUTE_S, _HOUR_S, _DAY_S = 60, 3600, 86_400
 
 
-@dataclass(slots=True)
-class KeptAlert:
-    """An alert. `at`: the time of day at which it came here. `count`: how often, if several times
-    in a row."""
-
-    at: str
-    text: str
-    count: int = 1
+def age(seconds: float) -> str:
+    """Return how long ago something was, in the largest unit: "12 s", "3 min", "2 h", "4 d"."""
+    for unit_s, unit in ((_DAY_S, "d"), (_HOUR_S, "h"), (_MINUTE_S, "min")):
+        if seconds >= unit_s:
+            return f"{seconds / unit_s:.0f} {unit}"
+    return f"{seconds:.0f} s"
 
 
-class Alerts:
-    """All alerts of this executive since this unit began; the last ones are not seen yet.
+def alert_choices(alerts: Sequence[OperatorAlert], now_us: int) -> list[Choice]:
+    """Return a line for each alert, as the list has them. `!`: nobody has acknowledged it; `-`: it
+    is over. `now_us`: microseconds since the Unix epoch by the executive's clock."""
+    return [
+        Choice(each.alert, _line(each, now_us), _who(each)) for each in alerts if not _too_old(each)
+    ]
 
-    `now`: the time of day, as it is shown.
+
+def _too_old(alert: OperatorAlert) -> bool:
+    return not alert.open and alert.severity is AlertSeverity.NOTICE
+
+
+def _line(alert: OperatorAlert, now_us: int) -> str:
+    mark = "!" if alert.calls else " " if alert.open else "-"
+    where = f"{alert.run}: " if alert.run else ""
+    many = f" ({alert.count} times)" if alert.count > 1 else ""
+    return f"{mark} {alert.severity}, {age(alert.age_s(now_us))}: {where}{alert.text}{many}"
+
+
+def _who(alert: OperatorAlert) -> str:
+    return f"{alert.owner} takes care" if alert.owner else ""
+
+
+def alert_text(alert: OperatorAlert, now_us: int) -> str:
+    """Return all that is known of an alert."""
+    where = f"{alert.run}: " if alert.run else ""
+    lines = [f"{where}{alert.text}", *alert.details]
+    lines.append(f"{alert.severity} {alert.code}, {age(alert.age_s(now_us))} ago")
+    if alert.count > 1:
+        lines.append(f"said {alert.count} times, last {_ago(now_us, alert.last_us)} ago")
+    if alert.acknowledged_by:
+        lines.append(f"acknowledged by {alert.acknowledged_by}")
+    if alert.owner:
+        lines.append(f"{alert.owner} takes care")
+    if not alert.open:
+        lines.append("It is over.")
+    return "\n".join(lines)
+
+
+def _ago(now_us: int, at_us: int) -> str:
+    return age(max(0, now_us - at_us) / 1_000_000)
+
+
+def what_to_do(alert: OperatorAlert, by: str) -> list[Choice]:
+    """Return what an operator can do about an alert."""
+    found = []
+    if alert.calls:
+        found.append(Choice("acknowledge", "Acknowledge it: you have seen it"))
+    if alert.open and alert.owner != by:
+        found.append(Choice("own", "Take care of it"))
+    if alert.open and alert.owner:
+        found.append(Choice("disown", "Nobody takes care of it any more"))
+    if alert.open and alert.code == INCIDENT:
+        found.append(Choice("decide", "Decide about the incident"))
+    if alert.run:
+        found.append(Choice("look", f"Look at {alert.run}"))
+    return [*found, Choice("close", "Close")]
+
+
+def hint(alerts: Iterable[OperatorAlert]) -> str:
+    """Say in short how many nobody has acknowledged, beside questions, which have a pane; "": none.
+
+    The most severe ones are named.
     """
+    calling = [each for each in alerts if each.calls and each.code != QUESTION]
+    if not calling:
+        return ""
+    worst = min((each.severity for each in calling), key=lambda each: each.rank)
+    count = f"{len(calling)} alert{'s' if len(calling) > 1 else ''}"
+    return f"{count}, {worst} (a)" if worst.rank < AlertSeverity.WARNING.rank else f"{count} (a)"
 
-    def __init__(self, now: Callable[[], str]) -> None:
-        self._now = now
-        self._kept: list[KeptAlert] = []
-        self.unseen = 0
 
-    def add(self, text: str) -> None:
-        """Keep an alert until it is seen, and afterwards."""
-        if self._kept and self._kept[-1].text == text and self.unseen:
-            self._kept[-1].count += 1
-            self._kept[-1].at = self._now()
-            return
-        self._kept.append(KeptAlert(self._now(), text))
-        del self._kept[:-MOST]
-        self.unseen = min(self.unseen + 1, MOST)
+class Bell:
+    """When the bell rings: for alerts that are new and call an operator, and again for critical
+    ones. `on`: whether it rings at all."""
 
-    def see(self) -> Text:
-        """Return all, the newest first, those that were not seen marked; now all are."""
-        if not self._kept:
-            return Text(NONE)
-        text = Text()
-        for place, alert in enumerate(reversed(self._kept)):
-            unseen = place < self.unseen
-            text.append(f"{'!' if unseen else ' '} {alert.at}  ", "bold #e07a6a")
-            many = f" ({alert.count} times)" if alert.count > 1 else ""
-            text.append(f"{alert.text}{many}\n", "#e3e8ee" if unseen else "#9aa4af")
-        self.unseen = 0
-        return text
+    def __init__(self, *, on: bool) -> None:
+        self.on = on
+        self._known: set[str] | None = None
+        self._rang_at = 0.0
 
-    def hint(self) -> str:
-        """Say in short how many are not seen; "": none."""
-        if not self.unseen:
-            return ""
-        return f"{self.unseen} alert{'s' if self.unseen > 1 else ''} (a)"
+    def rings(self, alerts: Iterable[OperatorAlert], now: float) -> bool:
+        """Return whether it rings now. `now`: the operator's clock, in seconds. What was there when
+        the unit began does not ring."""
+        calling = {
+            each.alert: each.severity
+            for each in alerts
+            if each.calls and each.severity is not AlertSeverity.NOTICE
+        }
+        new = self._known is not None and not calling.keys() <= self._known
+        critical = AlertSeverity.CRITICAL in calling.values()
+        again = critical and now - self._rang_at >= AGAIN_S
+        self._known = set(calling)
+        if not (new or again):
+            return False
+        self._rang_at = now
+        return self.on
+
+
+def time_left(alerts: Iterable[OperatorAlert], run: RunId, prompt: str, now_us: int) -> str:
+    """Return how long a question is open yet: ", 0:42 left"; "": without a limit."""
+    for each in alerts:
+        asks = each.code == QUESTION and each.run == run and each.subject == prompt
+        if asks and each.open and each.deadline_us is not None:
+            return f", {clock_time(max(0, each.deadline_us - now_us) / 1_000_000)} left"
+    return ""

@@ -6,10 +6,9 @@ from textual.binding import Binding, BindingType
 from textual.containers import VerticalScroll
 
 from m2pem.api import RunView
-from m2pem.api.runs import RunId, RunStatus
+from m2pem.api.runs import RunStatus
 from m2pem.errors import M2pemError
-from m2pem_plugin_terminal.alerts import TITLE as TITLE_ALERTS
-from m2pem_plugin_terminal.deciding import Deciding
+from m2pem_plugin_terminal.alerting import Alerting
 from m2pem_plugin_terminal.dialogs import Choice, Choose, Read, help_text
 from m2pem_plugin_terminal.direct_commands import DirectCommands
 from m2pem_plugin_terminal.shared_space import TITLE as TITLE_SPACE
@@ -18,7 +17,7 @@ from m2pem_plugin_terminal.starting import Starting
 from m2pem_plugin_terminal.status_lines import STOP_ALL
 
 
-class TerminalApp(Starting, Deciding, DirectCommands):
+class TerminalApp(Starting, Alerting, DirectCommands):
     """The display with its keys."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
@@ -36,9 +35,12 @@ class TerminalApp(Starting, Deciding, DirectCommands):
         Binding("m", "missions"),
         Binding("i", "incidents"),
         Binding("r", "runs"),
+        Binding("right_square_bracket", "next_run(1)"),
+        Binding("left_square_bracket", "next_run(-1)"),
         Binding("c", "schedule"),
         Binding("f", "space"),
         Binding("a", "alerts"),
+        Binding("b", "toggle_bell"),
         Binding("slash", "filter"),
         Binding("question_mark", "help"),
         Binding("q", "leave"),
@@ -167,31 +169,6 @@ class TerminalApp(Starting, Deciding, DirectCommands):
         await self.push_screen(Choose("Send a signal", choices), send)
         self.show()
 
-    async def action_runs(self) -> None:
-        """Choose the run to show."""
-        try:
-            runs = await self.control.runs()
-        except M2pemError as error:
-            self.say(str(error), alarm=True)
-            return
-        choices = [Choice(each.run, f"{each.run}  {each.mission}", each.status) for each in runs]
-        choices.reverse()
-
-        def look(run: str | None) -> None:
-            if run is not None:
-                self.run_worker(self._load_and_look(run), exit_on_error=False)
-
-        await self.push_screen(Choose("Look at a run", choices), look)
-        self.show()
-
-    async def _load_and_look(self, run: RunId) -> None:
-        try:
-            await self.follower.load(run)
-        except M2pemError as error:
-            self.say(str(error), alarm=True)
-        else:
-            self.look_at(run)
-
     async def action_space(self) -> None:
         """Show who is in shared space, and which tasks wait for what."""
         try:
@@ -200,11 +177,6 @@ class TerminalApp(Starting, Deciding, DirectCommands):
             self.say(str(error), alarm=True)
             return
         await self.push_screen(Read(TITLE_SPACE, space_text(spaces, waiting)))
-        self.show()
-
-    async def action_alerts(self) -> None:
-        """Show all alerts; those that are shown have been seen."""
-        await self.push_screen(Read(TITLE_ALERTS, self.alerts.see()))
         self.show()
 
     def action_filter(self) -> None:

@@ -39,7 +39,12 @@ class Deciding(Actions):
     async def _decide_about(self, incident: OpenIncident) -> None:
         """Ask for the choice and what it needs; `y` confirms, after a look at what follows."""
         listed = incidents.decision_choices(incident)
-        choice = await self.push_screen_wait(Choose(incident.task, listed, str(incident)))
+        try:
+            text = incidents.blocked_text(incident, await self.control.waiting())
+        except M2pemError as error:
+            self.say(str(error), alarm=True)
+            return
+        choice = await self.push_screen_wait(Choose(incident.task, listed, text))
         if choice is None:
             return
         try:
@@ -53,8 +58,8 @@ class Deciding(Actions):
                 "roles": decision.roles,
             }
             preview = await self.control.preview_incident(*place, **needs)
-            text = incidents.effect_text(incident, decision, preview)
-            if await self.push_screen_wait(Confirm(f"{choice} {incident.incident}?", text)):
+            effects = incidents.effect_text(incident, decision, preview)
+            if await self.push_screen_wait(Confirm(f"{choice} {incident.incident}?", effects)):
                 stuck = preview.verdict is IncidentVerdict.CANNOT_COMPLETE
                 await self.control.resolve_incident(
                     *place, **needs, by=self.by, even_if_stuck=stuck

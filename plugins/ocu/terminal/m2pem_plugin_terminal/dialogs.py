@@ -162,11 +162,23 @@ class Confirm(_TextDialog[bool]):
     HINT = "y: yes   Esc: no"
 
 
+class ConfirmStart(_TextDialog[str]):
+    """Whether a mission starts: now (`y`), when its vehicles are free (`w`), or later (`l`)."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        ("y", "dismiss('start')", "Yes"),
+        ("w", "dismiss('wait')", "When all is free"),
+        ("l", "dismiss('later')", "Later"),
+        ("escape", "dismiss(None)", "No"),
+    ]
+    HINT = "y: yes   w: when all is free   l: later   Esc: no"
+
+
 class Read(_TextDialog[None]):
     """A text; Escape, Enter or ? closes it."""
 
     BINDINGS: ClassVar[list[BindingType]] = [("escape,enter,question_mark", "dismiss", "Close")]
-    HINT = "Esc: close"
+    HINT = "Up, Down: move   Esc: close"
 
 
 class Ask(ModalScreen[str | None]):
@@ -203,18 +215,20 @@ KEYS = (
     ("^A ^A", "STOP all missions"),
     ("^C ^C", "as ^X; when nothing runs, quit"),
     ("s", "send a signal"),
-    ("m", "start a mission, chosen from the files there are"),
-    ("d", "command a vehicle: go to, hold, return, land, ..."),
-    ("t", "take a vehicle to steer by hand, or give it back"),
+    ("m", "start a mission, from the files there are"),
+    ("d", "command a vehicle: go to, hold, return, land"),
+    ("t", "take a vehicle to steer it, or give it back"),
     ("i", "decide about an error that stops a task (!)"),
-    ("r", "look at another run"),
+    ("r", "runs: going on, scheduled and ended ones"),
+    ("] [", "the next run that goes on, the one before"),
     ("g", "the map; g or Esc leaves it"),
     ("arrows", "move the map; else the mission"),
     ("+ - 0", "map: nearer, farther, everything"),
     (". ,", "map: follow the next vehicle, the one before"),
     ("c", "the schedule: start, hold, release, cancel"),
     ("f", "who is in shared space, and which tasks wait"),
-    ("a", "alerts, which stay until they are seen here"),
+    ("a", "alerts: acknowledge, take care, see the run"),
+    ("b", "the bell, on or off"),
     ("/", "log: only lines with a text; Esc: all"),
     ("PgUp PgDn", "move through the log"),
     ("Shift-Up", "move through a long question"),
@@ -224,17 +238,18 @@ KEYS = (
 
 
 def help_text() -> Text:
-    """Show all keys."""
+    """Show the marks of the mission, then all keys."""
     text = Text()
+    text.append("●", "#7fc8a9")
+    text.append(" at work  ", "#9aa4af")
+    text.append("?", "bold #e8c468")
+    text.append(" asks  ", "#9aa4af")
+    text.append("○", "#8ab4d8")
+    text.append(" waits  ", "#9aa4af")
+    text.append("✓ - ✗", "#9aa4af")
+    text.append(" done, given up, failed\n", "#9aa4af")
     for key, what in KEYS:
         text.append(f"{key:<11}", "bold #c8d0d9")
         text.append(f"{what}\n", "#9aa4af")
-    text.append("●", "#7fc8a9")
-    text.append(" at work   ", "#9aa4af")
-    text.append("?", "bold #e8c468")
-    text.append(" asks   ", "#9aa4af")
-    text.append("○", "#8ab4d8")
-    text.append(" waits   ", "#9aa4af")
-    text.append("✓ - ✗", "#9aa4af")
-    text.append(" done, given up, failed", "#9aa4af")
+    text.rstrip()
     return text

@@ -1,6 +1,7 @@
 """The screen of the operator control unit: its panes, which follow the executive."""
 
 import asyncio
+import os
 import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
@@ -20,6 +21,7 @@ from m2pem.api import (
     Listener,
     MissionControl,
     OpenPrompt,
+    OperatorAlert,
     PromptClosed,
     ResourceId,
     RunId,
@@ -29,9 +31,9 @@ from m2pem.api import (
     follow,
 )
 from m2pem.api.run_view import Behavior, FinishedToken
-from m2pem.api.runs import LOGGED, NEWS
+from m2pem.api.runs import LOGGED
 from m2pem.errors import M2pemError
-from m2pem_plugin_terminal.alerts import Alerts
+from m2pem_plugin_terminal.alerts import Bell, hint, time_left
 from m2pem_plugin_terminal.ascii_only import AsciiFilter, ascii_only
 from m2pem_plugin_terminal.formatting import clock_time
 from m2pem_plugin_terminal.handover import taken
@@ -39,6 +41,7 @@ from m2pem_plugin_terminal.log_pane import Line, LogPane, line_of
 from m2pem_plugin_terminal.map_pane import MapPane
 from m2pem_plugin_terminal.mission_pane import FADES_FOR_S, Done, mission_tree, shown_when_done
 from m2pem_plugin_terminal.prompt_pane import PromptPane
+from m2pem_plugin_terminal.runs import run_tabs
 from m2pem_plugin_terminal.status_lines import DoublePress, NoticeLine, StopBar, header
 from m2pem_plugin_terminal.vehicles_pane import Vehicles
 
@@ -59,6 +62,9 @@ NARROW_CELLS = 66
 LOG_LINES = 2000
 
 DONE_TOKENS = 20
+
+BELL = "M2PEM_BELL"
+"""0: the bell is off at first."""
 
 ALONE = "No executive stands by any more"
 
@@ -135,6 +141,7 @@ class Display(App[None], Listener, inherit_bindings=False):
         self.own_answers: set[tuple[RunId, str]] = set()
         # Stored, not queried: Textual cannot find them while it closes the screen.
         self._header = Static(id="header")
+        self._tabs = Static(id="runs")
         self._tree = Static(id="tree")
         self._mission = VerticalScroll(self._tree, id="mission", can_focus=False)
         self._fleet = Static(id="fleet")
@@ -142,8 +149,10 @@ class Display(App[None], Listener, inherit_bindings=False):
         self._ascii = [AsciiFilter()] if ascii_only() else []
         self.map_pane = MapPane(control.fleet(), ascii=bool(self._ascii))
         self.map_active = False
-        self.alerts = Alerts(lambda: time.strftime("%H:%M:%S"))
-        self._notice = NoticeLine(now, self.alerts.hint)
+        self.alerts: Sequence[OperatorAlert] = ()
+        self._alerts_read = False
+        self.alarm_bell = Bell(on=os.environ.get(BELL, "1") != "0")
+        self._notice = NoticeLine(now, lambda: hint(self.alerts))
         self.prompt_pane = PromptPane(now)
         self.log_pane = LogPane()
 
@@ -152,6 +161,7 @@ class Display(App[None], Listener, inherit_bindings=False):
     def compose(self) -> ComposeResult:
         """Compose the panes from top to bottom."""
         yield self._header
+        yield self._tabs
         yield Horizontal(self._mission, self.map_pane, self._around, id="middle")
         yield self.prompt_pane
         yield self.log_pane
@@ -171,6 +181,7 @@ class Display(App[None], Listener, inherit_bindings=False):
         self.run_worker(self._follow())
         self.run_worker(self._follow_telemetry())
         self.run_worker(self._follow_standbys())
+        self.alerts_changed()
         self.set_interval(REFRESH_S, self.show)
 
     def get_line_filters(self) -> Sequence[LineFilter]:
@@ -217,7 +228,6 @@ class Display(App[None], Listener, inherit_bindings=False):
             with suppress(M2pemError, OSError):  # the last answer stays
                 found = await self.control.standbys()
                 if self._standbys and not found:
-                    self.alerts.add(ALONE)
                     self.say(ALONE, alarm=True)
                 self._standbys = found
             await asyncio.sleep(STANDBYS_EVERY_S)
@@ -241,6 +251,10 @@ class Display(App[None], Listener, inherit_bindings=False):
             self._ask_holders()
         active = [b for b in self.follower.views.values() if not b.status.ended]
         others = sum(1 for each in active if each is not view)
+        self._tabs.display = others > 0
+        if others:
+            asking = {run for run, _ in self.follower.prompts}
+            self._tabs.update(run_tabs(active, self.run_shown, asking))
         hosts = list(dict.fromkeys(each.host for each in self._standbys))
         self._header.update(header(view, others, time_s, self.size.width, hosts))
         if view is not None:
@@ -249,7 +263,8 @@ class Display(App[None], Listener, inherit_bindings=False):
         self._show_vehicles(now)
         if self.map_pane.display:
             self.map_pane.draw(self._vehicles.silent(now))
-        self.prompt_pane.show(self.follower.prompts, self._label, self.run_shown)
+        self.prompt_pane.show(self.follower.prompts, self._label, self.run_shown, self._time_left)
+        self._ring()
         self._notice.show()
         paused = view is not None and view.status is RunStatus.PAUSED
         for each in self.screen_stack:
@@ -264,6 +279,14 @@ class Display(App[None], Listener, inherit_bindings=False):
             width = self._around.scrollable_content_region.width
             holders = taken(self._holders)
             self._fleet.update(self._vehicles.table(now, width, self._behavior_name, holders))
+
+    def clock_us(self) -> int:
+        """Microseconds since the Unix epoch by the executive's clock, as far as it is known here:
+        runs that go on say it, and without one it is taken for that of this computer."""
+        view = self.view
+        if view is not None and view.status is RunStatus.RUNNING:
+            return view.at_us(self._time_s)
+        return time.time_ns() // 1000
 
     async def _ask_time(self, view: RunView) -> None:
         try:
@@ -293,6 +316,9 @@ class Display(App[None], Listener, inherit_bindings=False):
         view = self.follower.views.get(run)
         return view.behaviors.get(id_) if view is not None else None
 
+    def _time_left(self, prompt: OpenPrompt) -> str:
+        return time_left(self.alerts, prompt.run, prompt.prompt, self.clock_us())
+
     def _label(self, prompt: OpenPrompt) -> str:
         view = self.follower.views.get(prompt.run)
         return view.label(prompt.element) if view is not None else prompt.element
@@ -318,7 +344,7 @@ class Display(App[None], Listener, inherit_bindings=False):
         if shown is None or shown.status.ended:
             self.look_at(view.run)
         elif not view.status.ended:
-            self.say(f"{view.run} has begun; press r to show it")
+            self.say(f"{view.run} has begun; press ] to show it")
 
     def recorded(self, view: RunView, stamped: StampedRecord, *, is_new: bool) -> None:
         """Log a record, and keep what it says of places."""
@@ -355,12 +381,24 @@ class Display(App[None], Listener, inherit_bindings=False):
             self.say(f"{self._label(prompt)} was withdrawn")
         self.show()
 
+    def alerts_changed(self) -> None:
+        """Read the executive's list of alerts; ring the bell for what is new."""
+        self.run_worker(self._read_alerts(), exit_on_error=False)
+
+    async def _read_alerts(self) -> None:
+        with suppress(M2pemError):  # the last answer stays
+            self.alerts = await self.control.alerts()
+            self._alerts_read = True
+            self._ring()
+
+    def _ring(self) -> None:
+        if self._alerts_read and self.alarm_bell.rings(self.alerts, self.now()):
+            self.bell()
+
     def alerted(self, alert: Alert) -> None:
-        """Show an alert as an alarm, unless the log shows it, and keep it until it is seen. The log
-        of its run has it whole."""
+        """Show an alert as an alarm, unless the log shows it. The log of its run has it whole, and
+        the executive's list keeps it."""
         text = f"{alert.run}: {alert.text}" if alert.run else alert.text
-        if alert.code not in NEWS:
-            self.alerts.add(text)
         if alert.code == LOGGED:
             return
         self.say(text, alarm=True)

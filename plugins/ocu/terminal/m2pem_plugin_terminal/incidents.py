@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from rich.text import Text
 
 from m2pem.api import IncidentPreview, IncidentVerdict, OpenIncident
+from m2pem.api.allocation import WaitingTask
 from m2pem_plugin_terminal.dialogs import Choice
 
 if TYPE_CHECKING:
@@ -38,6 +39,14 @@ class Decision:
 def incident_choices(incidents: Sequence[OpenIncident]) -> list[Choice]:
     """Return a line for each incident."""
     return [Choice(each.incident, f"{each.run}: {each.task}", each.code) for each in incidents]
+
+
+def blocked_text(incident: OpenIncident, waiting: Sequence[WaitingTask]) -> str:
+    """Return the incident, and the tasks that wait for what it holds."""
+    id_ = f"{incident.run}.{incident.incident.rpartition('.')[2]}"
+    blocked = [each for each in waiting if id_ in each.holders.values()]
+    lines = [f"it blocks {each.in_short()}" for each in blocked]
+    return "\n".join([str(incident), *(lines or ["no other task waits for it"])])
 
 
 def decision_choices(incident: OpenIncident) -> list[Choice]:

@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,6 +14,9 @@ from m2pem.errors import OperatorError, PluginError
 if TYPE_CHECKING:
     from m2pem.api.control import MissionControl
     from m2pem_plugin_terminal.app import TerminalApp
+
+MOUSE = "M2PEM_MOUSE"
+"""0: the terminal keeps the mouse, to select text without Shift."""
 
 LINGERS_FOR_S = 2.0
 """Seconds for which the end of a mission stays on the screen after `serve` is cancelled."""
@@ -48,7 +52,7 @@ class TerminalOcu:
         app = TerminalApp(self._control)
         loop = asyncio.get_running_loop()
         task_factory = loop.get_task_factory()
-        serving = asyncio.create_task(app.run_async(mouse=False))
+        serving = asyncio.create_task(app.run_async(mouse=os.environ.get(MOUSE, "1") != "0"))
         with _log_to(app):
             # Textual makes all tasks of the event loop eager, also those of the executive: undo
             # that.

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 
+from rich.style import Style
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.containers import Vertical, VerticalScroll
@@ -47,8 +48,12 @@ class PromptPane(Vertical):
         prompts: Mapping[tuple[RunId, str], OpenPrompt],
         label: Callable[[OpenPrompt], str],
         run: RunId,
+        time_left: Callable[[OpenPrompt], str],
     ) -> None:
-        """Show the open prompts; `label` names the element, `run` is the run that is shown."""
+        """Show the open prompts; `label` names the element, `run` is the run that is shown.
+
+        `time_left`: how long a prompt is open yet, in words that begin with a comma, or "".
+        """
         self._open = dict(prompts)
         if self._current not in self._open:
             self._show_prompt(next(iter(self._open), None))
@@ -61,8 +66,9 @@ class PromptPane(Vertical):
         count = f"Question {place} of {len(self._open)}" if several else "Question"
         address = prompt.prompt if prompt.run == run else f"{prompt.run} {prompt.prompt}"
         role = f" for {prompt.role}" if prompt.role else ""
+        left = time_left(prompt)
         hint = "   (Tab: next)" if several else ""
-        self.border_title = Text(f"{count}{role}: {label(prompt)} ({address}){hint}")
+        self.border_title = Text(f"{count}{role}: {label(prompt)} ({address}){left}{hint}")
         self._text.update(Text(prompt.text))
         self._decisions.update(_decisions(prompt))
 
@@ -89,8 +95,10 @@ def _decisions(prompt: OpenPrompt) -> Text:
     for number, decision in enumerate(prompt.decisions[:MOST_DECISIONS], 1):
         # A decision is not broken over two lines.
         label = (decision.label or decision.value).replace(" ", "\N{NO-BREAK SPACE}")
+        start = len(text)
         text.append(f"\N{NO-BREAK SPACE}{number}\N{NO-BREAK SPACE}", "bold #1b2129 on #e8c468")
         text.append(f"\N{NO-BREAK SPACE}{label}", "#e3e8ee")
+        text.stylize(Style.from_meta({"@click": f"app.answer({number})"}), start)
         text.append("   ")
     if len(prompt.decisions) > MOST_DECISIONS:
         text.append(f"and more: m2pem answer {prompt.run} {prompt.prompt}", "#9aa4af")

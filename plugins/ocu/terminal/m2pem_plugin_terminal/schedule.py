@@ -2,13 +2,17 @@
 
 from pathlib import Path
 
-from m2pem.api import Schedule, ScheduledMission, ScheduledStatus
+from m2pem.api import Schedule, ScheduledMission, ScheduledStatus, When
 from m2pem_plugin_terminal.dialogs import Choice
 
 TITLE = "Scheduled missions"
 NOTHING_SCHEDULED = (
     "Nothing is scheduled. `m2pem start MISSION --when ...` has a mission started later."
 )
+WHEN_HINT = (
+    "When: 08:00 or 2027-03-01 08:00, after r3 (when that run has completed), or by cron: 0 8 * * *"
+)
+CRON_FIELDS = 5
 ALL = "all"
 """The value of the line that holds the whole schedule, or releases it."""
 
@@ -33,3 +37,14 @@ def entry_choices(mission: ScheduledMission) -> list[Choice]:
         Choice("cancel", "Cancel it: it starts nothing any more"),
         Choice("start", "Start it now, whatever it waits for"),
     ]
+
+
+def when_of(text: str) -> When:
+    """Return when a mission is to start, as operators type it (`WHEN_HINT`); the executive refuses
+    what makes no sense."""
+    words = text.split()
+    if words[0] == "after":
+        return When(after=" ".join(words[1:]))
+    if len(words) == CRON_FIELDS:
+        return When(cron=" ".join(words))
+    return When(at=" ".join(words))

@@ -5,6 +5,7 @@ STOP is on every screen and over every dialog; a second press confirms it.
 
 from collections.abc import Callable, Sequence
 
+from rich.style import Style
 from rich.text import Text
 from textual.widgets import Static
 
@@ -28,15 +29,17 @@ ARMED_FOR_S = 4.0
 STOP_ALL = "STOP all runs"
 
 HINTS = (
-    ("p", "Pause"),
-    ("s", "Signals"),
-    ("t", "Take"),
-    ("m", "Start"),
-    ("r", "Runs"),
-    ("g", "Map"),
-    ("?", "Help"),
-    ("q", "Quit"),
+    ("p", "Pause", "pause"),
+    ("s", "Signals", "signals"),
+    ("t", "Take", "take"),
+    ("m", "Start", "missions"),
+    ("r", "Runs", "runs"),
+    ("g", "Map", "map"),
+    ("?", "Help", "help"),
+    ("q", "Quit", "leave"),
 )
+"""Keys, what they do, and the action that a click on them does. STOP has none: it is pressed
+twice."""
 
 
 def header(
@@ -140,7 +143,10 @@ class StopBar(Static):
             return
         text = Text()
         text.append(" ^X STOP ", "bold #ffffff on #b3382c")
-        for key, hint in HINTS:
-            text.append(f"  {key} ", "bold #c8d0d9")
+        for key, hint, action in HINTS:
+            text.append("  ")
+            start = len(text)
+            text.append(f"{key} ", "bold #c8d0d9")
             text.append("Go on" if hint == "Pause" and paused else hint, "#9aa4af")
+            text.stylize(Style.from_meta({"@click": f"app.{action}"}), start)
         self.update(text)

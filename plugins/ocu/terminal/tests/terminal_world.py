@@ -13,6 +13,7 @@ import pytest
 from m2pem_plugin_terminal.app import TerminalApp
 from textual.pilot import Pilot
 
+from m2pem.api.alerts import AlertsChanged
 from m2pem.api.arbiter import ArbiterContext, Connection
 from m2pem.api.control import MissionControl
 from m2pem.api.runs import RunId
@@ -193,6 +194,11 @@ class World:
 
     async def start(self) -> RunId:
         return await self.control.start(MISSION)
+
+    def look(self) -> None:
+        """What an executive on the clock of the system does twice a second: update the alerts."""
+        self.executive.look()
+        self.executive.events.publish(AlertsChanged())
 
     @asynccontextmanager
     async def terminal(

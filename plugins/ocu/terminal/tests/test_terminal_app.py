@@ -166,11 +166,11 @@ async def test_a_second_run_is_told_and_can_be_looked_at(world: World) -> None:
         await world.control.start(MISSION.read_bytes().replace(b'"scout"', b'"uav"'))
         await terminal.until_shown("+1 more (r)", "r2 has begun", "Question 1 of 4")
         await terminal.press("r")
-        await terminal.until_shown("Look at a run", "1 r2", "2 r1")
+        await terminal.until_shown("─ Runs ─", "1 r2", "2 r1")
         await terminal.press("down", "enter")
-        await terminal.until_gone("Look at a run")
+        await terminal.until_gone("─ Runs ─")
         await terminal.press("r")
-        await terminal.until_shown("Look at a run")
+        await terminal.until_shown("─ Runs ─")
         await terminal.press("1")
         await terminal.until_shown("r2  +1 more (r)", "GATE (r1 p")
 
@@ -223,7 +223,7 @@ async def test_nothing_is_cut_off_in_80_columns(world: World) -> None:
         assert len(lines) == 24
         assert not terminal.shows("…")
         keys = " ".join(lines[-1].split())
-        assert keys == "^X STOP p Pause s Signals t Take m Start r Runs / Filter ? Help q Quit"
+        assert keys == "^X STOP p Pause s Signals t Take m Start r Runs g Map ? Help q Quit"
         await terminal.press("question_mark")
         await terminal.until_shown("answer the question", "done, given up, failed", "Esc: close")
 

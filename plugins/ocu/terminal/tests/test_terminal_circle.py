@@ -22,7 +22,7 @@ async def test_an_operator_stops_one_of_two_runs_that_wait_for_each_other() -> N
             # The log has it whole, on several lines.
             await terminal.until_shown(NONE_GOES_ON, "Stop one of them (`m2pem stop", f"{second}`)")
             await terminal.press("r")
-            await terminal.until_shown("Look at a run", f"1 {second}", f"2 {first}")
+            await terminal.until_shown("─ Runs ─", f"1 {second}", f"2 {first}")
             await terminal.press("1")
             await terminal.until_shown(f"{second}  +1 more (r)", NONE_GOES_ON)
             await terminal.press("ctrl+x")

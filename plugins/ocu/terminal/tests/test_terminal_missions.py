@@ -4,8 +4,10 @@ from pathlib import Path
 
 import pytest
 from m2pem_plugin_terminal.missions import preview_text
+from m2pem_plugin_terminal.schedule import when_of
 from terminal_world import MISSION, World
 
+from m2pem.api import When
 from m2pem.api.allocation import RoleAssignment, StartPreview
 from m2pem.findings import Finding, Severity
 
@@ -123,3 +125,32 @@ def test_a_preview_names_the_members_of_a_team_and_the_files_without_their_folde
         "c.bpmn:3: x: warning: is doubtful; mend it [rule]",
         "sweepers: team: a, b",
     ]
+
+
+async def test_a_mission_waits_until_its_vehicles_are_free_or_starts_later(world: World) -> None:
+    await world.executive.load_schedule()
+    world.executive.serve_schedule()
+    async with world.terminal() as terminal:
+        await terminal.press("m")
+        await terminal.until_shown(
+            "1 patrol.bpmn  missions  1 warning", "2 wrong.bpmn  missions  1"
+        )
+        await terminal.press("1")
+        await terminal.until_shown("Start patrol.bpmn?", "w: when all is free   l: later")
+        await terminal.press("l")
+        await terminal.until_shown("Start patrol.bpmn later", "after r3")
+        await terminal.press(*"2031-03-01", "space", *["0", "8", "colon", "0", "0"], "enter")
+        await terminal.until_shown("s1 is scheduled by anna@gcs1")
+        await terminal.press("m", "1")
+        await terminal.until_shown("w: when all is free")
+        await terminal.press("w")
+        await terminal.until_shown("s2 is scheduled by anna@gcs1")
+        first, second = (await world.control.scheduled()).entries
+        assert {first.by, second.by} == {"anna@gcs1"}
+        assert {each.when.at[:16] for each in (first, second)} == {"2031-03-01T08:00", ""}
+
+
+def test_when_is_read_as_operators_type_it() -> None:
+    assert when_of("08:00") == When(at="08:00")
+    assert when_of("after r3") == When(after="r3")
+    assert when_of("0 8 * * *") == When(cron="0 8 * * *")
