@@ -40,7 +40,7 @@ def _line(alert: OperatorAlert, now_us: int) -> str:
     mark = "!" if alert.calls else " " if alert.open else "-"
     where = f"{alert.run}: " if alert.run else ""
     many = f" ({alert.count} times)" if alert.count > 1 else ""
-    return f"{mark} {alert.severity}, {age(alert.at(now_us).age_s)}: {where}{alert.text}{many}"
+    return f"{mark} {alert.severity}, {age(alert.age_s)}: {where}{alert.text}{many}"
 
 
 def _who(alert: OperatorAlert) -> str:
@@ -51,7 +51,7 @@ def alert_text(alert: OperatorAlert, now_us: int) -> str:
     """Return all that is known of an alert."""
     where = f"{alert.run}: " if alert.run else ""
     lines = [f"{where}{alert.text}", *alert.details]
-    lines.append(f"{alert.severity} {alert.code}, {age(alert.at(now_us).age_s)} ago")
+    lines.append(f"{alert.severity} {alert.code}, {age(alert.age_s)} ago")
     if alert.count > 1:
         lines.append(f"said {alert.count} times, last {_ago(now_us, alert.last_us)} ago")
     if alert.acknowledged_by:

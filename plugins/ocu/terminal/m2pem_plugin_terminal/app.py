@@ -2,6 +2,7 @@
 
 from typing import ClassVar
 
+from textual import events
 from textual.binding import Binding, BindingType
 from textual.containers import VerticalScroll
 
@@ -207,6 +208,11 @@ class TerminalApp(Starting, Alerting, DirectCommands):
             text = f"Not ended: {', '.join(running)}. To stop all, press ^A twice."
         await self.push_screen(Choose("Quit", choices, text), done)
         self.show()
+
+    async def on_click(self, event: events.Click) -> None:
+        """Do what a text that is clicked stands for. Textual's own links would be underlined."""
+        if (action := event.style.meta.get("does")) and not self.in_dialog:
+            await self.run_action(action)
 
     def action_map(self) -> None:
         """Let the arrow keys move the map, or the mission again."""

@@ -98,7 +98,7 @@ def _decisions(prompt: OpenPrompt) -> Text:
         start = len(text)
         text.append(f"\N{NO-BREAK SPACE}{number}\N{NO-BREAK SPACE}", "bold #1b2129 on #e8c468")
         text.append(f"\N{NO-BREAK SPACE}{label}", "#e3e8ee")
-        text.stylize(Style.from_meta({"@click": f"app.answer({number})"}), start)
+        text.stylize(Style.from_meta({"does": f"answer({number})"}), start)
         text.append("   ")
     if len(prompt.decisions) > MOST_DECISIONS:
         text.append(f"and more: m2pem answer {prompt.run} {prompt.prompt}", "#9aa4af")

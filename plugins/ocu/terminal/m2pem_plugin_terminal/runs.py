@@ -31,7 +31,7 @@ def run_tabs(views: Iterable[RunView], shown: RunId, asking: Collection[RunId]) 
         marks += "=" if view.status is RunStatus.PAUSED else ""
         own = view.run == shown
         style = "bold #1b2129 on #8ab4d8" if own else "#c8d0d9 on #2a333e"
-        click = Style.from_meta({"@click": f"app.look('{view.run}')"})
+        click = Style.from_meta({"does": f"look('{view.run}')"})
         start = len(text)
         text.append(f" {view.run} {shortened(view.name, NAME_CELLS)} ", style)
         if marks:

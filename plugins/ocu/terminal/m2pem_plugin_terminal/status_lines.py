@@ -148,5 +148,5 @@ class StopBar(Static):
             start = len(text)
             text.append(f"{key} ", "bold #c8d0d9")
             text.append("Go on" if hint == "Pause" and paused else hint, "#9aa4af")
-            text.stylize(Style.from_meta({"@click": f"app.{action}"}), start)
+            text.stylize(Style.from_meta({"does": action}), start)
         self.update(text)
