@@ -29,8 +29,8 @@ def with_loss(journal, loss=LOSS):
     """The journal as one that has found that entries of r1 are gone."""
     runs = journal.runs
 
-    async def lossy():
-        return [replace(each, loss=loss) for each in await runs()]
+    async def lossy(**wanted):
+        return [replace(each, loss=loss) for each in await runs(**wanted)]
 
     journal.runs = lossy
     return journal

@@ -67,6 +67,9 @@ class Starts:
     def admitted(self, plan: SchedulePlan) -> tuple[Mission, str]:
         return parse_mission(plan.mission, plan.mission_name), plan.process
 
+    async def unapproved(self, _: SchedulePlan) -> str:
+        return ""
+
     async def begin_scheduled(
         self,
         loaded: Mission,

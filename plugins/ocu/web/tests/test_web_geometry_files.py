@@ -19,7 +19,7 @@ async def test_a_file_is_read_and_nothing_is_saved(tmp_path: Path) -> None:
     async with rest_world(tmp_path) as rest:
         before = await rest.get("/geometries")
         answer = await rest.http.post(
-            "/api/geometries/read",
+            "/api/geometry-files/read",
             params={"name": "places.geojson"},
             content=json.dumps(file).encode(),
             headers={"Content-Type": "application/octet-stream", "x-role": "viewer"},
@@ -39,14 +39,14 @@ async def test_a_file_is_read_and_nothing_is_saved(tmp_path: Path) -> None:
 async def test_geometries_and_drawings_are_exported(tmp_path: Path) -> None:
     async with rest_world(tmp_path) as rest:
         names = [each["name"] for each in await rest.get("/geometries")]
-        whole = await rest.get("/geometries/export?format=geojson")
+        whole = await rest.get("/geometry-files/export?format=geojson")
         assert [each["properties"]["name"] for each in whole["features"]] == names
-        one = await rest.get(f"/geometries/export?format=geojson&names={names[0]}")
+        one = await rest.get(f"/geometry-files/export?format=geojson&names={names[0]}")
         assert one["features"] == whole["features"][:1]
-        await rest.get("/geometries/export?format=geojson&names=nowhere", 404)
-        await rest.get("/geometries/export?format=dwg", 422)
+        await rest.get("/geometry-files/export?format=geojson&names=nowhere", 404)
+        await rest.get("/geometry-files/export?format=dwg", 422)
         drawn = {"format": "geojson", "geometries": [{"name": "a", "geojson": LINE}]}
-        file = await rest.post("/geometries/export", drawn)
+        file = await rest.post("/geometry-files/export", drawn)
         assert file["features"][0]["geometry"] == LINE
         drawn["geometries"] = [{"name": "a", "geojson": {"type": "Point"}}]
-        await rest.post("/geometries/export", drawn, 422)
+        await rest.post("/geometry-files/export", drawn, 422)

@@ -111,7 +111,7 @@ def refuse_late(connection: HTTPConnection) -> None:
         )
 
 
-FILES = frozenset({"/api/geometries/read"})
+FILES = frozenset({"/api/geometry-files/read"})
 """Routes that take the bytes of a file; all others take JSON alone."""
 
 LARGEST_BYTES = 10_000_000

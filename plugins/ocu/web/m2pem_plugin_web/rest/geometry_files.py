@@ -1,4 +1,4 @@
-"""/api/geometries/read and export: files of routes, areas and points."""
+"""/api/geometry-files/read and export: files of routes, areas and points."""
 
 import asyncio
 from collections.abc import Sequence
@@ -99,7 +99,7 @@ class ExportModel(Body):
 
 def router(control: MissionControl) -> APIRouter:
     """The routes of files."""
-    routes = APIRouter(prefix="/api/geometries", tags=["geometries"], responses=RESPONSES)
+    routes = APIRouter(prefix="/api/geometry-files", tags=["geometries"], responses=RESPONSES)
     turn = asyncio.Semaphore(FILES_AT_ONCE)
 
     @routes.post("/read", openapi_extra={"requestBody": FILE_BODY})

@@ -20,7 +20,7 @@ interface Read {
 /** Shows what is in a file, to be taken or not. */
 export async function readFile(plan: MapPlan, file: File): Promise<void> {
   try {
-    const read = await post<Read>(`/geometries/read?name=${encodeURIComponent(file.name)}`, file);
+    const read = await post<Read>(`/geometry-files/read?name=${encodeURIComponent(file.name)}`, file);
     if (read.geometries.length === 0 && read.problems.length === 0) {
       toast(fill(words.nothingIn, { file: file.name }), "bad");
       return;
@@ -55,7 +55,7 @@ export async function exportAs({ catalogue, mission }: EditorContext, format: Fo
     geojson: featureOf(draftOf(each)),
   }));
   try {
-    const content = await postForFile("/geometries/export", { format, geometries });
+    const content = await postForFile("/geometry-files/export", { format, geometries });
     download(`${mission}.${format}`, content);
   } catch (error) {
     const reason = error instanceof Error ? error.message : String(error);
