@@ -275,7 +275,7 @@ DAMAGES: dict[str, tuple[str, Callable[[Path], object], int, str]] = {
     "truncated": ("", half, 1, "it is damaged; use a backup, or save what is intact"),
     "header flipped": ("", flip(lambda _: 3), 1, "it is not a journal of m2pem"),
     "entry flipped": ("", flip(of_text(b'"Noted"')), 1, "does not follow from what was before it"),
-    "fleet flipped": ("", flip(of_text(b'"vehicles"')), 1, "`m2pem journal check` says"),
+    "fleet flipped": ("", flip(of_text(b'"domain"')), 1, "`m2pem journal check` says"),
     "emptied": ("", lambda file: file.write_bytes(b""), 1, NOT_THAT_OF_THE_MARK),
     "removed": ("", Path.unlink, 2, "there is no journal"),
     "older": ("", older, 2, "the journal has lost the run: it acknowledged"),

@@ -188,7 +188,7 @@ def findings(folder: Path, text: str) -> list[tuple[int, str, str, str, str]]:
                 "vehicles.a.payloads.p.xyz",
                 "unknown-key",
                 "unknown key 'xyz'",
-                "known keys: arbiter, connection, behaviors, detector, tags",
+                "known keys: arbiter, connection, behaviors, detector, video, tags",
             ),
         ),
         (

@@ -426,6 +426,8 @@ def test_what_the_static_check_says_of_tasks_that_compete_can_happen(seed: int) 
     mission = notation(branches_with_needs(Random(seed), COMPETING))
     vehicles = fleet_of(mission)
     findings = check_mission(mission, vehicles, offers_all)
+    # Another rule is about tasks that name one vehicle; it does not ask what the fleet has.
+    findings = [each for each in findings if each.rule != "same-vehicle"]
     assert all(each.rule == "tasks-compete" for each in findings)
     net = translate(mission, vehicles, options=OPEN)
     found = explore(net, SMALL)

@@ -80,7 +80,8 @@ class TeamModel(BaseModel):
 
 
 class FleetModel(BaseModel):
-    """The fleet in use; `fence`: the area (GeoJSON) that no vehicle may leave, null for none."""
+    """The fleet in use; `fence`: the area (GeoJSON) that no vehicle may leave, null for none.
+    `approval_persons`: how many persons must approve a mission before it starts; 0 for none."""
 
     name: str
     origin: OriginModel
@@ -88,6 +89,7 @@ class FleetModel(BaseModel):
     payloads: list[PayloadModel]
     teams: list[TeamModel]
     fence: dict[str, Any] | None
+    approval_persons: int
 
 
 class ParameterModel(BaseModel):
@@ -183,6 +185,7 @@ def _fleet(fleet: Fleet) -> FleetModel:
             for each in fleet.teams.values()
         ],
         fence=as_geojson(fence)["geometry"] if isinstance(fence, Area) else None,
+        approval_persons=fleet.approval_persons,
     )
 
 

@@ -35,6 +35,7 @@ describe("behaviors that can be commanded", () => {
       payloads: [],
       teams: [],
       fence: null,
+      approval_persons: 0,
     };
     const offers = offersOf(fleet, [
       behavior("goto", ["v1", "m"]),

@@ -60,6 +60,7 @@ export function rows({ vehicles, states = [], payloads = {}, status = {}, silent
     ),
     teams: [],
     fence: null,
+    approval_persons: 0,
   };
   const known = Object.fromEntries(states.map((each) => [each.resource, each]));
   return rowsOf({

@@ -92,6 +92,8 @@ export interface Fleet {
   teams: { name: string; members: string[]; lead: string }[];
   /** No vehicle may leave it. */
   fence: GeoJSON.Geometry | null;
+  /** How many persons must approve a mission before it starts. */
+  approval_persons: number;
 }
 
 /** What altitudes are above: home, the sea, or the ground. */

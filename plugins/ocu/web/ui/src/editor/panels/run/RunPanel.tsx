@@ -34,7 +34,9 @@ function RunPanel({ editor }: { editor: EditorContext }) {
         <BeginForm editor={editor} prefix="m2r" />
       </section>
       <Rehearse editor={editor} />
-      <Approval mission={editor.mission} isDirty={editor.isDirty.value} />
+      {editor.catalogue.fleet.approval_persons > 0 && (
+        <Approval mission={editor.mission} isDirty={editor.isDirty.value} />
+      )}
       <Start editor={editor} />
     </div>
   );
