@@ -98,8 +98,11 @@ def survey_routes(pattern: SurveyPattern, surveyors: Sequence[Surveyor]) -> list
     """
     if not surveyors:
         raise GeometryError("a survey needs a vehicle")
-    if pattern.spacing_m <= 0:
+    if not 0 < pattern.spacing_m < math.inf:
         raise GeometryError(f"spacing: {pattern.spacing_m:g} m is not above 0")
+    for each in surveyors:
+        if not 0 < each.speed_m_s < math.inf:
+            raise GeometryError(f"{each.name or 'speed'}: {each.speed_m_s:g} m/s is not above 0")
     if sum(len(ring) for each in (pattern.area, *pattern.keep_out) for ring in each.rings) > (
         MAX_CORNERS
     ):

@@ -121,6 +121,7 @@ def test_a_clearance_is_kept() -> None:
     ("pattern", "says"),
     [
         (SurveyPattern(area(box(0, 0, 200, 60)), 0.0), "spacing: 0 m is not above 0"),
+        (SurveyPattern(area(box(0, 0, 200, 60)), math.nan), "spacing: nan m is not above 0"),
         (SurveyPattern(area(box(0, 0, 200, 60)), 0.001), "more than 2000 passes"),
         (SurveyPattern(area(box(0, 0, 200, 60)), 9.0, margin_m=-40), "nothing of the area is left"),
         (
@@ -213,3 +214,10 @@ def test_a_camera_gives_spacing_trigger_distance_and_resolution() -> None:
         image_plan(camera, 0.0, 0.8, 0.7)
     with pytest.raises(ValueError, match="side_overlap 1 is not"):
         image_plan(camera, 10.0, 0.8, 1.0)
+
+
+@pytest.mark.parametrize("speed_m_s", [0.0, -1.0, math.nan, math.inf])
+def test_a_vehicle_without_a_speed_is_refused(speed_m_s: float) -> None:
+    surveyors = (Surveyor("uav1", speed_m_s), Surveyor("uav2", 2.0))
+    with pytest.raises(GeometryError, match=r"uav1: .* m/s is not above 0"):
+        survey_routes(SurveyPattern(area(box(0, 0, 200, 60)), 10.0), surveyors)

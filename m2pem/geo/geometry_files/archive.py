@@ -9,17 +9,24 @@ from m2pem.geo.geometry_files.contents import FeatureProblemError
 
 MAX_MEMBERS = 1_000
 MAX_UNPACKED_BYTES = 50_000_000
-"""Of one member: what is beyond is never unpacked, whatever the archive says of its size."""
+"""Of all members that are read: what is beyond is never unpacked, whatever the archive says of its
+size."""
 
 
-def archive_of(content: bytes) -> ZipFile:
+class Archive(ZipFile):
+    """An archive. `left_bytes`: how much of it may still be unpacked."""
+
+    left_bytes = MAX_UNPACKED_BYTES
+
+
+def archive_of(content: bytes) -> Archive:
     """Return an archive.
 
     Raises:
         GeometryError: it is none, or has too many members.
     """
     try:
-        archive = ZipFile(BytesIO(content))
+        archive = Archive(BytesIO(content))
     except (BadZipFile, ValueError, NotImplementedError, OSError) as error:
         raise GeometryError(f"is no ZIP archive: {error}") from None
     if len(archive.infolist()) > MAX_MEMBERS:
@@ -29,20 +36,24 @@ def archive_of(content: bytes) -> ZipFile:
     return archive
 
 
-def member(archive: ZipFile, name: str) -> bytes:
+def member(archive: Archive, name: str) -> bytes:
     """Unpack a member.
 
     Raises:
-        GeometryError: it is damaged, encrypted, or larger than `MAX_UNPACKED_BYTES`.
+        GeometryError: it is damaged, encrypted, or with what was unpacked before larger than
+            `MAX_UNPACKED_BYTES`.
     """
     try:
         with archive.open(name) as file:
-            content = file.read(MAX_UNPACKED_BYTES + 1)
+            content = file.read(archive.left_bytes + 1)
     except (BadZipFile, EOFError, OSError, ValueError, zlib.error) as error:
         raise GeometryError(f"{name} is damaged: {error}") from None
     except (RuntimeError, NotImplementedError) as error:  # encrypted; a method that is not known
         raise GeometryError(f"{name} cannot be unpacked: {error}") from None
-    if len(content) > MAX_UNPACKED_BYTES:
+    if len(content) > archive.left_bytes:
+        before = " with what was read before it" if archive.left_bytes < MAX_UNPACKED_BYTES else ""
+        archive.left_bytes = 0
         limit = f"{MAX_UNPACKED_BYTES / 1_000_000:g} MB"
-        raise FeatureProblemError(f"{name} is larger than {limit} unpacked", "split it")
+        raise FeatureProblemError(f"{name} is larger than {limit} unpacked{before}", "split it")
+    archive.left_bytes -= len(content)
     return content

@@ -13,6 +13,8 @@ from m2pem.mission.geometry import Area, Point, Route
 MAX_FEATURES = 1_000
 MAX_POSITIONS = 200_000
 MAX_NAME_CHARACTERS = 100
+MAX_PROBLEMS = 100
+"""Of a file: of more, only their number is told."""
 
 _NO_NAME = re.compile(r"[^\w.\-]+")
 
@@ -68,6 +70,7 @@ class Contents:
         self._geometries: list[NamedGeometry] = []
         self._names: set[str] = set()
         self._problems: list[FileProblem] = []
+        self._untold = 0
         self._positions = 0
 
     @contextmanager
@@ -76,9 +79,9 @@ class Contents:
         try:
             yield
         except FeatureProblemError as error:
-            self._problems.append(FileProblem(Severity.ERROR, name, str(error), error.remedy))
+            self._note(FileProblem(Severity.ERROR, name, str(error), error.remedy))
         except GeometryError as error:
-            self._problems.append(FileProblem(Severity.ERROR, name, str(error)))
+            self._note(FileProblem(Severity.ERROR, name, str(error)))
 
     def add(self, name: str, geometry: Point | Route | Area) -> None:
         """Add a geometry under a valid and unique form of its name.
@@ -100,7 +103,13 @@ class Contents:
 
     def warn(self, feature: str, message: str, remedy: str = "") -> None:
         """Add a warning: the feature was read, and something of it was not kept."""
-        self._problems.append(FileProblem(Severity.WARNING, feature, message, remedy))
+        self._note(FileProblem(Severity.WARNING, feature, message, remedy))
+
+    def _note(self, problem: FileProblem) -> None:
+        if len(self._problems) < MAX_PROBLEMS:
+            self._problems.append(problem)
+        else:
+            self._untold += 1
 
     def whole(self) -> GeometryFile:
         """Return what was collected. A file without geometry and problem is a problem."""
@@ -113,6 +122,9 @@ class Contents:
                     "export the features themselves, not links to them or styles",
                 )
             )
+        if self._untold:
+            message = f"has {self._untold:,} problems more"
+            self._problems.append(FileProblem(Severity.ERROR, "", message, "mend these first"))
         return GeometryFile(tuple(self._geometries), tuple(self._problems))
 
     def _unique(self, name: str, geometry: Point | Route | Area) -> str:

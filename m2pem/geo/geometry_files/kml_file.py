@@ -20,7 +20,9 @@ _KML = "http://www.opengis.net/kml/2.2"
 _FRAME_OF = {"relativeToGround": "terrain", "absolute": "amsl"}
 _CLAMPED = frozenset({"", "clampToGround", "clampToSeaFloor"})
 _MODE_OF = {"relative": "relativeToGround", "terrain": "relativeToGround", "amsl": "absolute"}
-_COMMA = re.compile(r"\s*,\s*")
+_SPACE_AFTER_COMMA = re.compile(r",\s+")
+_SPACE_BEFORE_COMMA = re.compile(r"(?<!\s)\s+,")
+"""Begins only where the space does: otherwise the time grows with the square of its length."""
 _PARTS = ("MultiGeometry", "MultiTrack")
 _SINGLE = ("Point", "LineString", "LinearRing", "Polygon", "Track", *_PARTS)
 _ELSEWHERE = ("NetworkLink", "GroundOverlay", "PhotoOverlay")
@@ -154,7 +156,7 @@ def _closed(ring: Sequence[Coordinate]) -> tuple[Coordinate, ...]:
 
 
 def _coordinates(element: Element, keeps_altitude: bool) -> list[Coordinate]:
-    words = _COMMA.sub(",", _text(element, "coordinates")).split()
+    words = _joined(_text(element, "coordinates")).split()
     positions = []
     for number, word in enumerate(words, start=1):
         parts = word.split(",")
@@ -164,6 +166,11 @@ def _coordinates(element: Element, keeps_altitude: bool) -> list[Coordinate]:
             )
         positions.append(_position(parts, keeps_altitude, number))
     return positions
+
+
+def _joined(text: str) -> str:
+    """Return a list of positions without the space around commas, which some programs write."""
+    return _SPACE_AFTER_COMMA.sub(",", _SPACE_BEFORE_COMMA.sub(",", text))
 
 
 def _track(element: Element) -> list[Coordinate]:

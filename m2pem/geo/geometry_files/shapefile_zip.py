@@ -3,12 +3,11 @@
 from io import BytesIO
 from pathlib import PurePosixPath
 from typing import Any
-from zipfile import ZipFile
 
 import shapefile
 
 from m2pem.geo.geojson import GeometryError
-from m2pem.geo.geometry_files.archive import archive_of, member
+from m2pem.geo.geometry_files.archive import Archive, archive_of, member
 from m2pem.geo.geometry_files.contents import MAX_FEATURES, Contents, FeatureProblemError
 from m2pem.geo.geometry_files.geojson_file import read_feature
 
@@ -37,7 +36,7 @@ def read_shapefiles(content: bytes, contents: Contents) -> None:
                 _read_layer(archive, name, contents)
 
 
-def _read_layer(archive: ZipFile, name: str, contents: Contents) -> None:
+def _read_layer(archive: Archive, name: str, contents: Contents) -> None:
     parts = {
         suffix: _part(archive, name, suffix) for suffix in (".shp", ".shx", ".dbf", ".prj", ".cpg")
     }
@@ -111,7 +110,7 @@ def _with_altitudes(shape: "shapefile.Shape") -> Any:
     return {**geometry, "coordinates": place(geometry["coordinates"])}
 
 
-def _part(archive: ZipFile, name: str, suffix: str) -> bytes | None:
+def _part(archive: Archive, name: str, suffix: str) -> bytes | None:
     wanted = PurePosixPath(name).with_suffix(suffix).as_posix().lower()
     found = next((each for each in archive.namelist() if each.lower() == wanted), None)
     return None if found is None else member(archive, found)

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 from m2pem.findings import Severity
 from m2pem.geo.geometry_files import GeometryFile, read_geometry_file
+from m2pem.geo.geometry_files.contents import MAX_PROBLEMS
 from m2pem.mission.geometry import Area, Point, Route
 
 WGS84 = 'GEOGCS["GCS_WGS_1984",DATUM["D_WGS_1984",SPHEROID["WGS_1984",6378137.0,298.257223563]]]'
@@ -174,6 +175,27 @@ def test_a_kmz_is_read_and_a_bomb_is_not_unpacked() -> None:
     assert len(bomb) < 100_000
     (problem,) = problems("a.kmz", bomb)
     assert "doc.kml is larger than 50 MB unpacked" in problem
+
+
+def test_the_members_of_an_archive_are_bounded_together() -> None:
+    layers = {f"{name}.shp": b"\0" * 20_000_000 for name in "abc"}
+    assert str(read("a.zip", archive(layers)).problems[-1]) == (
+        "c.shp: c.shp is larger than 50 MB unpacked with what was read before it; split it"
+    )
+
+
+def test_space_around_commas_is_read_and_a_megabyte_of_it_is_no_burden() -> None:
+    """With a search that begins at each space it takes a quarter of an hour."""
+    line = "<Placemark><name>a</name><LineString><coordinates>{}</coordinates></LineString>"
+    spaced = kml(line.format("7 , 53 ,\n 5   8,54" + " " * 1_000_000 + "9,55") + "</Placemark>")
+    (found,) = read("a.kml", spaced).geometries
+    assert found.geometry == Route(((53.0, 7.0, None), (54.0, 8.0, None), (55.0, 9.0, None)))
+
+
+def test_of_many_problems_the_first_are_told() -> None:
+    file = read("a.kml", kml("<Placemark/>" * 5_000))
+    assert len(file.problems) == MAX_PROBLEMS + 1
+    assert str(file.problems[-1]) == "has 4,900 problems more; mend these first"
 
 
 # --- CSV ----------------------------------------------------------------------------------------
