@@ -111,10 +111,20 @@ async def _written(
     """No executive serves the fleet here: write to the journal, which the next one reads."""
     from m2pem.cli.journals import journal_at, url_of
     from m2pem.executive.approvals import Approvals
+    from m2pem.executive.drawings import Drawings
+
+    def now_us() -> int:
+        return time.time_ns() // 1000
 
     async with journal_at(url_of(journal_url)) as journal:
+        drawings = Drawings(fleet, journal, now_us)
+        await drawings.load()
         approvals = Approvals(
-            fleet, journal, lambda: fleet.geometries, dict, lambda: time.time_ns() // 1000
+            fleet,
+            journal,
+            lambda: {**fleet.geometries, **drawings.geometries},
+            lambda: drawings.drawn_by,
+            now_us,
         )
         files = mission.file, mission.source, mission.library
         match method:

@@ -85,6 +85,7 @@ class AlertList:
         self._open: dict[int, _Line] = {}
         self._last = 0
         self._unwritten: dict[int, _Line | None] = {}
+        self._was_read = False
         self._writing = asyncio.Lock()
         self.changes = 0
         """How often the list has changed."""
@@ -95,14 +96,18 @@ class AlertList:
         """Read what the journal has. Questions and incidents of runs that have ended are over.
 
         Raises:
-            JournalError: it cannot be read.
+            JournalError: it cannot be read; it is read before the next alert is written.
         """
         kept = await self._journal.alerts(self._fleet)
+        runs = await self._journal.runs(files=False) if kept else ()
+        # From here on nothing is awaited: what is raised meanwhile has the numbers after these.
+        self._was_read = True
         if not kept:
             return
-        over = {
-            each.run for each in await self._journal.runs(files=False) if each.outcome or each.gone
-        }
+        over = {each.run for each in runs if each.outcome or each.gone}
+        raised = list(self._lines.values())
+        self._lines, self._open, self._unwritten = {}, {}, {}
+        self._last = 0
         for number, text in kept.items():
             self._last = max(self._last, number)
             try:
@@ -116,6 +121,12 @@ class AlertList:
                 self._open[number] = line
                 if line.group is None and line.alert.subject and line.alert.run in over:
                     self._clear(number, line)
+        for line in raised:
+            alert = replace(line.alert, alert=self._next_id())
+            self._lines[self._last] = line
+            if alert.open:
+                self._open[self._last] = line
+            self._change(self._last, line, alert)
 
     def alerts(self, *, over: bool = False) -> list[OperatorAlert]:
         """The open alerts, the most severe first, the newest of each severity first; with `over`,
@@ -327,6 +338,8 @@ class AlertList:
             JournalError: it cannot be written; it is written with the next call.
         """
         async with self._writing:
+            if self._unwritten and not self._was_read:  # the numbers of what it has are not known
+                await self.load()
             taken, self._unwritten = self._unwritten, {}
             if not taken:
                 return

@@ -85,15 +85,20 @@ class Approvals:
             ),
         )
 
-    async def refuse_unapproved(self, file: str, mission: bytes, library: Iterable[Source]) -> None:
-        """Check that a mission may start.
+    def digest(self, mission: bytes, library: Iterable[Source]) -> str:
+        """Return the hash of the content that a mission has now."""
+        return self._content(mission, library).digest
+
+    async def refuse_unapproved(self, file: str, mission: bytes, library: Iterable[Source]) -> str:
+        """Check that a mission may start; returns the hash of the content that is approved; "":
+        nobody must approve it.
 
         Raises:
             NotApprovedError: persons must approve it before.
             JournalError: the journal cannot be read.
         """
         if not self._fleet.approval_persons:
-            return
+            return ""
         state = await self.state(file, mission, library)
         if not state.may_start:
             raise NotApprovedError(
@@ -101,6 +106,7 @@ class Approvals:
                 "the mission's page",
                 state.missing,
             )
+        return state.digest
 
     async def approve(
         self, file: str, mission: bytes, library: Iterable[Source], by: str, digest: str = ""

@@ -382,8 +382,10 @@ class Control:
     async def give_back(self, resource: str, *, by: str = "") -> None:
         """Give it back to the missions."""
         supervisor = self._supervisor
-        await supervisor.handover.give_back(resource, by, supervisor.runners.values())
-        await supervisor.control_requests.returned(resource, by)
+        try:
+            await supervisor.handover.give_back(resource, by, supervisor.runners.values())
+        finally:  # also if a run could not be told
+            await supervisor.control_requests.returned(resource, by)
 
     async def request_control(self, resource: str, *, by: str = "") -> None:
         """Ask the operator who has a vehicle or payload for it."""

@@ -95,8 +95,9 @@ class ControlRequests:
         self._begin(resource, by, holder)
         text = str(next(each for each in self.all() if each.resource == resource))
         self._publish(Alert("", CONTROL_REQUEST, text, AlertSeverity.WARNING, (resource,)))
-        for runner in self._going_on():
-            await runner.submit(i.ControlRequested(resource, by, holder))
+        for runner in list(self._runners()):
+            if not runner.done.is_set():
+                await runner.submit(i.ControlRequested(resource, by, holder))
 
     async def answer(self, name: str, by: str, *, give: bool) -> None:
         """Give a resource to the operator who asks for it, or refuse; who has asked withdraws it.
@@ -110,6 +111,8 @@ class ControlRequests:
             raise OperatorError(f"nobody asks for {resource}")
         if person_of(by) == person_of(request.by) and not give:
             outcome = RequestOutcome.WITHDRAWN
+        elif self._was_returned(resource, request):
+            raise OperatorError(f"{resource} was given back to the missions: it can be taken")
         elif person_of(by) != person_of(request.holder):
             raise OperatorError(
                 f"{resource} is with {request.holder}, whom {request.by} asks for it"
@@ -121,7 +124,8 @@ class ControlRequests:
     async def returned(self, name: str, by: str) -> None:
         """A resource was given back to the missions: nobody has it, whom one could ask."""
         resource = ResourceId(name)
-        if resource in self._open:
+        request = self._open.get(resource)
+        if request is not None and self._was_returned(resource, request):
             await self._end(resource, RequestOutcome.RETURNED, by)
 
     def take_up(self, requests: Mapping[str, ControlRequest]) -> None:
@@ -146,7 +150,8 @@ class ControlRequests:
 
     async def _expire(self, resource: ResourceId, request: _Open, within_s: float) -> None:
         await self._clock.sleep(within_s)
-        if self._open.get(resource) is request:
+        # One that is given back just now ends with that, not with a new holder.
+        if self._open.get(resource) is request and not self._was_returned(resource, request):
             gives = self._fleet.control_unanswered is Unanswered.GIVE
             try:
                 await self._end(
@@ -168,15 +173,17 @@ class ControlRequests:
             Alert("", CONTROL_REQUEST, text, AlertSeverity.NOTICE, (resource,), clears=over)
         )
         ended = i.ControlRequestEnded(resource, request.by, outcome, by)
-        for runner in self._going_on():
+        for runner in list(self._runners()):
+            if runner.done.is_set():  # it may have ended while another one was told
+                continue
             if outcome is RequestOutcome.GIVEN and resource not in control_of(runner.run.state)[0]:
                 # What the one before commands with it by hand is over.
                 await runner.submit(i.ControlTaken(resource, request.by))
             else:
                 await runner.submit(ended)
 
-    def _going_on(self) -> list[Runner]:
-        return [runner for runner in self._runners() if not runner.done.is_set()]
+    def _was_returned(self, resource: ResourceId, request: _Open) -> bool:
+        return self._handover.taken.get(resource) != request.holder
 
 
 def _sentence(

@@ -6,15 +6,17 @@ its records: nothing here changes a run that is under way.
 
 import asyncio
 import logging
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import msgspec
 
 from m2pem.api.runs import GeometryVersion, HandedOver
 from m2pem.errors import JournalError, OperatorError
 from m2pem.executive.emergency import WRITTEN_WITHIN_S
+from m2pem.fleet.fleet import Fleet
 from m2pem.geo.geojson import GeometryError, parse_geojson
 from m2pem.journal.base import Journal
+from m2pem.mission.geometry import Geometry
 from m2pem.mission.values import Value
 
 log = logging.getLogger("m2pem.drawings")
@@ -33,9 +35,13 @@ class _Written(msgspec.Struct, frozen=True):
 
 
 class Drawings:
-    """The versions of one fleet's drawings. `now_us`: the executive's clock."""
+    """The versions of one fleet's drawings. `now_us`: the executive's clock.
 
-    def __init__(self, fleet: str, journal: Journal, now_us: Callable[[], int]) -> None:
+    Those of a simulated fleet are kept apart. It begins with what the real one of its name has, and
+    changes nothing of that.
+    """
+
+    def __init__(self, fleet: Fleet, journal: Journal, now_us: Callable[[], int]) -> None:
         self._fleet = fleet
         self._journal = journal
         self._now_us = now_us
@@ -44,6 +50,7 @@ class Drawings:
         self._loaded: set[str] = set()
         self._last = 0
         self._unwritten: dict[int, str | None] = {}
+        self._was_read = False
 
     @property
     def handed_over(self) -> Mapping[str, HandedOver]:
@@ -60,32 +67,55 @@ class Drawings:
         """Return the versions of a drawing, the newest last."""
         return tuple(self._versions.get(name, ()))
 
+    @property
+    def geometries(self) -> Mapping[str, Geometry]:
+        """Those that missions may name now."""
+        return {name: parse_geojson(each.geometry) for name, each in self._handed_over.items()}
+
+    @property
+    def drawn_by(self) -> Mapping[str, str]:
+        """Who has handed over which of them."""
+        return {name: each.by for name, each in self._handed_over.items()}
+
     async def load(self) -> None:
-        """Read what former executives were given.
+        """Read what former executives were given. What was given here before that is newer.
 
         Raises:
-            JournalError: the journal cannot be read.
+            JournalError: the journal cannot be read; it is read before the next version is written.
         """
-        for number, text in (await self._journal.drawings(self._fleet)).items():
-            self._last = max(self._last, number)
-            try:
-                read = msgspec.json.decode(text, type=_Written)
-                if read.geometry is not None:
-                    parse_geojson(read.geometry)
-            except (msgspec.MsgspecError, GeometryError) as error:
-                log.warning("version %d of a drawing in the journal is left out: %s", number, error)
-                continue
-            self._loaded.add(read.name)
-            self._note(read.name, GeometryVersion(number, read.geometry, read.by, read.at_us))
+        fleet = self._fleet
+        kept = await self._journal.drawings(fleet.kept_as)
+        real = await self._journal.drawings(fleet.name) if fleet.kept_as != fleet.name else {}
+        # From here on nothing is awaited: what is given meanwhile has the numbers after these.
+        before = {} if self._was_read else self._versions
+        self._was_read = True
+        given = sorted(
+            ((each, name) for name, versions in before.items() for each in versions),
+            key=lambda version: version[0].number,
+        )
+        self._versions, self._handed_over, self._unwritten = {}, {}, {}
+        self._last = max(kept, default=0)
+        for version, name in _read(kept):
+            self._note(name, version)
+        for version, name in _read(real):
+            own = self._versions.get(name)
+            if own is None or own[-1].at_us < version.at_us:
+                self._hand_over(name, version)
+        self._loaded = set(self._handed_over)
+        for version, name in given:
+            self._add(name, version.geometry, version.by, version.at_us)
 
     def change(self, name: str, geometry: Mapping[str, Value] | None, by: str) -> None:
         """Make a version the latest one at once; None: delete the drawing. `write` keeps it."""
+        self._add(name, geometry, by, self._now_us())
+
+    def _add(self, name: str, geometry: Mapping[str, Value] | None, by: str, at_us: int) -> None:
         self._last += 1
         self._loaded.discard(name)
-        given = None if geometry is None else dict(geometry)
-        version = GeometryVersion(self._last, given, by, self._now_us())
+        geometry = None if geometry is None else dict(geometry)
+        version = GeometryVersion(self._last, geometry, by, at_us)
         self._note(name, version)
-        written = _Written(name, given, by, version.at_us)
+        written = _Written(name, geometry, by, at_us)
         self._unwritten[version.number] = msgspec.json.encode(written).decode()
         versions = self._versions[name]
         self._unwritten.update((each.number, None) for each in versions[:-MOST_VERSIONS])
@@ -97,22 +127,46 @@ class Drawings:
         Raises:
             OperatorError: it is not written in time, or cannot be.
         """
-        taken, self._unwritten = self._unwritten, {}
         try:
             async with asyncio.timeout(WRITTEN_WITHIN_S):
-                await self._journal.write_drawings(self._fleet, taken)
+                await self._write()
         except TimeoutError:
             why = f"has not written it within {WRITTEN_WITHIN_S:g} s"
         except JournalError as error:
             why = f"cannot write it: {error}"
         else:
             return
-        self._unwritten = {**taken, **self._unwritten}
         raise OperatorError(f"{done} here, but the journal {why}: it may not outlive a restart")
+
+    async def _write(self) -> None:
+        if not self._was_read:  # the numbers of what it has are not known
+            await self.load()
+        taken, self._unwritten = self._unwritten, {}
+        try:
+            await self._journal.write_drawings(self._fleet.kept_as, taken)
+        except BaseException:  # who asked for it may be gone: the next one writes it
+            self._unwritten = {**taken, **self._unwritten}
+            raise
 
     def _note(self, name: str, version: GeometryVersion) -> None:
         self._versions.setdefault(name, []).append(version)
+        self._hand_over(name, version)
+
+    def _hand_over(self, name: str, version: GeometryVersion) -> None:
         if version.geometry is None:
             self._handed_over.pop(name, None)
         else:
             self._handed_over[name] = HandedOver(version.geometry, version.by, version.at_us)
+
+
+def _read(kept: Mapping[int, str]) -> Iterator[tuple[GeometryVersion, str]]:
+    """Yield the versions that a journal has, each with the name of its drawing."""
+    for number, text in kept.items():
+        try:
+            read = msgspec.json.decode(text, type=_Written)
+            if read.geometry is not None:
+                parse_geojson(read.geometry)
+        except (msgspec.MsgspecError, GeometryError) as error:
+            log.warning("version %d of a drawing in the journal is left out: %s", number, error)
+            continue
+        yield GeometryVersion(number, read.geometry, read.by, read.at_us), read.name

@@ -91,7 +91,7 @@ class Executive:
         self.clock = clock
         self.bus = Bus()
         self.events = ControlEvents()
-        self.alerts = AlertList(fleet.name, journal, clock.now_us)
+        self.alerts = AlertList(fleet.kept_as, journal, clock.now_us)
         self.events.on_alert = self.alerts.add
         self.arbiters = FleetArbiters(
             fleet,

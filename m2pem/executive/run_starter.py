@@ -12,7 +12,7 @@ from m2pem.api.runs import APPROVAL, Alert, RunId
 from m2pem.engine.inputs import StartRun
 from m2pem.engine.run import MissionRun
 from m2pem.engine.state import RunStatus
-from m2pem.errors import BusyError, M2pemError, MissionError
+from m2pem.errors import BusyError, M2pemError, MissionError, NotApprovedError
 from m2pem.executive.approvals import Approvals
 from m2pem.executive.handover import refuse_busy_resources
 from m2pem.executive.loading import (
@@ -34,6 +34,8 @@ from m2pem.mission.mission import Mission
 from m2pem.mission.values import Value
 from m2pem.scheduling.entry import EntryChange
 
+CHANGED = "a geometry that it names was handed over anew as it was to begin; look at it again"
+
 
 class RunStarter:
     """Checks missions and begins their runs, which the supervisor drives then."""
@@ -44,7 +46,7 @@ class RunStarter:
             supervisor.fleet,
             supervisor.journal,
             lambda: supervisor.fleet_now.geometries,
-            lambda: {name: each.by for name, each in supervisor.drawings.handed_over.items()},
+            lambda: supervisor.drawings.drawn_by,
             supervisor.clock.now_us,
             lambda text: supervisor.events.publish(Alert("", APPROVAL, text, AlertSeverity.NOTICE)),
         )
@@ -249,8 +251,8 @@ class RunStarter:
         supervisor = self._supervisor
         supervisor.refuse_unconnected()
         supervisor.interrupted.refuse_start()
-        if not direct:
-            await self.approvals.refuse_unapproved(loaded.file, loaded.source, loaded.library)
+        files = loaded.file, loaded.source, loaded.library
+        approved = "" if direct else await self.approvals.refuse_unapproved(*files)
         header = RunHeader(
             loaded.file,
             loaded.source,
@@ -268,6 +270,12 @@ class RunStarter:
         if not still():
             await supervisor.journal.release(number)
             raise NotBegunError(number, "it was held as it was to begin")
+        if approved and self.approvals.digest(*files[1:]) != approved:
+            await supervisor.journal.release(number)
+            if started is not None:
+                raise NotBegunError(number, CHANGED)
+            await supervisor.journal.delete([number], by=by, unended=True)
+            raise NotApprovedError(f"{loaded.file} was not started: {CHANGED}", 0)
         for resource in lent:
             supervisor.availability.lend(resource, number)
         run = MissionRun(loaded, supervisor.fleet, number, supervisor.settings.steps_at_once)

@@ -136,7 +136,7 @@ class Supervisor:
         self.events = events
         self.settings = settings
         self.runners: dict[RunId, Runner] = {}
-        self.drawings = Drawings(self.fleet.name, journal, clock.now_us)
+        self.drawings = Drawings(self.fleet, journal, clock.now_us)
         self.availability = Availability(self.fleet)
         self.counts = RunCounts()
         self._bus = bus
@@ -303,9 +303,7 @@ class Supervisor:
     @property
     def fleet_now(self) -> Fleet:
         """The fleet, with the geometries that operators have handed over for all runs."""
-        handed_over = self.drawings.handed_over
-        given = {name: parse_geojson(each.geometry) for name, each in handed_over.items()}
-        return replace(self.fleet, geometries={**self.fleet.geometries, **given})
+        return replace(self.fleet, geometries={**self.fleet.geometries, **self.drawings.geometries})
 
     def geometries_given(self, mission: Mission, *, resumed: bool = False) -> list[GeometrySet]:
         """Return the inputs that hand over what operators have handed over for all runs.

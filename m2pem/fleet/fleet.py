@@ -211,6 +211,12 @@ class Fleet:
         return tuple(payload.id for payload in self.payloads.values() if payload.detector)
 
     @property
+    def kept_as(self) -> str:
+        """The name by which a journal keeps the alerts and drawings of this fleet: apart from
+        those of a fleet of the same name that commands real vehicles, if this one is simulated."""
+        return f"{self.name} (simulated)" if self.simulated else self.name
+
+    @property
     def simulated(self) -> bool:
         """Whether every vehicle and payload is of the simulated arbiter, in this process."""
         everything: list[Vehicle | Payload] = [*self.vehicles.values(), *self.payloads.values()]

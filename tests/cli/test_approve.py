@@ -1,10 +1,14 @@
 """`m2pem approve`, and what `m2pem run` says of a mission that nobody has approved."""
 
+import asyncio
 import json
 from pathlib import Path
 
 import pytest
 
+from m2pem.cli.journals import journal_at, url_of
+from m2pem.executive.drawings import Drawings
+from m2pem.fleet.fleet_file import load_fleet
 from m2pem.testing import scenarios
 from tests.cli.conftest import Invoke
 
@@ -46,6 +50,33 @@ def test_a_mission_runs_once_persons_have_approved_it(
     mission.write_bytes(mission.read_bytes() + b"\n")
     status, out, _ = invoke(*approve, "--show")
     assert (status, "before these changed: the mission file" in out) == (0, True)
+
+
+def test_without_an_executive_the_geometries_of_operators_are_approved_too(
+    invoke: Invoke, files: tuple[Path, Path], tmp_path: Path
+) -> None:
+    mission, fleet_file = files
+    journal = tmp_path / "journal.db"
+    approve = ("approve", mission, "--fleet", fleet_file, "--journal", journal, "--by")
+    fleet = load_fleet(str(fleet_file))
+    digests = []
+    for north in (50.0, 51.0):
+
+        async def hand_over(latitude: float = north) -> None:
+            async with journal_at(url_of(str(journal))) as opened:
+                drawings = Drawings(fleet, opened, lambda: 1)
+                await drawings.load()
+                point = {"type": "Point", "coordinates": [7.0, latitude]}
+                drawings.change("drive_stop", point, "bob")  # the mission has that word
+                await drawings.write("done")
+
+        asyncio.run(hand_over())
+        status, out, _ = invoke(*approve, "carla", "--format", "json")
+        digests.append(json.loads(out)["digest"])
+        assert (status, json.loads(out)["editors"]) == (0, ["bob"])
+    assert len(set(digests)) == 2
+    status, _, err = invoke(*approve, "bob")
+    assert (status, "bob edited it" in err) == (1, True)
 
 
 def test_what_cannot_be_approved_is_said(invoke: Invoke, files: tuple[Path, Path]) -> None:

@@ -224,3 +224,35 @@ async def test_the_oldest_that_are_over_are_removed_from_list_and_journal():
     await alerts.write()
     assert len(alerts.alerts(over=True)) == MOST_OVER
     assert min(await journal.alerts("north")) == 11
+
+
+class Unreadable(MemoryJournal):
+    """A journal that cannot be read at first."""
+
+    broken = True
+
+    async def alerts(self, fleet):
+        if self.broken:
+            raise JournalError("it cannot be read")
+        return await super().alerts(fleet)
+
+
+async def test_what_could_not_be_read_at_first_is_not_written_over():
+    journal = Unreadable()
+    before = made(journal=journal)
+    journal.broken = False
+    before.add(Alert("", "SCHEDULE", "kept", AlertSeverity.WARNING))
+    await before.write()
+    journal.broken = True
+    after = made(journal=journal)
+    with pytest.raises(JournalError):
+        await after.load()
+    after.add(Alert("", "SCHEDULE", "new", AlertSeverity.WARNING))
+    with pytest.raises(JournalError):
+        await after.write()
+    journal.broken = False
+    await after.write()
+    assert {each.alert: each.text for each in after.alerts()} == {"a1": "kept", "a2": "new"}
+    again = made(journal=journal)
+    await again.load()
+    assert again.alerts() == after.alerts()

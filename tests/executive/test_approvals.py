@@ -1,5 +1,6 @@
 """Missions that start only when persons have approved exactly their content."""
 
+from collections.abc import Awaitable, Callable
 from contextlib import asynccontextmanager
 from dataclasses import replace
 from typing import Any
@@ -8,16 +9,18 @@ import pytest
 
 from m2pem.api.authoring import MissionFiles
 from m2pem.api.clock import SystemClock
-from m2pem.api.runs import Alert
+from m2pem.api.runs import Alert, RunId
 from m2pem.api.schedule import When
 from m2pem.errors import NotApprovedError, OperatorError
 from m2pem.executive.executive import Executive
 from m2pem.fleet.approval import file_digest
 from m2pem.fleet.fleet import Fleet, simulated_fleet
 from m2pem.journal import Journal, MemoryJournal
+from m2pem.journal.base import RunHeader
 from m2pem.mission.geometry import Point
 from m2pem.mission.library import Source
 from m2pem.plugins import PluginManager
+from m2pem.scheduling.entry import EntryChange
 from m2pem.testing import scenarios
 from tests.executive.conftest import behavior, mission, sequence
 
@@ -233,3 +236,34 @@ async def test_a_scheduled_mission_waits_for_approvals_and_starts_by_itself() ->
             if (await control.scheduled()).entries[0].run:
                 break
         assert any("bob has approved patrol.bpmn" in each for each in alerts)
+
+
+class SlowJournal(MemoryJournal):
+    """A journal that lets others do something while it creates a run."""
+
+    meanwhile: Callable[[], Awaitable[None]] | None = None
+
+    async def create(self, header: RunHeader, started: EntryChange | None = None) -> RunId:
+        run = await super().create(header, started)
+        if self.meanwhile is not None:
+            await self.meanwhile()
+        return run
+
+
+async def test_a_drawing_that_is_handed_over_as_the_mission_is_to_begin_keeps_it_from_that() -> (
+    None
+):
+    target = '<m2pem:property name="target" value="gate"/>'
+    source = mission(sequence(("T", behavior("T", "goto", "ugv1", parameters=target))))
+    files, journal = MissionFiles("goto.bpmn", source), SlowJournal()
+    async with executive(asking_fleet(1), journal) as running:
+        control = running.control
+        await edited(control, files, "anna")
+        await control.approve(files, by="bob")
+        journal.meanwhile = lambda: control.set_geometry("gate", GATE, by="otto")
+        with pytest.raises(NotApprovedError, match="handed over anew as it was to begin"):
+            await control.start(files)
+        assert await control.runs() == []
+        journal.meanwhile = None
+        with pytest.raises(NotApprovedError, match="drawing gate"):
+            await control.start(files)

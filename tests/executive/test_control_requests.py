@@ -1,5 +1,6 @@
 """Operators ask each other for vehicles: given, refused, or not answered in time."""
 
+import asyncio
 from dataclasses import replace
 
 import pytest
@@ -10,6 +11,7 @@ from m2pem.engine.inputs import ControlRequested, ControlTaken, StartRun
 from m2pem.engine.records import RequestOutcome
 from m2pem.errors import OperatorError
 from m2pem.fleet.fleet import Unanswered
+from m2pem.journal import MemoryJournal
 from tests.executive.conftest import World, fleet, mission, question, sequence
 from tests.executive.test_recovery import left_behind
 
@@ -195,3 +197,38 @@ def test_a_note_is_in_the_log_also_during_a_pause(play):
         return [each for each in world.seen if isinstance(each, r.OperatorNote)]
 
     assert play(story, "ugv1") == [r.OperatorNote("wind picks up", "anna")]
+
+
+class Untold(MemoryJournal):
+    """A journal that writes nothing once it is stuck, until it is free again."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.free = asyncio.Event()
+        self.free.set()
+
+    async def append(self, *given, **named):
+        await self.free.wait()
+        return await super().append(*given, **named)
+
+
+def test_a_request_does_not_take_what_is_given_back_just_now(play):
+    """Giving back waits for the journal; the time of the request is over meanwhile."""
+    journal = Untold()
+
+    async def story(world: World):
+        await asked(world)
+        control = world.executive.control
+        journal.free.clear()
+        returning = asyncio.create_task(control.give_back("ugv1", by="anna"))
+        await world.clock.sleep(31.0)
+        with pytest.raises(OperatorError, match="was given back to the missions"):
+            await control.answer_control("ugv1", give=True, by="anna")
+        journal.free.set()
+        await returning
+        return await control.holders(), await control.control_requests()
+
+    chosen = replace(fleet("ugv1"), control_unanswered=Unanswered.GIVE)
+    holders, requests = play(story, fleet=chosen, journal=journal)
+    assert holders == {"ugv1": ""}
+    assert requests == []

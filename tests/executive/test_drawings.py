@@ -1,12 +1,16 @@
 """Geometries that operators hand over for all runs: versions, deletion, restarts."""
 
+import asyncio
+from collections.abc import Mapping
 from typing import Any
 
 import pytest
 
-from m2pem.errors import OperatorError
-from m2pem.executive.drawings import MOST_VERSIONS
+from m2pem.errors import JournalError, OperatorError
+from m2pem.executive.drawings import MOST_VERSIONS, Drawings
+from m2pem.fleet.fleet import simulated_fleet
 from m2pem.journal import MemoryJournal
+from m2pem.testing import scenarios
 from tests.executive.conftest import World, mission, question, sequence
 
 POINT = {"type": "Point", "coordinates": [7.0, 50.0]}
@@ -65,7 +69,7 @@ def test_the_oldest_versions_are_removed(play: Any) -> None:
         control = world.executive.control
         for number in range(MOST_VERSIONS + 5):
             await control.set_geometry("gate", POINT, by=str(number))
-        kept = await world.journal.drawings(world.executive.control.fleet().name)
+        kept = await world.journal.drawings(world.executive.control.fleet().kept_as)
         return await control.geometry_versions("gate"), kept
 
     versions, kept = play(story)
@@ -89,3 +93,93 @@ def test_runs_under_way_that_name_it_are_its_users(play: Any) -> None:
     assert during == (["r1"], [])
     assert has == {"gate": POINT}, "a run under way keeps what it has"
     assert after == []
+
+
+class BrokenJournal(MemoryJournal):
+    """A journal that cannot be read, or whose writing is waited for in vain."""
+
+    unreadable = False
+    stuck = False
+
+    async def drawings(self, fleet: str) -> Mapping[int, str]:
+        if self.unreadable:
+            raise JournalError("it cannot be read")
+        return await super().drawings(fleet)
+
+    async def write_drawings(self, fleet: str, drawings: Mapping[int, str | None]) -> None:
+        if self.stuck:
+            await asyncio.Event().wait()
+        await super().write_drawings(fleet, drawings)
+
+
+def names_of(kept: Mapping[str, Any]) -> list[str]:
+    return sorted(kept)
+
+
+async def test_what_could_not_be_read_at_first_is_not_written_over() -> None:
+    journal = BrokenJournal()
+    before = Drawings(scenarios.fleet("sim", {"ugv1": {}}), journal, lambda: 1)
+    before.change("gate", POINT, "anna")
+    await before.write("done")
+    journal.unreadable = True
+    after = Drawings(scenarios.fleet("sim", {"ugv1": {}}), journal, lambda: 2)
+    with pytest.raises(JournalError):
+        await after.load()
+    after.change("hangar", OTHER, "ben")
+    with pytest.raises(OperatorError, match="it cannot be read"):
+        await after.write("hangar is handed over")
+    journal.unreadable = False
+    await after.write("done")
+    assert names_of(after.handed_over) == ["gate", "hangar"]
+    assert names_of(after.given_here) == ["hangar"]
+    again = Drawings(scenarios.fleet("sim", {"ugv1": {}}), journal, lambda: 3)
+    await again.load()
+    assert again.handed_over == after.handed_over
+
+
+async def test_who_hands_over_and_is_gone_at_once_leaves_it_to_be_written() -> None:
+    """As a browser that was closed while the journal was slow."""
+    journal = BrokenJournal()
+    drawings = Drawings(scenarios.fleet("sim", {"ugv1": {}}), journal, lambda: 1)
+    await drawings.load()
+    journal.stuck = True
+    drawings.change("gate", POINT, "anna")
+    writing = asyncio.create_task(drawings.write("done"))
+    await asyncio.sleep(0)
+    writing.cancel()
+    await asyncio.wait([writing])
+    journal.stuck = False
+    drawings.change("hangar", OTHER, "ben")
+    await drawings.write("done")
+    again = Drawings(scenarios.fleet("sim", {"ugv1": {}}), journal, lambda: 2)
+    await again.load()
+    assert names_of(again.handed_over) == ["gate", "hangar"]
+
+
+async def test_a_simulated_fleet_knows_the_drawings_of_the_real_one_and_changes_none() -> None:
+    journal = MemoryJournal()
+    fleet = scenarios.fleet("mavlink", {"ugv1": {}})
+    real = Drawings(fleet, journal, lambda: 1)
+    real.change("gate", POINT, "anna")
+    real.change("gone", POINT, "anna")
+    await real.write("done")
+    simulated = Drawings(simulated_fleet(fleet), journal, lambda: 2)
+    await simulated.load()
+    assert names_of(simulated.handed_over) == ["gate", "gone"]
+    simulated.change("gate", OTHER, "ben")
+    simulated.change("gone", None, "ben")
+    await simulated.write("done")
+    again = Drawings(fleet, journal, lambda: 3)
+    await again.load()
+    assert {name: each.by for name, each in again.handed_over.items()} == {
+        "gate": "anna",
+        "gone": "anna",
+    }
+    resumed = Drawings(simulated_fleet(fleet), journal, lambda: 4)
+    await resumed.load()
+    assert {name: each.by for name, each in resumed.handed_over.items()} == {"gate": "ben"}
+    again.change("gate", POINT, "carla")
+    await again.write("done")
+    resumed = Drawings(simulated_fleet(fleet), journal, lambda: 5)
+    await resumed.load()
+    assert resumed.handed_over["gate"].by == "carla", "the newest counts"
