@@ -9,6 +9,7 @@ import asyncio
 import logging
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 
 import msgspec
 
@@ -387,9 +388,8 @@ class AlertList:
         self._open.pop(number, None)
         self._change(number, line, replace(line.alert, cleared_us=self._now_us(), deadline_us=None))
         over = len(self._lines) - len(self._open)
-        for oldest in [each for each in self._lines if each not in self._open][
-            : max(0, over - MOST_OVER)
-        ]:
+        past = (each for each in self._lines if each not in self._open)
+        for oldest in list(islice(past, max(0, over - MOST_OVER))):
             del self._lines[oldest]
             self._unwritten[oldest] = None
 

@@ -37,11 +37,14 @@ async def watch_alerts(
                 await changed.wait()
 
 
-async def keep_alerts(alerts: AlertList) -> None:
-    """Have the journal keep the list, for ever; what it does not write is written later."""
+async def keep_alerts(alerts: AlertList, is_replaced: Callable[[], bool] = lambda: False) -> None:
+    """Have the journal keep the list, for ever; what it does not write is written later.
+
+    `is_replaced`: whether another executive has the list now, which this one must not write over.
+    """
     written, said = -1, False
     while True:
-        if alerts.changes != written:
+        if alerts.changes != written and not is_replaced():
             changes = alerts.changes
             try:
                 await alerts.write()

@@ -202,7 +202,11 @@ class Executive:
         if isinstance(self.clock, SystemClock):
             publish = self.events.publish
             self._listen(group, "alerts", partial(watch_alerts, self.alerts, self.look, publish))
-            self._listen(group, "journal of alerts", partial(keep_alerts, self.alerts))
+            self._listen(
+                group,
+                "journal of alerts",
+                partial(keep_alerts, self.alerts, self.superseded.is_set),
+            )
         if self.journal.file is not None:
             watching = partial(watch_space, self.journal.file, self.events)
             self._listen(group, "watch of free space", watching)
@@ -239,11 +243,13 @@ class Executive:
             self.health.connected = False
             await self._connections.close()
             self.health.close()
+            # As long as no other executive can have read the list.
+            if not self.superseded.is_set():
+                await write_alerts(self.alerts)
             self._locks.release()
             if self._observers is not None:
                 await self._observers.close()
             await self._supervisor.close()
-            await write_alerts(self.alerts)
             self.bus.close()
             self.events.end()
             await self._stack.aclose()

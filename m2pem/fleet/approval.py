@@ -6,6 +6,7 @@ and a content that was approved once is approved wherever it is kept.
 
 import hashlib
 import re
+import unicodedata
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import PurePath
@@ -53,7 +54,7 @@ class Edit(msgspec.Struct, frozen=True):
 
 def person_of(by: str) -> str:
     """Return the person behind the name of an operator: anna@gcs1 and Anna are one."""
-    return by.partition("@")[0].strip().casefold()
+    return unicodedata.normalize("NFKC", by).partition("@")[0].strip().casefold()
 
 
 def file_digest(content: bytes) -> str:

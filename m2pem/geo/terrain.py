@@ -181,7 +181,12 @@ class _Raster:
         return _between(row, column, height, width, self._sample)
 
     def _sample(self, row: int, column: int) -> float | None:
-        values = self._data.read(1, window=((row, row + 1), (column, column + 1)), masked=True)
+        from rasterio.errors import RasterioError  # noqa: PLC0415
+
+        try:
+            values = self._data.read(1, window=((row, row + 1), (column, column + 1)), masked=True)
+        except (RasterioError, OSError) as error:
+            raise TerrainError(f"{self._data.name}: is damaged: {error}") from None
         value = values[0, 0]
         return None if values.mask.any() or not math.isfinite(value) else float(value)
 

@@ -3,8 +3,10 @@
 import asyncio
 import logging
 
+from m2pem.api.alerts import AlertSeverity
 from m2pem.api.runs import LOGGED, Alert
 from m2pem.api.telemetry import LinkState, VehicleState
+from m2pem.journal import MemoryJournal
 from m2pem.mission.catalogue import BehaviorState, ResourceId
 
 from .conftest import World, behavior, mission, sequence
@@ -140,3 +142,24 @@ def test_a_single_behavior_that_ends_speaks_of_its_own_vehicle_alone(play):
         return (await asyncio.wait_for(said, 10))[-1]
 
     assert play(story, "ugv1", "ugv2").text.startswith("ugv2 stays armed in GUIDED. Nothing")
+
+
+def test_an_executive_that_was_replaced_does_not_write_over_the_alerts_of_the_next(play):
+    async def story(world: World):
+        world.executive.alerts.add(Alert("", "SCHEDULE", "late", AlertSeverity.WARNING))
+        world.executive.superseded.set()
+        return world.executive.fleet.kept_as
+
+    journal = MemoryJournal()
+    kept_as = play(story, "ugv1", journal=journal)
+    assert asyncio.run(journal.alerts(kept_as)) == {}
+
+
+def test_what_was_said_last_is_written_at_the_end(play):
+    async def story(world: World):
+        world.executive.alerts.add(Alert("", "SCHEDULE", "late", AlertSeverity.WARNING))
+        return world.executive.fleet.kept_as
+
+    journal = MemoryJournal()
+    kept_as = play(story, "ugv1", journal=journal)
+    assert list(asyncio.run(journal.alerts(kept_as))) == [1]

@@ -74,3 +74,8 @@ def test_files_of_one_name_are_told_apart() -> None:
 def test_a_person_is_the_same_on_every_host() -> None:
     assert person_of("Anna@gcs1") == person_of("anna") == "anna"
     assert person_of("@gcs1") == ""
+
+
+def test_a_name_is_the_same_however_it_is_written() -> None:
+    assert person_of("Jose\u0301") == person_of("Jos\u00e9"), "an accent of its own"
+    assert person_of("\uff21nna\uff20gcs1") == "anna", "letters of full width"

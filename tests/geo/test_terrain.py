@@ -126,6 +126,15 @@ def test_files_that_cannot_be_used_are_named(
         Terrain(tmp_path / "nowhere")
 
 
+def test_a_geotiff_that_was_cut_off_is_named(tmp_path: Path) -> None:
+    """It opens: what is missing is seen when it is read."""
+    path = tmp_path / "dem.tif"
+    write_geotiff(path, 4326, west=7.0, north=53.0, cell=0.001)
+    path.write_bytes(path.read_bytes()[:-6_000])
+    with pytest.raises(TerrainError, match=r"dem\.tif: is damaged"):
+        Terrain(tmp_path).height_m((53 - 0.0405, 7 + 0.0205))
+
+
 # --- profiles -----------------------------------------------------------------------------------
 
 
