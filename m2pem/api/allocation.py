@@ -61,6 +61,7 @@ class TakeEffect:
     `task` is the task's label. `caught_by`: the label of the event that catches the error, where
     the mission goes on; "": no event catches it, and the run fails. `reassigned`: the error comes
     only if no other can do the rest of the task. `asks`: an incident opens in its place.
+    `direct`: it was commanded outside of a mission, and is stopped; nothing fails.
     """
 
     run: RunId
@@ -70,8 +71,11 @@ class TakeEffect:
     caught_by: str = ""
     reassigned: bool = False
     asks: bool = False
+    direct: bool = False
 
     def __str__(self) -> str:
+        if self.direct:
+            return f"{self.run}: {self.task}, which was commanded, is stopped"
         if self.asks:
             return f"{self.run}: an incident opens, which asks what is done with {self.task}"
         ends = f"{self.run}: {self.task} ends with error TAKEN_OVER"

@@ -373,7 +373,7 @@ class Control:
 
     async def take(self, resource: str, *, by: str = "") -> None:
         """Take a vehicle or payload from the missions."""
-        await self._supervisor.handover.take(resource, by, self._supervisor.runners.values())
+        await self._direct.take(resource, by)
 
     async def preview_take(self, resource: str) -> Sequence[TakeEffect]:
         """What `take` of a resource would end now."""

@@ -80,6 +80,22 @@ class DirectBehaviors:
                 loaded, process, data, by, lent=(resource,) if own else (), direct=True
             )
 
+    async def take(self, name: str, by: str) -> None:
+        """Give a resource to an operator. What it was asked for outside of a mission is stopped:
+        that is what the operator wants, and no failure.
+
+        Raises:
+            OperatorError: there is no such resource, an operator has it, or the journal has not
+                written yet that the behavior was stopped; the operator has the resource then.
+        """
+        supervisor, by = self._supervisor, by or UNNAMED_OPERATOR
+        runner = self._earlier(supervisor.handover.known(name))
+        others = [each for each in supervisor.runners.values() if each is not runner]
+        await supervisor.handover.take(name, by, others)
+        if runner is not None and runner.run.state.status is not RunStatus.ENDED:
+            asked = supervisor.emergency.stop(runner, by, f"{name} was taken by {by}")
+            await supervisor.emergency.written("stop", {runner.id: asked})
+
     async def _end_earlier(self, resource: ResourceId, by: str) -> None:
         """End the behavior that goes on by an earlier request.
 

@@ -78,6 +78,7 @@ class Handover:
                     and on_loss is not OnLoss.REASSIGN
                     and self._opens_incident(state, behavior)
                 ),
+                is_one_task(state.mission),
             )
             for runner in runners
             if not runner.done.is_set() and (state := runner.run.state)

@@ -166,3 +166,23 @@ def test_stop_of_all_ends_it_and_leaves_the_resource_with_its_operator(play):
     stopped, run, holders = play(story, "ugv1")
     assert stopped == [run]
     assert holders == {"ugv1": "anna"}
+
+
+def test_to_take_what_was_commanded_stops_that_and_fails_nothing(play):
+    async def story(world: World):
+        control = world.executive.control
+        run = await control.execute_behavior("ugv1", "drive_stop", by="anna")
+        await world.fake.until_called("start", f"{run}.b1")
+        effects = await control.preview_take("ugv1")
+        await control.take("ugv1", by="ben")
+        await world.fake.until_called("cancel", f"{run}.b1")
+        world.fake.report(f"{run}.b1", BehaviorState.CANCELLED)
+        done = await control.wait(run)
+        return effects, done, await control.holders(), await control.alerts()
+
+    effects, done, holders, alerts = play(story, "ugv1")
+    assert [str(each) for each in effects] == ["r1: drive_stop, which was commanded, is stopped"]
+    assert done.status is RunStatus.STOPPED
+    assert "ugv1 was taken by ben" in done.detail
+    assert holders == {"ugv1": "ben"}
+    assert list(alerts) == []

@@ -52,7 +52,7 @@ def effects_text(resource: str, effects: Sequence["TakeEffect"]) -> Text:
     """Return what taking a resource does to the missions, to be read before it is taken."""
     text = Text()
     for each in effects:
-        text.append(f"{each}.\n", "" if each.caught_by else "bold #e07a6a")
+        text.append(f"{each}.\n", "" if each.caught_by or each.direct else "bold #e07a6a")
     if not effects:
         text.append(f"No mission is commanding {resource}.\n")
     text.append("Until it is given back, tasks that need it fail: RESOURCE_UNAVAILABLE.")
