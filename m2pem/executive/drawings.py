@@ -50,7 +50,7 @@ class Drawings:
         self._loaded: set[str] = set()
         self._last = 0
         self._unwritten: dict[int, str | None] = {}
-        self._was_read = False
+        self._last_kept: int | None = None
 
     @property
     def handed_over(self) -> Mapping[str, HandedOver]:
@@ -78,7 +78,7 @@ class Drawings:
         return {name: each.by for name, each in self._handed_over.items()}
 
     async def load(self) -> None:
-        """Read what former executives were given. What was given here before that is newer.
+        """Read what other executives were given. What is not written yet of this one is newer.
 
         Raises:
             JournalError: the journal cannot be read; it is read before the next version is written.
@@ -87,21 +87,25 @@ class Drawings:
         kept = await self._journal.drawings(fleet.kept_as)
         real = await self._journal.drawings(fleet.name) if fleet.kept_as != fleet.name else {}
         # From here on nothing is awaited: what is given meanwhile has the numbers after these.
-        before = {} if self._was_read else self._versions
-        self._was_read = True
+        here = set(self.given_here)
         given = sorted(
-            ((each, name) for name, versions in before.items() for each in versions),
+            (
+                (each, name)
+                for name, versions in self._versions.items()
+                for each in versions
+                if self._unwritten.get(each.number) is not None
+            ),
             key=lambda version: version[0].number,
         )
         self._versions, self._handed_over, self._unwritten = {}, {}, {}
-        self._last = max(kept, default=0)
+        self._last = self._last_kept = max(kept, default=0)
         for version, name in _read(kept):
             self._note(name, version)
         for version, name in _read(real):
             own = self._versions.get(name)
             if own is None or own[-1].at_us < version.at_us:
                 self._hand_over(name, version)
-        self._loaded = set(self._handed_over)
+        self._loaded = self._handed_over.keys() - here
         for version, name in given:
             self._add(name, version.geometry, version.by, version.at_us)
 
@@ -139,11 +143,15 @@ class Drawings:
         raise OperatorError(f"{done} here, but the journal {why}: it may not outlive a restart")
 
     async def _write(self) -> None:
-        if not self._was_read:  # the numbers of what it has are not known
+        kept = await self._journal.drawings(self._fleet.kept_as)
+        if max(kept, default=0) != self._last_kept:
+            # It was not read yet, or another executive of this fleet, as one that simulates it, has
+            # written: the numbers are given anew.
             await self.load()
         taken, self._unwritten = self._unwritten, {}
         try:
             await self._journal.write_drawings(self._fleet.kept_as, taken)
+            self._last_kept = max((self._last_kept or 0, *taken))
         except BaseException:  # who asked for it may be gone: the next one writes it
             self._unwritten = {**taken, **self._unwritten}
             raise

@@ -183,3 +183,23 @@ async def test_a_simulated_fleet_knows_the_drawings_of_the_real_one_and_changes_
     resumed = Drawings(simulated_fleet(fleet), journal, lambda: 5)
     await resumed.load()
     assert resumed.handed_over["gate"].by == "carla", "the newest counts"
+
+
+async def test_two_executives_of_a_fleet_write_over_nothing_of_each_other() -> None:
+    journal = MemoryJournal()
+    fleet = scenarios.fleet("sim", {"ugv1": {}})
+    one, two = (Drawings(fleet, journal, lambda: 1) for _ in range(2))
+    await one.load()
+    await two.load()
+    one.change("gate", POINT, "anna")
+    await one.write("done")
+    two.change("hangar", POINT, "ben")
+    await two.write("done")
+    one.change("gate", OTHER, "anna")
+    await one.write("done")
+    assert names_of(two.given_here) == ["hangar"]
+    again = Drawings(fleet, journal, lambda: 2)
+    await again.load()
+    assert names_of(again.handed_over) == ["gate", "hangar"]
+    assert again.handed_over["gate"].geometry == OTHER
+    assert [each.number for each in again.versions("gate")] == [1, 3]
