@@ -24,11 +24,13 @@ def alerts(over: bool, journal: str | None, output: str) -> None:
     The alerts of all executives on this host, the most severe first, each with who has acknowledged
     it and who takes care.
     """
+    from m2pem.api.description import printable
+
     found = [each for socket in executives_here(journal) for each in _of(socket, over=over)]
     if output == "json":
         click.echo(as_json({"alerts": found}))
     else:
-        click.echo("\n".join(map(str, found)) or "there is no alert")
+        click.echo("\n".join(printable(str(each)) for each in found) or "there is no alert")
 
 
 @click.command(epilog=example("m2pem acknowledge a3"))

@@ -16,6 +16,7 @@ def operators(journal: str | None, output: str) -> None:
     """
     import msgspec
 
+    from m2pem.api.description import printable
     from m2pem.api.people import OpenControlRequest, OperatorPresence
     from m2pem.control_socket.client import ask
 
@@ -27,4 +28,5 @@ def operators(journal: str | None, output: str) -> None:
     if output == "json":
         click.echo(as_json({"operators": present, "control_requests": requests}))
     else:
-        click.echo("\n".join(map(str, (*present, *requests))) or "no operator is present")
+        lines = [printable(str(each)) for each in (*present, *requests)]
+        click.echo("\n".join(lines) or "no operator is present")
