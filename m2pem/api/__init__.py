@@ -102,6 +102,7 @@ if TYPE_CHECKING:
     )
     from m2pem.api.run_view import RunView
     from m2pem.api.runs import (
+        CONTROL_REQUEST,
         NEWS,
         SCHEDULE,
         Alert,
@@ -246,7 +247,8 @@ _MODULES = {
     ),
     "m2pem.api.run_view": "RunView",
     "m2pem.api.runs": (
-        "NEWS SCHEDULE Alert GeometryVersion HandedOver IncidentPreview IncidentVerdict"
+        "CONTROL_REQUEST NEWS SCHEDULE Alert GeometryVersion HandedOver IncidentPreview"
+        " IncidentVerdict"
         " OpenIncident OpenPrompt PromptClosed RunId RunStatus RunSummary SimulationResult"
         " StampedRecord TelemetrySample"
     ),
@@ -316,6 +318,7 @@ __all__ = [
     "EventCondition",
     "EventThrower",
     "AnswerRule",
+    "CONTROL_REQUEST",
     "NEWS",
     "SCHEDULE",
     "WHEN_FREE",

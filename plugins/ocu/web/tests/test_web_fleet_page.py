@@ -182,3 +182,18 @@ async def test_the_fleet_has_no_violation(desk: Desk, dark: bool) -> None:
     await expect(page.get_by_role("tab", name="Map")).to_be_visible()
     await eyes.look("phone")
     eyes.assert_well()
+
+
+async def test_to_take_over_what_one_has_commanded_oneself_is_no_fault(desk: Desk) -> None:
+    far = {"resources": ["evsg3"], "behavior": "goto", "parameters": {"target": "[38.2, -77.3]"}}
+    run = (await desk.ask("POST", "/api/fleet/execute", far))["results"][0]["run"]
+    page = await fleet(desk)
+    await row(page, "evsg3").click()
+    await press(page, "Take over")
+    dialog = page.get_by_role("dialog", name="Take over evsg3")
+    await expect(dialog).to_contain_text("which you commanded, ends")
+    await dialog.get_by_role("button", name="Take over").click()
+    await expect(row(page, "evsg3")).to_contain_text("with you")
+    await desk.until(f"/api/runs/{run}", lambda said: said["status"] == "stopped")
+    await expect(page.locator(".toast-bad")).to_have_count(0)
+    assert not [each for each in await desk.ask("GET", "/api/alerts") if each["run"] == run]

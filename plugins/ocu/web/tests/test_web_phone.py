@@ -1,8 +1,10 @@
-"""STOP on a phone: whole, and covered by nothing, on every page."""
+"""On a phone STOP and what calls are seen, whole and covered by nothing, on every page."""
+
+import re
 
 import pytest
 from playwright.async_api import Page, expect
-from web_desk import IN_ONE_LOOP, Desk
+from web_desk import IN_ONE_LOOP, Desk, element
 from web_running import answer
 
 pytestmark = IN_ONE_LOOP
@@ -64,3 +66,44 @@ async def test_stop_is_whole_on_every_page_of_a_phone(desk: Desk, width: int) ->
     await page.get_by_role("button", name="Replay it").click()
     await expect(page.locator(".player")).to_be_visible()
     await assert_stop_is_whole(page, "replay")
+
+
+BELL = re.compile("alerts? needs? you$")
+
+
+@pytest.mark.parametrize("size", [(320, 640), (640, 320)], ids=["upright", "on its side"])
+async def test_what_calls_is_seen_on_every_page_of_a_phone(
+    desk: Desk, size: tuple[int, int]
+) -> None:
+    page = desk.page
+    await page.set_viewport_size({"width": size[0], "height": size[1]})
+    await desk.start()
+    await assert_calls_are_seen(page, "run")
+    run = page.url
+    await page.get_by_role("button", name="Message…").scroll_into_view_if_needed()
+    await assert_stop_is_whole(page, "run, scrolled")
+    await expect(answer(page, "Continue")).to_be_in_viewport(ratio=1)
+    for where in ("", "fleet", "alerts", "missions/vignette1"):
+        await page.goto(f"{desk.executive.origin}/{where}")
+        await expect(page.get_by_role("link", name="question open")).to_be_in_viewport(ratio=1)
+        await assert_calls_are_seen(page, where)
+    await page.goto(run)
+    await page.get_by_role("button", name=BELL).click()
+    await expect(page.get_by_role("dialog", name="Alerts")).to_be_in_viewport(ratio=1)
+    await assert_calls_are_seen(page, "panel of alerts")
+    await page.keyboard.press("Escape")
+    await answer(page, "Continue").click()
+    await expect(element(page, "DriveRoute")).to_contain_class("m2-active")
+    await desk.edit(tab="Run")
+    desk.refusals.append(409)  # another run has the vehicle
+    await page.get_by_role("button", name="Start", exact=True).click()
+    await expect(page.get_by_role("dialog", name="Vehicles are busy")).to_be_visible()
+    await assert_stop_is_whole(page, "vehicles are busy")
+
+
+async def assert_calls_are_seen(page: Page, where: str) -> None:
+    """STOP, the bell and whether vehicles are real; and nothing needs to be scrolled sideways."""
+    await assert_stop_is_whole(page, where)
+    await expect(page.get_by_role("button", name=BELL)).to_be_in_viewport(ratio=1)
+    await expect(page.locator(".reality")).to_be_in_viewport(ratio=1)
+    assert await page.evaluate("document.documentElement.scrollWidth <= innerWidth"), where

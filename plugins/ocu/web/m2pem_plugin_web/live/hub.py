@@ -14,6 +14,7 @@ from typing import Any
 import msgspec
 
 from m2pem.api import (
+    CONTROL_REQUEST,
     NEWS,
     PRESENCE_EVERY_S,
     Alert,
@@ -154,7 +155,9 @@ class Hub(Listener):
         self._send_to_all(messages.prompt_closed(closed))
 
     def alerted(self, alert: Alert) -> None:
-        """Send the alert at once."""
+        """Send the alert at once, unless each page shows what it is about until it is over."""
+        if alert.code == CONTROL_REQUEST and not alert.clears:
+            return
         text = f"{alert.run}: {alert.text}" if alert.run else alert.text
         is_news = alert.code in NEWS
         self._send_to_all(messages.notice(text) if is_news else messages.fault(text))

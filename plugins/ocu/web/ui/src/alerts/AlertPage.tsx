@@ -133,14 +133,18 @@ function Table({ alerts, over = false }: { alerts: readonly OperatorAlert[]; ove
               <td>
                 <Source alert={alert} />
               </td>
-              <td class="home-when">{moment(alert.raised_us / 1000)}</td>
+              <td class="home-when" data-label={columns.raised}>
+                {moment(alert.raised_us / 1000)}
+              </td>
               <td class="home-when">
                 <Age alert={alert} />
               </td>
-              <td>{seenBy(alert)}</td>
-              <td>{alert.owner || "–"}</td>
+              <td data-label={columns.acknowledged}>{seenBy(alert)}</td>
+              <td data-label={columns.owner}>{alert.owner || "–"}</td>
               {over ? (
-                <td class="home-when">{moment((alert.cleared_us ?? 0) / 1000)}</td>
+                <td class="home-when" data-label={columns.over}>
+                  {moment((alert.cleared_us ?? 0) / 1000)}
+                </td>
               ) : (
                 <td class="home-actions">
                   <AlertActions alert={alert} />

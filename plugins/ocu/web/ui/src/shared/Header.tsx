@@ -56,18 +56,15 @@ export function Header() {
               <span class="fleet" title={text.fleet}>
                 {who.fleet}
               </span>
+              <Reality simulated={who.simulated} />
+              <Link />
               <nav class="header-pages" aria-label={text.pages}>
                 <PageLink to="/" label={text.home} isHere={route.value.page === "home"} />
                 <PageLink to="/fleet" label={text.fleetPage} isHere={route.value.page === "fleet"} />
               </nav>
-              <Reality simulated={who.simulated} />
-              <Link />
             </>
           )}
           <span class="space" />
-          {who && <Questions />}
-          {who && <Present />}
-          {who && <AlertBell />}
           {who && (
             <span class="who" title={text.signedInAs}>
               {who.user} <small>{text.roles[who.role]}</small>
@@ -91,6 +88,13 @@ export function Header() {
             </button>
           )}
         </div>
+        {who && (
+          <div class="header-calls">
+            <Questions />
+            <Present />
+            <AlertBell />
+          </div>
+        )}
         {may("operator") && (
           <StopButton
             class="stop-all"
@@ -166,7 +170,15 @@ function Questions() {
   const path = `/runs/${encodeURIComponent(first.run)}`;
   return (
     <a class="questions" href={path} onClick={leave(path)}>
-      {standing.length} {standing.length === 1 ? text.question : text.questions}
+      {standing.length}
+      <span class="questions-words">
+        {" "}
+        {standing.length === 1 ? text.question : text.questions}
+      </span>
+      <span class="questions-mark" aria-hidden="true">
+        {" "}
+        ?
+      </span>
     </a>
   );
 }

@@ -2,9 +2,8 @@
 import { signal } from "@preact/signals";
 import { strings } from "../strings";
 import { ApiError } from "./api";
+import { newest, type Tone } from "./newestToasts";
 import "./toasts.css";
-
-export type Tone = "good" | "plain" | "bad";
 
 interface Toast {
   id: number;
@@ -13,14 +12,17 @@ interface Toast {
 }
 
 const SHOWN_MS = 6000;
-const MOST = 5;
+/** A phone has less room: what is below, such as a question, stays in view. */
+const SMALL = "(width < 600px)";
+const LOW = "(height < 480px)";
+const most = (): number => (matchMedia(LOW).matches ? 1 : matchMedia(SMALL).matches ? 3 : 5);
 
 const toasts = signal<Toast[]>([]);
 let count = 0;
 
 export function toast(text: string, tone: Tone = "plain"): void {
   const id = ++count;
-  toasts.value = [...toasts.value, { id, text, tone }].slice(-MOST);
+  toasts.value = newest([...toasts.value, { id, text, tone }], most());
   if (tone !== "bad") setTimeout(() => dismiss(id), SHOWN_MS);
 }
 

@@ -114,7 +114,7 @@ export class Drawing {
   }
 
   fit(): void {
-    if (this.host.clientWidth === 0) return;
+    if (this.host.clientWidth === 0 || this.host.clientHeight === 0) return;
     this.fitting = true;
     this.canvas.zoom("fit-viewport", MIDDLE);
     const { scale } = this.canvas.viewbox();
