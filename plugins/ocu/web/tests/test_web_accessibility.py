@@ -2,13 +2,13 @@
 
 import re
 import shutil
-from collections.abc import Sequence
+from collections.abc import Awaitable, Callable, Sequence
 
 import pytest
 from playwright.async_api import Browser, Page, expect
 from web_axe import Accessibility
 from web_browsing import page_at
-from web_desk import IN_ONE_LOOP, MISSION, Desk
+from web_desk import IN_ONE_LOOP, MISSION, Desk, signed_in
 from web_drawing import Drawing
 from web_running import answer, press_twice, wait_for_status
 from web_served import REPOSITORY, Served
@@ -281,3 +281,81 @@ FOCUSED = """() => {
   const focused = document.activeElement;
   return (focused?.getAttribute("aria-label") ?? focused?.textContent ?? "").trim();
 }"""
+
+
+@pytest.mark.long
+@LIGHT_AND_DARK
+async def test_pages_of_the_fleet_and_of_alerts_have_no_violation(
+    chromium: Browser, desk: Desk, dark: bool
+) -> None:
+    """Each as a whole, on a desk and on a phone, and with forced colours."""
+    eyes = await opened(desk, dark)
+    page = eyes.page
+    async with signed_in(chromium, desk.executive, "otto"):
+        await desk.ask("POST", "/api/resources/evsg2/take")
+        await desk.driving()
+        for name, show in SHOWN.items():
+            await page.set_viewport_size({"width": 1280, "height": 720})
+            await show(desk)
+            await eyes.look(name)
+            if not dark:  # forced colours know no theme
+                await page.emulate_media(forced_colors="active")
+                await eyes.look(f"{name}, forced colours")
+                await page.emulate_media(forced_colors="none")
+            await page.set_viewport_size({"width": 390, "height": 780})
+            await eyes.look(f"{name}, phone")
+            await page.keyboard.press("Escape")
+    eyes.assert_well()
+
+
+async def show_runs(desk: Desk) -> None:
+    await desk.home()
+    await desk.page.get_by_role("checkbox", name="Select all on this page").check()
+
+
+async def show_stopping(desk: Desk) -> None:
+    await show_runs(desk)
+    runs = desk.page.get_by_role("region", name="Runs")
+    await runs.get_by_role("button", name="Stop", exact=True).click()
+    await expect(desk.page.get_by_role("dialog", name=re.compile("^Stop"))).to_be_visible()
+
+
+async def show_panel_of_alerts(desk: Desk) -> None:
+    await desk.home()
+    await desk.page.get_by_role("button", name=re.compile("needs? you$")).click()
+    await expect(desk.page.get_by_role("dialog", name="Alerts")).to_be_visible()
+
+
+async def show_alerts(desk: Desk) -> None:
+    await desk.page.goto(f"{desk.executive.origin}/alerts")
+    await expect(desk.page.get_by_role("region", name="Over")).to_be_visible()
+
+
+async def show_present(desk: Desk) -> None:
+    await desk.home()
+    await desk.page.get_by_role("button", name=re.compile("present$")).click()
+    await expect(desk.page.get_by_role("region", name="Who is present")).to_be_visible()
+
+
+async def show_fleet(desk: Desk) -> None:
+    await desk.page.goto(f"{desk.executive.origin}/fleet")
+    await desk.page.get_by_role("row").filter(has_text="uav1").click()
+    await expect(desk.page.get_by_role("region", name="Details and commands")).to_be_attached()
+
+
+async def show_busy(desk: Desk) -> None:
+    await desk.edit(tab="Run")
+    desk.refusals.append(409)  # another run has the vehicle
+    await desk.page.get_by_role("button", name="Start", exact=True).click()
+    await expect(desk.page.get_by_role("dialog", name="Vehicles are busy")).to_be_visible()
+
+
+SHOWN: dict[str, Callable[[Desk], Awaitable[None]]] = {
+    "runs selected": show_runs,
+    "runs to be stopped": show_stopping,
+    "panel of alerts": show_panel_of_alerts,
+    "alerts": show_alerts,
+    "who is present": show_present,
+    "fleet": show_fleet,
+    "vehicles are busy": show_busy,
+}

@@ -100,18 +100,20 @@ export function BusyDialog({ mission, busy, real, startNow, close }: BusyDialogP
           {words.chooseHint}
         </li>
         {runs.map((run) => (
-          <li key={run} role="status">
-            {stopped.includes(run) ? (
-              fill(words.stopping, { run })
-            ) : (
-              <button
-                type="button"
-                class={sure === run ? "primary m2r-real" : "secondary"}
-                onClick={() => (sure === run ? void stop(run) : setSure(run))}
-              >
-                {fill(sure === run ? words.stopSure : words.stop, { run })}
-              </button>
-            )}
+          <li key={run}>
+            <span role="status">
+              {stopped.includes(run) ? (
+                fill(words.stopping, { run })
+              ) : (
+                <button
+                  type="button"
+                  class={sure === run ? "primary m2r-real" : "secondary"}
+                  onClick={() => (sure === run ? void stop(run) : setSure(run))}
+                >
+                  {fill(sure === run ? words.stopSure : words.stop, { run })}
+                </button>
+              )}
+            </span>
           </li>
         ))}
       </ul>
