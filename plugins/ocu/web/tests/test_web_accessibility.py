@@ -10,6 +10,7 @@ from web_axe import Accessibility
 from web_browsing import page_at
 from web_desk import IN_ONE_LOOP, MISSION, Desk, signed_in
 from web_drawing import Drawing
+from web_map_seen import vehicles_on
 from web_running import answer, press_twice, wait_for_status
 from web_served import REPOSITORY, Served
 
@@ -139,7 +140,7 @@ async def look_at_rehearsal(eyes: Accessibility) -> None:
         await outcome.get_by_role("link", name="Watch the rehearsal").click()
     watched = Accessibility(await opening.value, eyes.wrong, eyes.looked)
     await expect(watched.page.get_by_label("Position")).to_be_visible()
-    await expect(watched.page.locator(".vehicle").first).to_be_visible()
+    await expect(vehicles_on(watched.page)).not_to_have_count(0)
     await watched.look("rehearsal, from the start")
     await watched.page.get_by_role("button", name="To the end").click()
     await wait_for_status(watched.page, "Failed")

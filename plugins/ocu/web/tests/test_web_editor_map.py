@@ -10,6 +10,7 @@ from playwright.async_api import Locator, Page, expect
 from web_axe import Accessibility
 from web_desk import IN_ONE_LOOP, Desk
 from web_drawing import Drawing, new_mission
+from web_map_seen import vehicles_on
 from web_pictures import picture
 
 from m2pem import load_mission
@@ -203,7 +204,7 @@ async def test_a_rehearsal_of_the_draft_is_played_on_the_map(desk: Desk) -> None
     await page.get_by_role("button", name="Rehearse").click()
     outcome = page.get_by_role("region", name="What came of it")
     await outcome.get_by_role("button", name="Play on the map").click()
-    await expect(plan(page).locator(".vehicle")).not_to_have_count(0)
+    await expect(vehicles_on(plan(page))).not_to_have_count(0)
     await expect(page.locator(".m2-rehearsed").first).to_be_attached()
     await plan(page).get_by_role("button", name="Pause").click()
     await plan(page).get_by_label("Position", exact=True).fill("40")
@@ -213,5 +214,5 @@ async def test_a_rehearsal_of_the_draft_is_played_on_the_map(desk: Desk) -> None
     await picture(page, "rehearsed_on_map")
     assert page.url.endswith("/missions/vignette1")
     await plan(page).get_by_role("button", name="End of the rehearsal on the map").click()
-    await expect(plan(page).locator(".vehicle")).to_have_count(0)
+    await expect(vehicles_on(plan(page))).to_have_count(0)
     await expect(page.locator(".m2-rehearsed")).to_have_count(0)

@@ -8,6 +8,7 @@ from typing import Any
 from playwright.async_api import Browser, expect
 from web_browsing import page_at
 from web_desk import IN_ONE_LOOP
+from web_map_seen import LOST, colours, middle_drawn, vehicles_on
 from web_world import VEHICLE, MakeWorld, executive, serving
 
 from m2pem.api.arbiter import Arbiter
@@ -56,15 +57,20 @@ async def test_a_vehicle_whose_link_is_lost_is_gray_and_comes_back(
         prompt = await here.asked()
         await page.goto(f"{here.base}/runs/{prompt.run}")
         card = page.locator(".card", has_text=VEHICLE)
-        marker = page.locator(".vehicle")
+        listed = vehicles_on(page)
         await expect(card).not_to_contain_class("card-stale")
-        await expect(marker).not_to_contain_class("vehicle-stale")
+        await expect(listed).to_contain_text(f"{VEHICLE}: Well")
+        assert LOST not in await colours(page)
+        await page.mouse.move(*await middle_drawn(page))
+        await expect(page.locator(".map-over-vehicle")).to_be_attached()
         plugins.made.lose_link(ResourceId(VEHICLE))
         await expect(card).to_contain_class("card-stale")
         await expect(card).to_contain_text("silent for")
-        await expect(marker).to_contain_class("vehicle-stale")
+        await expect(listed).to_contain_text(f"{VEHICLE}: Lost")
+        assert LOST in await colours(page)
         plugins.made.restore_link(ResourceId(VEHICLE))
         await expect(card).not_to_contain_class("card-stale")
         await expect(card).not_to_contain_text("silent for")
-        await expect(marker).not_to_contain_class("vehicle-stale")
+        await expect(listed).to_contain_text(f"{VEHICLE}: Well")
+        assert LOST not in await colours(page)
         it.assert_well()

@@ -1,5 +1,7 @@
 """A run is replayed after a restart: vehicles are where they were, in a real browser."""
 
+import math
+import re
 from collections.abc import AsyncIterator
 from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
@@ -8,6 +10,7 @@ from playwright.async_api import Browser, Page, expect
 from test_web_telemetry import begun
 from web_browsing import page_at
 from web_desk import IN_ONE_LOOP
+from web_map_seen import vehicles_on
 from web_world import VEHICLE, World
 
 from m2pem.api import RunStatus
@@ -15,25 +18,26 @@ from m2pem.testing import scenarios
 
 pytestmark = IN_ONE_LOOP
 
-FAR_PX = 20
+FAR_M = 40
+METRES_PER_DEGREE = 111_195
 FAR = scenarios.one_behavior("reverse", VEHICLE, distance="60 m")
 NEAR = scenarios.one_behavior("reverse", VEHICLE, distance="1 m")
 
-PLACE = """([vehicle]) => {
-  for (const marker of document.querySelectorAll(".map .vehicle")) {
-    if (!marker.textContent.includes(vehicle)) continue;
-    const {left, top} = marker.getBoundingClientRect();
-    return [Math.round(left), Math.round(top)];
-  }
-  return null;
-}"""
+PLACE = re.compile(r"at (-?[\d.]+)°, (-?[\d.]+)°")
 
 
-async def place(page: Page) -> list[int]:
-    """Where the vehicle is drawn."""
-    await expect(page.locator(".map .vehicle", has_text=VEHICLE)).to_be_visible()
-    found: list[int] = await page.evaluate(PLACE, [VEHICLE])
-    return found
+def place(said: str) -> tuple[float, float]:
+    """Where a vehicle is drawn, in degrees, by what the map lists of it."""
+    found = PLACE.search(said)
+    assert found
+    return float(found[1]), float(found[2])
+
+
+def apart_m(said: str, then: str) -> float:
+    """Between two places, over a short distance."""
+    one, other = place(said), place(then)
+    north, east = one[0] - other[0], (one[1] - other[1]) * math.cos(math.radians(one[0]))
+    return math.hypot(north, east) * METRES_PER_DEGREE
 
 
 async def scrub(page: Page, t_s: float) -> None:
@@ -80,17 +84,19 @@ async def test_a_replay_after_a_restart_shows_where_vehicles_were_or_why_not(
         page = await stack.enter_async_context(opened(chromium, second))
         await page.goto(f"{second.base}/runs/{run}?t=0")
         await expect(page.locator(".run-bar .mode")).to_contain_text("Replay")
-        begin = await place(page)
+        listed = vehicles_on(page).filter(has_text=f"{VEHICLE}:")
+        begin = await listed.inner_text()
         await expect(page.locator(".map-nobody")).to_have_count(0)
         await scrub(page, await page.locator(".player-position").evaluate("e => +e.max"))
         await expect(page.locator(".run-bar .status")).to_have_text("Completed")
-        there = await place(page)
-        assert abs(there[0] - begin[0]) + abs(there[1] - begin[1]) > FAR_PX
+        await expect(listed).not_to_have_text(begin)
+        there = await listed.inner_text()
+        assert apart_m(there, begin) > FAR_M
         await scrub(page, 0)
         await expect(page.locator(".run-bar .status")).to_have_text("Running")
-        assert await place(page) == begin
+        await expect(listed).to_have_text(begin)
 
         await page.goto(f"{second.base}/runs/{other}")
         nobody = page.locator(".map-nobody")
         await expect(nobody).to_contain_text("No positions of vehicles were recorded")
-        await expect(page.locator(".map .vehicle")).to_have_count(0)
+        await expect(vehicles_on(page)).to_have_count(0)

@@ -4,7 +4,6 @@ import L from "leaflet";
 import { useEffect, useRef } from "preact/hooks";
 import { baseMap } from "../map/baseMap";
 import { session } from "../shared/session";
-import { theme } from "../shared/theme";
 import type { Fleet, Geometry } from "../shared/types";
 import { fill, strings } from "../strings";
 import { FleetLayer } from "./fleetLayer";
@@ -42,11 +41,8 @@ export function FleetMap({ fleet, geometries, rows, picksOnce }: FleetMapProps) 
   const view = useRef<{ map: L.Map; layer: FleetLayer; fitted: boolean }>();
 
   useEffect(() => {
-    // The canvas of vehicles is drawn for one zoom.
-    const map = baseMap(host.current!, fleet, session.peek()?.tiles ?? null, {
-      zoomAnimation: false,
-    });
-    const layer = new FleetLayer().addTo(map);
+    const map = baseMap(host.current!, fleet, session.peek()?.tiles ?? null);
+    const layer = new FleetLayer(map);
     view.current = { map, layer, fitted: false };
     middle.current = () => {
       const { lat, lng } = map.getCenter();
@@ -62,21 +58,14 @@ export function FleetMap({ fleet, geometries, rows, picksOnce }: FleetMapProps) 
       if (mark?.kind === "cluster") {
         map.setView([mark.latitude, mark.longitude], layer.zoomOf(mark.id), { animate: false });
       } else if (mark) {
-        const { id } = mark.row;
+        const { id } = mark.vehicle;
         if (originalEvent.ctrlKey || originalEvent.metaKey || originalEvent.shiftKey) {
           select([id], !selected.value.has(id));
         } else focused.value = id;
       }
     });
-    map.on("mousemove", ({ containerPoint }) => {
-      const isOver = !picking.value && layer.at(containerPoint) !== null;
-      map.getContainer().classList.toggle("fleet-map-over", isOver);
-    });
     const resized = new ResizeObserver(() => map.invalidateSize({ animate: false }));
     resized.observe(host.current!);
-    const forced = matchMedia("(forced-colors: active)");
-    const recolour = () => layer.recolour();
-    forced.addEventListener("change", recolour);
     const stops = [
       effect(() => layer.choose(new Set([...selected.value, focused.value]))),
       effect(() => layer.aim(destination.value, targets())),
@@ -85,12 +74,9 @@ export function FleetMap({ fleet, geometries, rows, picksOnce }: FleetMapProps) 
         const at = wanted && layer.position(wanted.resource);
         if (at) map.setView(at, Math.max(map.getZoom(), NEAR_ZOOM), { animate: false });
       }),
-      // The style of a theme is that of the next frame.
-      theme.subscribe(() => void requestAnimationFrame(recolour)),
     ];
     return () => {
       for (const stop of stops) stop();
-      forced.removeEventListener("change", recolour);
       resized.disconnect();
       middle.current = () => null;
       map.remove();

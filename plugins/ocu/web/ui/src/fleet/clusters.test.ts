@@ -1,5 +1,6 @@
 import { describe, expect, it } from "vitest";
-import { Clusters, worstOf } from "./clusters";
+import { worstOf } from "../map/vehicleSymbols";
+import { Clusters } from "./clusters";
 import { rows, state, vehicle } from "./testing";
 
 describe("clusters", () => {

@@ -1,6 +1,9 @@
 // Vehicles that are near each other on the map, drawn as one.
 import Supercluster from "supercluster";
-import { rankOf, type Health, type Row } from "./rows";
+import type { Counted } from "../map/vehicleSymbols";
+import type { Health } from "../map/health";
+import type { Mark } from "../map/vehicleCanvas";
+import type { Row } from "./rows";
 
 /** Smaller fleets are seen one by one: a formation is not drawn as a number. */
 const LEAST = 50;
@@ -8,26 +11,6 @@ const RADIUS_PX = 44;
 const TILE_PX = 256;
 /** From this zoom on each vehicle is drawn. */
 export const WHOLE_ZOOM = 18;
-
-export type Mark =
-  | { kind: "vehicle"; row: Row; latitude: number; longitude: number }
-  | {
-      kind: "cluster";
-      id: number;
-      count: number;
-      /** How many have each health. */
-      healths: Counted;
-      latitude: number;
-      longitude: number;
-    };
-
-export type Counted = Partial<Record<Health, number>>;
-
-/** Of those in a cluster. */
-export const worstOf = (healths: Counted): Health =>
-  (Object.keys(healths) as Health[]).reduce((worst, each) =>
-    rankOf(each) > rankOf(worst) ? each : worst,
-  );
 
 export class Clusters {
   private readonly index = new Supercluster<{ row: Row }, { healths: Counted }>({
@@ -90,7 +73,7 @@ export class Clusters {
 
 const markOf = (row: Row): Mark => ({
   kind: "vehicle",
-  row,
+  vehicle: row,
   latitude: row.latitude!,
   longitude: row.longitude!,
 });

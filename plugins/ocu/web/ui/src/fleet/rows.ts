@@ -1,10 +1,10 @@
 // The lines of the table of the fleet: what is known of each vehicle and payload, as people sort,
 // search and group it.
 import { speed_m_s, STALE_S } from "../shared/format";
+import { healthOf, isLow, rankOf, type Health } from "../map/health";
 import type { Fleet, PayloadState, VehicleState } from "../shared/types";
 
 export type Domain = Fleet["vehicles"][number]["domain"];
-export type Health = "ok" | "degraded" | "lowBattery" | "notReady" | "unheard" | "lost";
 export type Filter = "lost" | "notReady" | "lowBattery" | "free" | "taken" | "inRun";
 export type Grouping = "none" | "domain" | "arbiter" | "host" | "health" | "holder";
 export type Column =
@@ -36,20 +36,6 @@ export const GROUPINGS: readonly Grouping[] = [
   "health",
   "holder",
 ];
-export const LOW_BATTERY = 0.25;
-
-/** The worst last. */
-const HEALTHS: readonly Health[] = [
-  "ok",
-  "degraded",
-  "lowBattery",
-  "notReady",
-  "unheard",
-  "lost",
-];
-
-export const rankOf = (health: Health): number => HEALTHS.indexOf(health);
-
 /** What the executive says of a resource that is not just free: `GET /api/fleet/status`. */
 export interface ResourceStatus {
   holder: string;
@@ -128,7 +114,6 @@ function rowOf(
   const position = vehicle?.position ?? null;
   const battery = vehicle?.battery_fraction ?? null;
   const isLost = state?.link === "lost" || (age_s !== null && age_s > STALE_S);
-  const isLow = battery !== null && battery < LOW_BATTERY;
   const operator = now && now.holder && !OF_RUN.test(now.holder) ? now.holder : "";
   const row = {
     id,
@@ -157,30 +142,22 @@ function rowOf(
   };
   return {
     ...row,
-    health: healthOf(state !== undefined, isLost, row.ready, isLow, row.link),
+    health: healthOf({
+      isKnown: state !== undefined,
+      isLost,
+      ready: row.ready,
+      isLow: isLow(battery),
+      link: row.link,
+    }),
     flags: {
       lost: isLost || state === undefined,
       notReady: row.ready === false,
-      lowBattery: isLow,
+      lowBattery: isLow(battery),
       free: !manned && !(now && (now.holder || now.run || now.unavailable)),
       taken: operator !== "",
       inRun: now !== null && now.run !== "" && !now.direct,
     },
   };
-}
-
-function healthOf(
-  isKnown: boolean,
-  isLost: boolean,
-  ready: boolean | null,
-  isLow: boolean,
-  link: Row["link"],
-): Health {
-  if (isLost) return "lost";
-  if (!isKnown) return "unheard";
-  if (ready === false) return "notReady";
-  if (isLow) return "lowBattery";
-  return link === "degraded" ? "degraded" : "ok";
 }
 
 /** The values by which a column sorts; null and "" come last, whichever way it sorts. */

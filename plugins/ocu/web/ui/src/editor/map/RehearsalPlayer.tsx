@@ -5,6 +5,8 @@ import { loadReplay } from "../../operate/loading";
 import { Player } from "../../operate/player/Player";
 import type { ReplayScene } from "../../operate/scene/replayScene";
 import { attempt } from "../../shared/Toasts";
+import { VehicleList } from "../../map/VehicleList";
+import type { VehicleMark } from "../../operate/map/vehicleLayer";
 import { strings } from "../../strings";
 import type { EditorContext } from "../panels/panel";
 import type { PlayedRehearsal } from "./plan";
@@ -24,6 +26,7 @@ export interface RehearsalPlayerProps {
 
 export function RehearsalPlayer({ editor, rehearsal, map }: RehearsalPlayerProps) {
   const scene = useSignal<ReplayScene | null>(null);
+  const listed = useSignal<readonly VehicleMark[]>([]);
   useEffect(() => {
     let left = false;
     void attempt(async () => {
@@ -45,6 +48,7 @@ export function RehearsalPlayer({ editor, rehearsal, map }: RehearsalPlayerProps
     const layer = on.vehicles;
     layer.show({ trails: true, names: true, footprints: true });
     const stops = [
+      layer.listed.subscribe((now) => (listed.value = now)),
       shown.vehicles.subscribe((states) => layer.vehicles(states, shown.pace.peek())),
       shown.payloads.subscribe((states) => layer.payloads(states)),
       shown.jumps.subscribe(() => layer.retrace((resource) => shown.trail(resource))),
@@ -60,6 +64,7 @@ export function RehearsalPlayer({ editor, rehearsal, map }: RehearsalPlayerProps
   }, [scene.value]);
   return (
     <div class="plan-player">
+      <VehicleList vehicles={listed} />
       {scene.value ? (
         <Player scene={scene.value} embedded />
       ) : (

@@ -79,7 +79,7 @@ export class PlanMap {
     for (const layer of [this.geometries, this.preview, this.badges, this.handles]) {
       layer.addTo(this.map);
     }
-    this.vehicles = new VehicleLayer(this.map, fleet, () => undefined);
+    this.vehicles = new VehicleLayer(this.map, fleet);
     const style = { color: DRAFT, weight: 2, dashArray: "2 6", interactive: false };
     this.band = L.polyline([], style).addTo(this.map);
     this.map.on("click", ({ latlng }) => this.click(latlng));
@@ -95,6 +95,7 @@ export class PlanMap {
 
   dispose(): void {
     this.observer.disconnect();
+    this.vehicles.dispose();
     this.map.remove();
   }
 

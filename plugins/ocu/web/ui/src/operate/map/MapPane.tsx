@@ -12,7 +12,9 @@ import { workOf } from "../vehicles/work";
 import { DrawForm } from "./DrawForm";
 import { added, draftOf, emptyDraft, moved, type Kind } from "../../map/draft";
 import { MapTools, type MapShows } from "./MapTools";
+import { VehicleList } from "../../map/VehicleList";
 import { MapView } from "./mapView";
+import type { VehicleMark } from "./vehicleLayer";
 import "./map.css";
 
 const text = strings.operate.map;
@@ -25,6 +27,7 @@ export function MapPane({ formInside }: { formInside: boolean }) {
   const { scene, fleet, geometries, followed, centred, selected, draft, middle } = useOperating();
   const host = useRef<HTMLDivElement>(null);
   const view = useRef<MapView>();
+  const listed = useSignal<readonly VehicleMark[]>([]);
   const shows = useSignal<MapShows>({ ...SHOWS, ...remembered<Partial<MapShows>>("map", {}) });
 
   useEffect(() => {
@@ -60,7 +63,11 @@ export function MapPane({ formInside }: { formInside: boolean }) {
       }),
       scene.jumps.subscribe(() => made.vehicles.retrace((resource) => scene.trail(resource))),
       scene.payloads.subscribe((states) => made.vehicles.payloads(states)),
-      followed.subscribe((resource) => made.centre(resource)),
+      made.vehicles.listed.subscribe((now) => (listed.value = now)),
+      followed.subscribe((resource) => {
+        made.vehicles.choose(resource);
+        made.centre(resource);
+      }),
       centred.subscribe((wanted) => wanted && made.centre(wanted.resource)),
       draft.subscribe((now) => made.draw(now)),
       shows.subscribe((now) => {
@@ -106,6 +113,7 @@ export function MapPane({ formInside }: { formInside: boolean }) {
           if (event.key === "Escape" && !event.shiftKey) draft.value = null;
         }}
       />
+      <VehicleList vehicles={listed} />
       {formInside && draft.value && <DrawForm draft={draft.value} />}
       <Nobody />
     </Pane>

@@ -54,9 +54,11 @@ export class MapView {
       this.widenCorridors();
     });
     this.drafted.addTo(this.map);
-    this.vehicles = new VehicleLayer(this.map, fleet, (resource) => listener.chosen(resource));
-    this.map.on("click", ({ latlng }) => {
-      if (this.isDrawing) listener.clicked(vertexOf(latlng));
+    this.vehicles = new VehicleLayer(this.map, fleet);
+    this.map.on("click", ({ latlng, containerPoint }) => {
+      if (this.isDrawing) return listener.clicked(vertexOf(latlng));
+      const resource = this.vehicles.at(containerPoint);
+      if (resource) listener.chosen(resource);
     });
     this.map.on("dragstart", () => listener.moved());
     this.observer = new ResizeObserver(() => this.map.invalidateSize({ animate: false }));
@@ -65,6 +67,7 @@ export class MapView {
 
   dispose(): void {
     this.observer.disconnect();
+    this.vehicles.dispose();
     this.map.remove();
   }
 

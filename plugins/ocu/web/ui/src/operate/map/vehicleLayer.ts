@@ -1,28 +1,29 @@
 // Vehicles on the map: where they are, where they head, where they have been, what they see.
+import { signal } from "@preact/signals";
 import L from "leaflet";
 import type { Fleet, GeoPosition, PayloadState, VehicleState } from "../../shared/types";
-import { heading_deg } from "../../shared/format";
+import { healthOf, isLow } from "../../map/health";
+import { TrailLayer } from "../../map/trailLayer";
+import { VehicleCanvas, type Mark } from "../../map/vehicleCanvas";
 import { TRAIL_POINTS } from "../scene/scene";
-import { GAP_S, isGap } from "./trail";
-import { DOMAIN_PATHS } from "../vehicles/DomainSymbol";
+import { GAP_S } from "./trail";
 
 type Vehicle = Fleet["vehicles"][number];
+export type VehicleMark = Extract<Mark, { kind: "vehicle" }>;
 
-const TRAIL_STEP_M = 1;
-
-const TRAIL: L.PolylineOptions = { color: "#3a7bd0", weight: 2, opacity: 0.65, interactive: false };
 const FOOTPRINT: L.PolylineOptions = {
   color: "#d08a1d",
   weight: 1,
   fillOpacity: 0.1,
   interactive: false,
 };
+/** Nobody is read to more often where vehicles are. */
+const LISTED_MS = 500;
 
 interface Shown {
-  marker: L.Marker;
-  trail: L.Polyline;
-  state: VehicleState | undefined;
-  symbol: SVGElement | null;
+  state: VehicleState;
+  isStale: boolean;
+  mark: VehicleMark;
 }
 
 export interface Shows {
@@ -45,34 +46,54 @@ const isSame = (before: readonly GeoPosition[], now: readonly GeoPosition[]): bo
   );
 
 export class VehicleLayer {
+  /** All that are drawn, wherever the map is, a moment after they are. */
+  readonly listed = signal<readonly VehicleMark[]>([]);
   private readonly shown = new Map<string, Shown>();
-  private readonly trails = L.layerGroup();
+  private readonly canvas: VehicleCanvas;
+  private readonly trails = new TrailLayer(TRAIL_POINTS);
   private readonly footprints = L.layerGroup();
   private been: (resource: string) => GeoPosition[][] = () => [];
   private longest_s = GAP_S;
   private readonly seen = new Map<string, { polygon: L.Polygon; state: PayloadState }>();
+  private listing: ReturnType<typeof setTimeout> | undefined;
 
   constructor(
     private readonly map: L.Map,
     private readonly fleet: Fleet,
-    private readonly chosen: (resource: string) => void,
-  ) {}
+  ) {
+    this.canvas = new VehicleCanvas({
+      marks: () => [...this.shown.values()].map(({ mark }) => mark),
+      done: () => this.list(),
+    }).addTo(map);
+  }
+
+  dispose(): void {
+    clearTimeout(this.listing);
+  }
 
   position(resource: string): L.LatLngTuple | null {
-    const position = this.shown.get(resource)?.state?.position;
+    const position = this.shown.get(resource)?.state.position;
     return position ? place(position) : null;
   }
 
   positions(): L.LatLngTuple[] {
-    return [...this.shown.keys()].flatMap((resource) => {
-      const found = this.position(resource);
-      return found ? [found] : [];
-    });
+    return [...this.shown.values()].map(({ mark }) => [mark.latitude, mark.longitude]);
+  }
+
+  /** The vehicle that is drawn at a place of the container. */
+  at(point: L.Point): string | null {
+    const mark = this.canvas.at(point);
+    return mark?.kind === "vehicle" ? mark.vehicle.id : null;
+  }
+
+  choose(resource: string): void {
+    this.canvas.choose(new Set(resource ? [resource] : []));
   }
 
   show({ trails, names, footprints }: Shows): void {
     this.turn(this.trails, trails);
     this.turn(this.footprints, footprints);
+    this.canvas.showNames(names);
     this.map.getContainer().classList.toggle("map-nameless", !names);
   }
 
@@ -83,28 +104,27 @@ export class VehicleLayer {
       const state = states[vehicle.id];
       const shown = this.shown.get(vehicle.id);
       if (!state?.position) {
-        if (shown) this.remove(vehicle.id, shown);
-      } else if (shown?.state !== state) {
-        this.move(shown ?? this.add(vehicle, state.position), state, state.position);
-      }
+        if (shown) this.remove(vehicle.id);
+      } else if (shown?.state !== state) this.move(vehicle, shown, state, state.position);
     }
+    this.canvas.redraw();
   }
 
   /** Draw trails anew: `been` says where a vehicle was, and where it is ends the trail. */
   retrace(been: (resource: string) => GeoPosition[][]): void {
     this.been = been;
-    for (const [resource, { marker, trail }] of this.shown) {
-      trail.setLatLngs(been(resource).map((piece) => piece.map((each) => L.latLng(place(each)))));
-      this.extend(trail, marker.getLatLng(), 0);
-    }
+    for (const [resource, { state }] of this.shown) this.trace(resource, state.position!);
   }
 
-  /** Gray where no state came for a while. */
+  /** What is not heard of for a while is drawn as lost. */
   ages(isStale: (resource: string) => boolean): void {
-    for (const [resource, { marker, state }] of this.shown) {
-      const element = marker.getElement();
-      element?.classList.toggle("vehicle-stale", isStale(resource));
-      element?.classList.toggle("vehicle-lost", state?.link === "lost");
+    for (const [resource, shown] of this.shown) {
+      const now = isStale(resource);
+      if (now === shown.isStale) continue;
+      shown.isStale = now;
+      const { health } = symbolOf(shown.mark.vehicle, shown.state, now);
+      shown.mark = { ...shown.mark, vehicle: { ...shown.mark.vehicle, health } };
+      this.canvas.redraw();
     }
   }
 
@@ -125,64 +145,65 @@ export class VehicleLayer {
     }
   }
 
-  private turn(layer: L.LayerGroup, on: boolean): void {
+  private turn(layer: L.Layer, on: boolean): void {
     if (on) layer.addTo(this.map);
     else layer.remove();
   }
 
-  private add(vehicle: Vehicle, position: GeoPosition): Shown {
-    const icon = L.divIcon({
-      className: `vehicle vehicle-${vehicle.domain} ${vehicle.manned ? "vehicle-manned" : ""}`,
-      html: symbolOf(vehicle),
-      iconSize: [28, 28],
-    });
-    const marker = L.marker(place(position), { icon, keyboard: false, zIndexOffset: 1000 });
-    marker.on("click", () => this.chosen(vehicle.id)).addTo(this.map);
-    const symbol = marker.getElement()?.querySelector("svg") ?? null;
-    const trail = L.polyline(
-      this.been(vehicle.id).map((piece) => piece.map(place)),
-      TRAIL,
-    ).addTo(this.trails);
-    const shown: Shown = { marker, trail, state: undefined, symbol };
-    this.shown.set(vehicle.id, shown);
-    return shown;
+  private move(
+    vehicle: Vehicle,
+    shown: Shown | undefined,
+    state: VehicleState,
+    position: GeoPosition,
+  ): void {
+    const { latitude_deg: latitude, longitude_deg: longitude } = position;
+    const mark: VehicleMark = {
+      kind: "vehicle",
+      vehicle: symbolOf(vehicle, state, false),
+      latitude,
+      longitude,
+    };
+    this.shown.set(vehicle.id, { state, isStale: false, mark });
+    if (!shown) return this.trace(vehicle.id, position);
+    const since_s = (state.time_us - shown.state.time_us) / 1e6;
+    this.trails.extend(vehicle.id, place(position), since_s, this.longest_s);
   }
 
-  private move(shown: Shown, state: VehicleState, position: GeoPosition): void {
-    const at = L.latLng(place(position));
-    if (!shown.marker.getLatLng().equals(at, 0)) shown.marker.setLatLng(at);
-    if (state.yaw_rad !== null && shown.symbol) {
-      shown.symbol.style.transform = `rotate(${heading_deg(state.yaw_rad).toFixed(1)}deg)`;
-    }
-    const before_us = shown.state?.time_us ?? state.time_us;
-    this.extend(shown.trail, at, (state.time_us - before_us) / 1e6);
-    shown.state = state;
+  private trace(resource: string, end: GeoPosition): void {
+    this.trails.replace(
+      resource,
+      this.been(resource).map((piece) => piece.map(place)),
+    );
+    this.trails.extend(resource, place(end), 0, this.longest_s);
   }
 
-  /** Go on with a trail; after a gap, with a new piece of it. */
-  private extend(trail: L.Polyline, at: L.LatLng, since_s: number): void {
-    const known = (trail.getLatLngs() as L.LatLng[][]).filter(Array.isArray);
-    const last = known.at(-1)?.at(-1);
-    const step_m = last?.distanceTo(at) ?? Infinity;
-    if (step_m < TRAIL_STEP_M) return;
-    if (!last || isGap(since_s, step_m, this.longest_s)) known.push([at]);
-    else known.at(-1)!.push(at);
-    while (known.reduce((count, piece) => count + piece.length, 0) > TRAIL_POINTS) {
-      known[0] = known[0]!.slice(TRAIL_POINTS / 4);
-      if (known[0].length === 0) known.shift();
-    }
-    trail.setLatLngs(known);
-  }
-
-  private remove(resource: string, { marker, trail }: Shown): void {
-    marker.remove();
-    trail.remove();
+  private remove(resource: string): void {
+    this.trails.forget(resource);
     this.shown.delete(resource);
   }
+
+  private list(): void {
+    this.listing ??= setTimeout(() => {
+      this.listing = undefined;
+      this.listed.value = [...this.shown.values()].map(({ mark }) => mark);
+    }, LISTED_MS);
+  }
 }
 
-function symbolOf({ id, domain }: Vehicle): string {
-  const name = document.createElement("span");
-  name.textContent = id;
-  return `<svg viewBox="0 0 24 24" aria-hidden="true"><path d="${DOMAIN_PATHS[domain]}"/></svg>${name.outerHTML}`;
-}
+const symbolOf = (
+  { id, domain, manned }: Pick<Vehicle, "id" | "domain" | "manned">,
+  { yaw_rad, link, ready, battery_fraction }: VehicleState,
+  isStale: boolean,
+) => ({
+  id,
+  domain,
+  manned,
+  yaw_rad,
+  health: healthOf({
+    isKnown: true,
+    isLost: isStale || link === "lost",
+    ready,
+    isLow: isLow(battery_fraction),
+    link,
+  }),
+});
