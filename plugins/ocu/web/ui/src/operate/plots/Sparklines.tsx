@@ -1,9 +1,7 @@
 // Battery and link of the last minutes, small, on the card of a vehicle.
-import { useComputed } from "@preact/signals";
 import { age } from "../../shared/format";
 import { fill, strings } from "../../strings";
 import { useOperating } from "../context";
-import { usePaced } from "../layout/pace";
 import { LINK_LEVELS } from "./fields";
 import { drawn, grid, type Drawn } from "./series";
 import { readValue } from "./values";
@@ -12,17 +10,14 @@ import "./sparks.css";
 const text = strings.plots;
 
 const SPAN_S = 600;
-const EVERY_MS = 2000;
 const WIDTH = 54;
 const HEIGHT = 18;
 const COLUMNS = WIDTH / 3;
 
+/** Drawn with its card. */
 export function Sparklines({ resource }: { resource: string }) {
   const { scene } = useOperating();
-  const { history } = usePaced(scene.history, EVERY_MS);
-  // A replay goes through a history that does not change.
-  const replayed_s = useComputed(() => (scene.mode === "replay" ? Math.floor(scene.time.value) : 0));
-  replayed_s.value;
+  const { history } = scene.history.peek();
   const to_s = Math.max(1, scene.now());
   const range = { from_s: Math.max(0, to_s - SPAN_S), to_s };
   const times = grid(range, COLUMNS);

@@ -1,4 +1,6 @@
 // Each vehicle: how it is, what it does and for which element, and who has it.
+import { Component } from "preact";
+import { useRef } from "preact/hooks";
 import { usePaced } from "../layout/pace";
 import { age, heading_deg, speed_m_s, STALE_S } from "../../shared/format";
 import { askFor, requests } from "../../people/people";
@@ -14,6 +16,7 @@ import { Sparklines } from "../plots/Sparklines";
 import { SharedSpaces } from "./SharedSpaces";
 import { Teams } from "./Teams";
 import { heldElsewhere, isOperator, payloadsOf, workOf } from "./work";
+import { Turns, useSeen } from "./turns";
 import "./vehicles.css";
 
 const text = strings.operate.vehicles;
@@ -27,17 +30,22 @@ export function VehiclesPane() {
   const payloads = usePaced(scene.payloads, PACE_MS);
   // Ages grow without any message.
   usePaced(scene.time, 1000);
+  const list = useRef<HTMLUListElement>(null);
+  const seen = useSeen(list, fleet.vehicles.length);
+  const turns = useRef(new Turns());
+  const now = turns.current.take(fleet.vehicles.length, (index) => seen.has(index));
   return (
     <Pane title={strings.operate.panes.vehicles} class="vehicles-pane" scrolls>
       {fleet.vehicles.length === 0 && <p class="nothing">{text.none}</p>}
-      <ul class="cards">
-        {fleet.vehicles.map((vehicle) => (
-          <Card
+      <ul class="cards" ref={list}>
+        {fleet.vehicles.map((vehicle, index) => (
+          <CardInTurn
             key={vehicle.id}
             vehicle={vehicle}
             state={states[vehicle.id]}
             payloads={payloads}
             silent_s={scene.silentFor_s(vehicle.id)}
+            hasTurn={now[index]!}
           />
         ))}
       </ul>
@@ -52,6 +60,17 @@ interface CardProps {
   state: VehicleState | undefined;
   payloads: Record<string, PayloadState>;
   silent_s: number | null;
+}
+
+/** Drawn anew when it has its turn; at once when what it does or who has it changes. */
+class CardInTurn extends Component<CardProps & { hasTurn: boolean }> {
+  override shouldComponentUpdate({ hasTurn }: { hasTurn: boolean }): boolean {
+    return hasTurn;
+  }
+
+  render({ hasTurn: _, ...card }: CardProps & { hasTurn: boolean }) {
+    return <Card {...card} />;
+  }
 }
 
 function Card({ vehicle, state, payloads, silent_s }: CardProps) {
