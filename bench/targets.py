@@ -104,6 +104,21 @@ def _mavlink_command(journal: str, bound_ms: float | None) -> Program:
     return Program("100 vehicles, 50 messages/s each", command, quick, goals)
 
 
+def _web_map(vehicles: int, least_fps: float) -> Program:
+    what = f"the page of a run with {vehicles:,} driving vehicles"
+    return Program(
+        "They send states 5 times a second; looked at in Chromium without a graphics card",
+        ("web_map", str(vehicles), "30"),
+        ("web_map", "10", "1"),
+        (
+            Goal("fps", f"{what}, pictures drawn", "/s", least_fps, at_least=True),
+            Goal("told_per_s", f"{what}, frames told to it", "/s"),
+            Goal("longest_ms", f"{what}, the longest time between two pictures", "ms"),
+            Goal("cpu_percent", f"{what}, the page's process, of a core", "%"),
+        ),
+    )
+
+
 def _ros_command(journal: str, bound_ms: float | None) -> Program:
     signal = f"signal to the ROS vehicle's callback, {journal} journal"
     pause = f"pause to the ROS vehicle's callback, {journal} journal"
@@ -310,6 +325,8 @@ PROGRAMS = (
             Goal("longest_ms", "the page, the longest time between two pictures", "ms"),
         ),
     ),
+    _web_map(100, 30),
+    _web_map(1000, 10),
     Program(
         "a run that never waits, all faces but ros",
         ("faces", "cost", FACES, "3000", "3"),

@@ -4,6 +4,7 @@ python -m bench.programs.web_map <vehicles> <seconds> [picture.png]
 
 Each vehicle drives round a circle of its own and says five times a second where it is, as vehicles
 of the simulator do; the page shows trails and names. Chromium draws without a graphics card.
+`cpu_percent`: of a core, in the page's process.
 """
 
 import asyncio
@@ -17,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from m2pem_plugin_web.ocu import WebOcu
-from playwright.async_api import Page, async_playwright
+from playwright.async_api import CDPSession, Page, async_playwright
 
 from bench.graphs import file
 from bench.programs.stage import asking, executive, flows
@@ -37,6 +38,8 @@ SPEED_M_S = 5
 STATES_PER_S = 5
 SHARES = 5
 """Not all vehicles send at the same moment."""
+GROW_S = 5
+"""Trails grow meanwhile."""
 DOMAINS = (Domain.GROUND, Domain.AIR, Domain.SURFACE, Domain.SUBSURFACE)
 
 MISSION = file(
@@ -110,6 +113,13 @@ class Driving(FakeArbiter):
             await asyncio.sleep(1 / STATES_PER_S / SHARES)
 
 
+async def cpu_s(tools: CDPSession) -> float:
+    """CPU time of the page's process so far."""
+    answer = await tools.send("Performance.getMetrics")
+    metrics = {each["name"]: each["value"] for each in answer["metrics"]}
+    return float(metrics["ProcessTime"])
+
+
 async def look(page: Page, address: str, seconds: float, picture: str | None) -> dict[str, Any]:
     """Open the run's page by an address that signs in, and count while vehicles drive."""
     told = 0
@@ -121,10 +131,15 @@ async def look(page: Page, address: str, seconds: float, picture: str | None) ->
     page.on("websocket", lambda socket: socket.on("framereceived", received))
     await page.goto(address)
     await page.locator(".drawing .djs-shape").first.wait_for()
-    await asyncio.sleep(5)  # trails grow
-    before = told
+    await asyncio.sleep(GROW_S)
+    tools = await page.context.new_cdp_session(page)
+    await tools.send("Performance.enable")
+    before, before_s = told, await cpu_s(tools)
     answer: dict[str, Any] = await page.evaluate(COUNT_FRAMES, seconds)
-    answer |= {"told_per_s": (told - before) / seconds}
+    answer |= {
+        "told_per_s": (told - before) / seconds,
+        "cpu_percent": (await cpu_s(tools) - before_s) / seconds * 100,
+    }
     if picture is not None:
         await page.screenshot(path=picture)
     return answer
