@@ -84,6 +84,10 @@ from m2pem.mission.values import MAX_DEPTH, Value, is_too_deep
 from m2pem.telemetry.bus import Bus
 
 
+MANY_RUNS = 500
+"""From so many on, a thread makes the summaries of runs."""
+
+
 class Rehearse(Protocol):
     """Rehearses missions for an executive, with the options of `MissionControl.simulate`."""
 
@@ -561,8 +565,12 @@ class Control:
     async def runs(self) -> Sequence[RunSummary]:
         """Every run of the journal but those that it has lost whole."""
         lines = await self._supervisor.journal.runs(files=False)
+
+        def summaries() -> list[RunSummary]:
+            return [summary(line) for line in lines if not line.gone]
+
         # Of ten thousand runs it would keep the event loop for a while.
-        return await asyncio.to_thread(lambda: [summary(line) for line in lines if not line.gone])
+        return summaries() if len(lines) < MANY_RUNS else await asyncio.to_thread(summaries)
 
     def prompts(self) -> Sequence[OpenPrompt]:
         """The prompts that are open."""
