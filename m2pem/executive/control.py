@@ -83,7 +83,6 @@ from m2pem.mission.mission import Mission
 from m2pem.mission.values import MAX_DEPTH, Value, is_too_deep
 from m2pem.telemetry.bus import Bus
 
-
 MANY_RUNS = 500
 """From so many on, a thread makes the summaries of runs."""
 
