@@ -11,7 +11,8 @@ import fastkml
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pymavlink import mavwp
+from pymavlink import mavutil, mavwp
+from pymavlink.dialects.v20 import ardupilotmega
 
 from m2pem.geo.geojson import GeometryError
 from m2pem.geo.geometry_files import (
@@ -63,7 +64,11 @@ def test_fastkml_reads_what_is_written() -> None:
 
 
 @pytest.mark.parametrize("frame", ["relative", "amsl", "terrain"])
-def test_pymavlink_reads_what_is_written(tmp_path: Path, frame: str) -> None:
+def test_pymavlink_reads_what_is_written(
+    tmp_path: Path, frame: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MAVLINK20", "1")  # another test of the process may have set it
+    monkeypatch.setattr(mavutil, "mavlink", ardupilotmega)
     route = Route(((38.1, -77.3, 20.5), (38.2, -77.25, 30.0)), frame)
     path = tmp_path / "road.waypoints"
     path.write_bytes(written("waypoints", NamedGeometry("road", route)))

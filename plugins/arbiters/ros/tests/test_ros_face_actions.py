@@ -171,7 +171,8 @@ async def test_two_goals_do_not_fight_but_who_has_taken_a_vehicle_replaces_its_g
         await world.client.call(TakeVehicle, "/face/take_vehicle", vehicle="ugv1", by="ben")
         status, result = await first.end()
         assert status == GoalStatus.STATUS_ABORTED
-        assert (result.status.state, result.status.code) == (BehaviorStatus.FAILED, "TAKEN_OVER")
+        assert (result.status.state, result.status.code) == (BehaviorStatus.FAILED, "STOPPED")
+        assert result.status.reason == "ugv1 was taken by ros /face ben"
         third = await world.client.send(UGV1, behavior_goal("goto", target=FAR))
         await until(lambda: third.feedback)
         fourth = await world.client.send(UGV1, behavior_goal("goto", target=point(0.0005)))
