@@ -13,7 +13,7 @@ log = logging.getLogger("m2pem.alerts")
 
 LOOK_EVERY_S = 0.5
 PUBLISHED_EVERY_S = 0.1
-"""However many alerts come, operators are told no more often that the list has changed."""
+"""Events that the list has changed are published no more often, however many alerts come."""
 
 WRITE_AGAIN_S = 5.0
 
@@ -21,12 +21,19 @@ WRITE_AGAIN_S = 5.0
 async def watch_alerts(
     alerts: AlertList, look: Callable[[], None], publish: Callable[[AlertsChanged], None]
 ) -> None:
-    """Look, and publish an event after each change, for ever. `look`: updates the list."""
+    """Look, and publish an event after each change, for ever. `look`: updates the list. An error in
+    it is logged once, and it is called again: the next alerts must not be missed."""
     changed = asyncio.Event()
     alerts.on_change = changed.set
-    known = alerts.changes
+    known, fails = alerts.changes, False
     while True:
-        look()
+        try:
+            look()
+            fails = False
+        except Exception:
+            if not fails:
+                log.exception("the conditions of alerts cannot be looked at; the list may be old")
+            fails = True
         if alerts.changes != known:
             known = alerts.changes
             publish(AlertsChanged())
