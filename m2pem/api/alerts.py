@@ -14,8 +14,8 @@ class AlertSeverity(StrEnum):
     """How severe an alert is, in the words of syslog (RFC 5424), which MAVLink's MAV_SEVERITY has,
     too.
 
-    CRITICAL: act now, a vehicle may do what nobody wants. ERROR: something does not go on, or is
-    lost. WARNING: look at it, or decide. NOTICE: it is told, and needs nobody.
+    CRITICAL: act now, a vehicle may do what no operator wants. ERROR: something does not go on, or
+    is lost. WARNING: look at it, or decide. NOTICE: it is said once, and needs no operator.
     """
 
     CRITICAL = "critical"
@@ -56,7 +56,7 @@ class OperatorAlert:
     prompt or an incident. `last_us`, `count`: when it was said last, and how often. `details`: what
     else was said that is part of it, the newest last. `deadline_us`: when a question will be
     withdrawn; None: never, or not while its run is paused. `cleared_us`: when it was over; None: it
-    is open. `acknowledged_by`: who has seen it; `owner`: who takes care; "": nobody. `age_s`,
+    is open. `acknowledged_by`: who has seen it; `owner`: who takes care; "": no operator. `age_s`,
     `left_s`: seconds since it was raised and until its deadline, when it was asked for.
     """
 
@@ -87,7 +87,7 @@ class OperatorAlert:
 
     @property
     def calls(self) -> bool:
-        """Whether it is open and nobody has acknowledged it."""
+        """Whether it is open and not acknowledged."""
         return self.open and not self.acknowledged_by
 
     def at(self, now_us: int) -> "OperatorAlert":

@@ -36,8 +36,8 @@ class StartPreview:
 
     `findings`: those of `MissionControl.check`; an error among them refuses the start. `busy`: the
     reason why the start has to be confirmed, which says who has what; "" when all is free.
-    `unapproved`: who must approve the mission before it may start; "": nobody. `name` and `process`
-    are "" if the mission cannot be read.
+    `unapproved`: who must approve the mission before it may start; "": no person. `name` and
+    `process` are "" if the mission cannot be read.
     """
 
     file: str

@@ -38,9 +38,9 @@ class MissionApproval:
 
     `mission`: the name of its file; `digest`: of its content. `persons`: how many others than its
     editors the fleet asks for; 0: none. `role`: the role of operators who may approve; "": all.
-    `editors`: who has made its files and drawings what they are; `editor_unknown`: somebody has
-    made one of them who is not known, so that one person more must approve. `approvals`: those
-    that count. `not_counted`: those of its editors. `earlier`: those of earlier contents.
+    `editors`: who has made its files and drawings what they are; `editor_unknown`: one of
+    them was made by a person who is not known, so that one person more must approve.
+    `approvals`: those that count. `not_counted`: those of its editors. `earlier`: those of earlier contents.
     """
 
     mission: str
@@ -65,7 +65,7 @@ class MissionApproval:
 
     @property
     def may_start(self) -> bool:
-        """Whether nobody more must approve it."""
+        """Whether no more persons must approve it."""
         return self.missing == 0
 
     def who(self) -> str:

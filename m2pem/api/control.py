@@ -102,7 +102,7 @@ class MissionControl(Protocol):
         self, mission: MissionSource, *, digest: str = "", by: str = ""
     ) -> MissionApproval:
         """Approve exactly this content of a mission: its file, those that it calls or imports, and
-        the routes, areas and points that they name. Returns how it stands then. `digest`: of the
+        the routes, areas and points that they name. Returns its approvals then. `digest`: of the
         content that `by` has looked at; another one is not approved.
 
         Raises:
@@ -365,7 +365,7 @@ class MissionControl(Protocol):
         withdraws the request by refusing.
 
         Raises:
-            OperatorError: nobody asks for it, or `by` does not have it.
+            OperatorError: no operator asks for it, or `by` does not have it.
         """
         ...
 
@@ -488,17 +488,17 @@ class MissionControl(Protocol):
         ...
 
     async def acknowledge_alert(self, alert: str, *, by: str = "") -> None:
-        """Note that an operator has seen an alert: it calls nobody any more. One that was said
+        """Note that an operator has seen an alert: it calls no operator any more. One that was said
         once, and is no condition that ends by itself, is over then.
 
         Raises:
-            OperatorError: there is no such alert, it is over, or somebody has acknowledged it; or
+            OperatorError: there is no such alert, it is over, or it is acknowledged already; or
                 the journal has not written it within 1.5 s.
         """
         ...
 
     async def own_alert(self, alert: str, *, owner: str | None = None, by: str = "") -> None:
-        """Note who takes care of an alert. None: `by` does; "": nobody any more.
+        """Note who takes care of an alert. None: `by` does; "": no operator any more.
 
         Raises:
             OperatorError: there is no such alert, or it is over; or the journal has not written it

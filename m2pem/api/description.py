@@ -175,9 +175,9 @@ _ENDED_REQUESTS = {
 def _control_request_ended(_: RunView, record: r.ControlRequestEnded) -> _Sentence:
     asked = f"{record.requested_by} asked for {record.resource}"
     if record.outcome is r.RequestOutcome.EXPIRED:
-        return f"{asked}: nobody answered, it stays", Importance.WARNING
+        return f"{asked}: without an answer, it stays", Importance.WARNING
     if not record.by:
-        return f"{asked}: nobody answered, it goes to {record.requested_by}", Importance.WARNING
+        return f"{asked}: without an answer, it goes to {record.requested_by}", Importance.WARNING
     return f"{asked}: {record.by} {_ENDED_REQUESTS[record.outcome]}", Importance.NORMAL
 
 

@@ -33,7 +33,7 @@ MOST_OPEN = 1000
 MOST_DETAILS = 20
 
 WRITTEN_WITHIN_S = 1.5
-"""An operator is told if the journal has not written an acknowledgement within this time."""
+"""An operator gets an error if the journal has not written an acknowledgement within this time."""
 
 SHOWN_NAMES = 5
 
@@ -293,8 +293,8 @@ class AlertList:
         """Note that an operator has seen an alert. What was said once is over then.
 
         Raises:
-            OperatorError: there is no such alert, it is over, or somebody was first; or it is
-                noted here, and the journal has not written it.
+            OperatorError: there is no such alert, it is over, or another operator was first; or
+                it is noted here, and the journal has not written it.
         """
         number, line = self._find(alert)
         if line.alert.acknowledged_by:
@@ -308,7 +308,7 @@ class AlertList:
         await self._written(f"{alert} is acknowledged")
 
     async def own(self, alert: str, owner: str) -> None:
-        """Note who takes care of an alert; "": nobody any more.
+        """Note who takes care of an alert; "": no operator any more.
 
         Raises:
             OperatorError: there is no such alert, or it is over; or it is noted here, and the
@@ -317,7 +317,7 @@ class AlertList:
         number, line = self._find(alert)
         owned_us = self._now_us() if owner else None
         self._change(number, line, replace(line.alert, owner=owner, owned_us=owned_us))
-        await self._written(f"{alert}: the owner is {owner or 'nobody'}")
+        await self._written(f"{alert}: the owner is {owner or 'no operator'}")
 
     def _find(self, alert: str) -> tuple[int, _Line]:
         digits = alert.removeprefix("a")

@@ -1,7 +1,7 @@
 """Operators ask each other for vehicles and payloads: who has one gives it, or refuses.
 
 The journal of each run has requests and their ends. So the next executive knows those that are
-open, and their time begins anew: nobody loses a vehicle by a time-out of which they saw nothing.
+open, and their time begins again: no operator loses a vehicle by a time-out that was not seen.
 """
 
 import asyncio
@@ -103,12 +103,12 @@ class ControlRequests:
         """Give a resource to the operator who asks for it, or refuse; who has asked withdraws it.
 
         Raises:
-            OperatorError: nobody asks for it, or it is not with this operator.
+            OperatorError: no operator asks for it, or it is not with this operator.
         """
         resource = self._handover.known(name)
         request = self._open.get(resource)
         if request is None:
-            raise OperatorError(f"nobody asks for {resource}")
+            raise OperatorError(f"no operator asks for {resource}")
         if person_of(by) == person_of(request.by) and not give:
             outcome = RequestOutcome.WITHDRAWN
         elif self._was_returned(resource, request):
@@ -122,7 +122,7 @@ class ControlRequests:
         await self._end(resource, outcome, by)
 
     async def returned(self, name: str, by: str) -> None:
-        """A resource was given back to the missions: nobody has it, whom one could ask."""
+        """A resource was given back to the missions: no operator has it, who could be asked."""
         resource = ResourceId(name)
         request = self._open.get(resource)
         if request is not None and self._was_returned(resource, request):
@@ -174,7 +174,7 @@ class ControlRequests:
         )
         ended = i.ControlRequestEnded(resource, request.by, outcome, by)
         for runner in list(self._runners()):
-            if runner.done.is_set():  # it may have ended while another one was told
+            if runner.done.is_set():  # it may have ended while another run got it
                 continue
             if outcome is RequestOutcome.GIVEN and resource not in control_of(runner.run.state)[0]:
                 # What the one before commands with it by hand is over.

@@ -117,7 +117,7 @@ def test_what_cannot_be_asked_for_is_said(play):
             await control.request_control("ugv1", by="anna@gcs2")
         with pytest.raises(OperatorError, match="needs a name"):
             await control.request_control("ugv1")
-        with pytest.raises(OperatorError, match="nobody asks for ugv1"):
+        with pytest.raises(OperatorError, match="no operator asks for ugv1"):
             await control.answer_control("ugv1", give=True, by="anna")
 
     play(story, "ugv1")

@@ -420,7 +420,7 @@ def control_request_ended(x: Execution, item: i.ControlRequestEnded) -> None:
         and x.state.taken.get(item.resource, item.requested_by) != item.requested_by
     )
     if asked is None and not given:
-        x.ignore(f"nobody asks for {item.resource}")
+        x.ignore(f"no operator asks for {item.resource}")
         return
     x.emit(r.ControlRequestEnded(item.resource, item.requested_by, item.outcome, item.by))
     if given:

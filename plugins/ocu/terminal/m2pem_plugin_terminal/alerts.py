@@ -11,7 +11,7 @@ TITLE = "Alerts"
 NONE = "There are no alerts."
 
 AGAIN_S = 10.0
-"""The bell rings again for critical alerts that nobody has acknowledged, after so long."""
+"""The bell rings again for critical alerts that are not acknowledged, after so long."""
 
 _MINUTE_S, _HOUR_S, _DAY_S = 60, 3600, 86_400
 
@@ -25,7 +25,7 @@ def age(seconds: float) -> str:
 
 
 def alert_choices(alerts: Sequence[OperatorAlert], now_us: int) -> list[Choice]:
-    """Return a line for each alert, as the list has them. `!`: nobody has acknowledged it; `-`: it
+    """Return a line for each alert, as the list has them. `!`: it is not acknowledged; `-`: it
     is over. `now_us`: microseconds since the Unix epoch by the executive's clock."""
     return [
         Choice(each.alert, _line(each, now_us), _who(each)) for each in alerts if not _too_old(each)
@@ -75,7 +75,7 @@ def what_to_do(alert: OperatorAlert, by: str) -> list[Choice]:
     if alert.open and alert.owner != by:
         found.append(Choice("own", "Take care of it"))
     if alert.open and alert.owner:
-        found.append(Choice("disown", "Nobody takes care of it any more"))
+        found.append(Choice("disown", "Give it up: it has no owner any more"))
     if alert.open and alert.code == INCIDENT:
         found.append(Choice("decide", "Decide about the incident"))
     if alert.run:
@@ -84,7 +84,7 @@ def what_to_do(alert: OperatorAlert, by: str) -> list[Choice]:
 
 
 def hint(alerts: Iterable[OperatorAlert]) -> str:
-    """Say in short how many nobody has acknowledged, beside questions, which have a pane; "": none.
+    """Say in short how many are not acknowledged, beside questions, which have a pane; "": none.
 
     The most severe ones are named.
     """

@@ -40,7 +40,7 @@ async def test_an_alert_is_listed_acknowledged_and_owned(world: World) -> None:
         await terminal.press("a")
         await terminal.until_shown("anna@gcs1 takes care")
         await terminal.press("1")
-        await terminal.until_shown("1 Acknowledge it", "2 Nobody takes care")
+        await terminal.until_shown("1 Acknowledge it", "2 Give it up: it has no")
         await terminal.press("1")
         world.look()
         await terminal.until_gone("1 alert, critical (a)")

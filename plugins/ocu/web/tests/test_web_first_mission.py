@@ -102,7 +102,7 @@ async def draw(author: Author) -> None:
     await author.who("uav2")
     await author.block("Ask and decide")
     await author.element("Ask the operator")
-    await author.write("Question", "Somebody is there. Go home?")
+    await author.write("Question", "A person is there. Go home?")
     await author.element("Choose what is done then")
     await author.block("Return to launch")
     await author.who("uav2")

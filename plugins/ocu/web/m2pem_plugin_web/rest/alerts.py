@@ -44,7 +44,7 @@ class AlertModel(BaseModel):
 
 
 class OwnModel(Body):
-    """Who takes care. Null: who asks; "": nobody any more."""
+    """Who takes care. Null: who asks; "": no operator any more."""
 
     owner: Annotated[str, Field(max_length=MAX_NAME_CHARACTERS)] | None = None
 

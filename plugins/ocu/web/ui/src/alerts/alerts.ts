@@ -79,7 +79,7 @@ async function read(): Promise<void> {
       readAt_ms = performance.now();
       alerts.value = found;
       failed.value = false;
-      announcer.heard(found);
+      announcer.announce(found);
     } catch {
       failed.value = true;
     }

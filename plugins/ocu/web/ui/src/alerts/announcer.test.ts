@@ -38,7 +38,7 @@ function listening(settings: Partial<AlertSettings> = {}) {
     () => ({ ...DEFAULTS, vibrate: false, ...settings }),
     (count, first) => `${count} alerts: ${first}`,
   );
-  announcer.heard([]);
+  announcer.announce([]);
   return { announcer, told };
 }
 
@@ -49,15 +49,15 @@ test("what was there before the page is not told", () => {
     () => DEFAULTS,
     String,
   );
-  late.heard([alert("a1")]);
-  announcer.heard([]);
+  late.announce([alert("a1")]);
+  announcer.announce([]);
   expect(told).toEqual([]);
 });
 
 test("a new alert is told once, in each way that is wanted", () => {
   const { announcer, told } = listening({ notify: true, vibrate: true, speech: true });
-  announcer.heard([alert("a1", { run: "r1" })]);
-  announcer.heard([alert("a1", { run: "r1" })]);
+  announcer.announce([alert("a1", { run: "r1" })]);
+  announcer.announce([alert("a1", { run: "r1" })]);
   expect(told).toEqual([
     "sound error",
     "vibrate error",
@@ -69,35 +69,35 @@ test("a new alert is told once, in each way that is wanted", () => {
 test("a thousand that come together are told together, by the worst of them", () => {
   const { announcer, told } = listening({ notify: true });
   const many = Array.from({ length: 1000 }, (_, number) => alert(`a${number}`));
-  announcer.heard([...many, alert("b", { severity: "critical" })]);
+  announcer.announce([...many, alert("b", { severity: "critical" })]);
   expect(told).toEqual(["sound critical", "notify critical 1001 alerts: b is lost"]);
 });
 
 test("only alerts that are severe enough sound", () => {
   const { announcer, told } = listening({ sound: "error" });
-  announcer.heard([alert("a1", { severity: "warning" })]);
+  announcer.announce([alert("a1", { severity: "warning" })]);
   expect(told).toEqual([]);
-  announcer.heard([alert("a1", { severity: "warning" }), alert("a2")]);
+  announcer.announce([alert("a1", { severity: "warning" }), alert("a2")]);
   expect(told).toEqual(["sound error"]);
 });
 
 test("a critical one sounds again until it is acknowledged, and not if sound is off", () => {
   const { announcer, told } = listening();
   const critical = alert("a1", { severity: "critical" });
-  announcer.heard([critical]);
+  announcer.announce([critical]);
   announcer.again();
-  announcer.heard([{ ...critical, acknowledged_by: "anna", calls: false }]);
+  announcer.announce([{ ...critical, acknowledged_by: "anna", calls: false }]);
   announcer.again();
   expect(told).toEqual(["sound critical", "sound critical"]);
   const silent = listening({ sound: "off" });
-  silent.announcer.heard([critical]);
+  silent.announcer.announce([critical]);
   silent.announcer.again();
   expect(silent.told).toEqual([]);
 });
 
 test("what somebody has acknowledged meanwhile, and a notice, are not told", () => {
   const { announcer, told } = listening();
-  announcer.heard([
+  announcer.announce([
     alert("a1", { calls: false, acknowledged_by: "otto" }),
     alert("a2", { severity: "notice" }),
   ]);

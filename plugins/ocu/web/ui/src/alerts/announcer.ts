@@ -37,7 +37,7 @@ export class Announcer {
   ) {}
 
   /** These are open now. What was there when the page was opened is not told as new. */
-  heard(alerts: readonly OperatorAlert[]): void {
+  announce(alerts: readonly OperatorAlert[]): void {
     const known = this.known;
     this.known = new Set(alerts.map(({ alert }) => alert));
     this.calling = alerts.filter(({ calls }) => calls);

@@ -40,7 +40,7 @@ export const alerts = {
   leastSevere: "Shown from",
   shown: { notice: "notices on", warning: "warnings on", error: "errors on", critical: "critical" },
   settings: "Sound and messages",
-  settingsHint: "For this browser. What comes together is told once.",
+  settingsHint: "For this browser. What comes together is announced once.",
   sound: "Sound",
   soundFrom: {
     off: "off",
@@ -48,12 +48,12 @@ export const alerts = {
     error: "errors and worse",
     warning: "warnings and worse",
   },
-  repeated: "Critical alerts sound again every five seconds until somebody acknowledges them.",
+  repeated: "Critical alerts sound again every five seconds until an operator acknowledges them.",
   notify: "Messages of the browser, also while another window is in front",
   notifyDenied: "This browser does not allow messages of this page.",
   vibrate: "Vibration",
   speech: "Read aloud",
   test: "Try it",
-  testText: "This is how an alert is told.",
+  testText: "This is how an alert is announced.",
   several: "{count} alerts: {text}",
 } as const;
