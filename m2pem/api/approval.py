@@ -40,7 +40,8 @@ class MissionApproval:
     editors the fleet asks for; 0: none. `role`: the role of operators who may approve; "": all.
     `editors`: who has made its files and drawings what they are; `editor_unknown`: one of
     them was made by a person who is not known, so that one person more must approve.
-    `approvals`: those that count. `not_counted`: those of its editors. `earlier`: those of earlier contents.
+    `approvals`: those that count. `not_counted`: those of its editors. `earlier`: those of earlier
+    contents.
     """
 
     mission: str

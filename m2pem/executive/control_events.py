@@ -224,8 +224,8 @@ LOGGERS = (
 class LoggedAlerts(logging.Handler):
     """Publish each warning and error of `LOGGERS` as an alert, between enter and exit.
 
-    Records may say more in `extra`: `resource`, whom it is about; `notice`, that it needs no operator;
-    `unlisted`, that the list of alerts has it by itself.
+    Records may say more in `extra`: `resource`, whom it is about; `notice`, that it needs no
+    operator; `unlisted`, that the list of alerts has it by itself.
     """
 
     def __init__(self, events: ControlEvents) -> None:
