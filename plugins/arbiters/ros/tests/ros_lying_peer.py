@@ -78,8 +78,9 @@ class Liar:
         if command.behavior == "drive_stop":
             self.say(id_, 3, BehaviorStatus.SUCCEEDED)
             self.current = ""
-            self.say(id_, 4, BehaviorStatus.FAILED)
-            self.say(id_, 3, BehaviorStatus.SUCCEEDED)
+            if self.lie == "parrot":
+                self.say(id_, 4, BehaviorStatus.FAILED)
+                self.say(id_, 3, BehaviorStatus.SUCCEEDED)
 
     def execute(self, handle: Any) -> Any:
         handle.succeed()

@@ -102,7 +102,7 @@ async def test_a_new_alert_is_told_in_the_ways_that_this_browser_wants(desk: Des
     for name in ("Messages of the browser", "Read aloud"):
         await page.get_by_label(name).check()
     await page.get_by_role("button", name="Try it").click()
-    said = "This is how an alert is told."
+    said = "This is how an alert is announced."
     assert await page.evaluate("told.splice(0)") == [
         "tone",
         "tone",
