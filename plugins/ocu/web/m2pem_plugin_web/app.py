@@ -45,6 +45,7 @@ from m2pem_plugin_web.rest import (
 from m2pem_plugin_web.server import Slots
 from m2pem_plugin_web.services import Services
 from m2pem_plugin_web.settings import Settings
+from m2pem_plugin_web.tile_files import open_tiles
 from m2pem_plugin_web.tracks.recorder import Recorder
 
 OPENAPI = "/api/openapi.json"
@@ -55,7 +56,7 @@ def routers_of(
 ) -> list[APIRouter]:
     """Return the routers of the REST interface, the WebSocket and the page."""
     control, folder = services.control, services.folder
-    tiles = map_tiles.Tiles(settings.tiles) if settings.tiles is not None else None
+    tiles = open_tiles(settings.tiles) if settings.tiles is not None else None
     return [
         session.router(control, settings, entry, tiles.pictured if tiles is not None else None),
         runs.router(control, folder),

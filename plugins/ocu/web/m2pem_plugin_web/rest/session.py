@@ -16,7 +16,7 @@ from m2pem_plugin_web.access.sign_in import Entry, ThrottledError
 from m2pem_plugin_web.problems import RESPONSES, ProblemError
 from m2pem_plugin_web.rest.models import Body, Name
 from m2pem_plugin_web.settings import Settings
-from m2pem_plugin_web.tiles import Pictured
+from m2pem_plugin_web.tile_files import Pictured
 
 
 class TilesModel(BaseModel):
