@@ -130,6 +130,11 @@ class StaleEntryError(JournalError):
     held; nothing was written."""
 
 
+class StaleDrawingsError(JournalError):
+    """Another process has written drawings of the fleet since they were read; nothing was
+    written."""
+
+
 class FleetServedError(JournalError):
     """Another executive serves the fleet on this journal."""
 

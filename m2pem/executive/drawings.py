@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 import msgspec
 
 from m2pem.api.runs import GeometryVersion, HandedOver
-from m2pem.errors import JournalError, OperatorError
+from m2pem.errors import JournalError, OperatorError, StaleDrawingsError
 from m2pem.executive.emergency import WRITTEN_WITHIN_S
 from m2pem.fleet.fleet import Fleet
 from m2pem.geo.geojson import GeometryError, parse_geojson
@@ -51,6 +51,7 @@ class Drawings:
         self._last = 0
         self._unwritten: dict[int, str | None] = {}
         self._last_kept: int | None = None
+        self._writing = asyncio.Lock()
 
     @property
     def handed_over(self) -> Mapping[str, HandedOver]:
@@ -106,7 +107,10 @@ class Drawings:
             if own is None or own[-1].at_us < version.at_us:
                 self._hand_over(name, version)
         self._loaded = self._handed_over.keys() - here
+        written = [(name, each.geometry, each.by, each.at_us) for each, name in _read(kept)]
         for version, name in given:
+            if (name, version.geometry, version.by, version.at_us) in written:
+                continue  # its writing was given up, and was done all the same
             self._add(name, version.geometry, version.by, version.at_us)
 
     def change(self, name: str, geometry: Mapping[str, Value] | None, by: str) -> None:
@@ -143,18 +147,26 @@ class Drawings:
         raise OperatorError(f"{done} here, but the journal {why}: it may not outlive a restart")
 
     async def _write(self) -> None:
-        kept = await self._journal.drawings(self._fleet.kept_as)
-        if max(kept, default=0) != self._last_kept:
-            # It was not read yet, or another executive of this fleet, as one that simulates it, has
-            # written: the numbers are given anew.
-            await self.load()
-        taken, self._unwritten = self._unwritten, {}
-        try:
-            await self._journal.write_drawings(self._fleet.kept_as, taken)
-            self._last_kept = max((self._last_kept or 0, *taken))
-        except BaseException:  # who asked for it may be gone: the next one writes it
-            self._unwritten = {**taken, **self._unwritten}
-            raise
+        async with self._writing:
+            while True:
+                if self._last_kept is None:
+                    await self.load()
+                taken, self._unwritten = self._unwritten, {}
+                if not taken:
+                    return  # the one before has written it
+                last = self._last_kept or 0
+                try:
+                    await self._journal.write_drawings(self._fleet.kept_as, taken, last=last)
+                except BaseException as error:
+                    # The next one writes it: who asked for it may be gone.
+                    self._unwritten = {**taken, **self._unwritten}
+                    # Whether the journal has what was on its way is not known.
+                    self._last_kept = None
+                    if not isinstance(error, StaleDrawingsError):
+                        raise
+                else:
+                    self._last_kept = max((last, *taken))
+                    return
 
     def _note(self, name: str, version: GeometryVersion) -> None:
         self._versions.setdefault(name, []).append(version)

@@ -417,11 +417,17 @@ class Journal(Protocol):
 
     # --- drawings -------------------------------------------------------------------------------
 
-    async def write_drawings(self, fleet: str, drawings: Mapping[int, str | None]) -> None:
+    async def write_drawings(
+        self, fleet: str, drawings: Mapping[int, str | None], *, last: int | None = None
+    ) -> None:
         """Write versions of routes, areas and points that operators have handed over, by their
         numbers; None: remove it. Durable on return.
 
+        `last`: the greatest number that the fleet must have before, 0 for none; None: any. Of two
+        processes that have read the same versions, one writes, and the other is refused.
+
         Raises:
+            StaleDrawingsError: the greatest number is another one; nothing was written.
             JournalError: they cannot be written.
         """
         ...

@@ -11,7 +11,7 @@ import msgspec
 
 from m2pem.engine.inputs import Input
 from m2pem.engine.records import Record
-from m2pem.errors import InternalError, JournalError
+from m2pem.errors import InternalError, JournalError, StaleDrawingsError
 from m2pem.fleet.approval import Approval, Edit
 from m2pem.journal.base import Entry
 from m2pem.mission.library import Source
@@ -133,6 +133,18 @@ def unknown_entry(entry: str) -> JournalError:
     return JournalError(
         f"the journal has no entry {entry!r} of a schedule; `m2pem schedule` lists what it has"
     )
+
+
+def refuse_stale_drawings(fleet: str, found: int, last: int) -> None:
+    """Refuse a writer of drawings that has read another `last` version than there is.
+
+    Raises:
+        StaleDrawingsError: the numbers differ.
+    """
+    if found != last:
+        raise StaleDrawingsError(
+            f"the last version of the drawings of {fleet} is {found}, not {last}: read them again"
+        )
 
 
 def record_line(run: str, seq: int, t_us: int, record: Record) -> bytes:

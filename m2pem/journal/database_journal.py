@@ -467,10 +467,14 @@ class DatabaseJournal(ABC):
         )
         return dict(rows)
 
-    async def write_drawings(self, fleet: str, drawings: Mapping[int, str | None]) -> None:
+    async def write_drawings(
+        self, fleet: str, drawings: Mapping[int, str | None], *, last: int | None = None
+    ) -> None:
         """See `Journal.write_drawings`."""
         self._check_open()
-        await self._writer.submit(lambda transaction: transaction.write_drawings(fleet, drawings))
+        await self._writer.submit(
+            lambda transaction: transaction.write_drawings(fleet, drawings, last)
+        )
 
     async def drawings(self, fleet: str) -> Mapping[int, str]:
         """See `Journal.drawings`."""

@@ -13,7 +13,14 @@ from uuid import UUID, uuid4
 from m2pem.errors import InternalError, JournalError, StaleEntryError
 from m2pem.fleet.approval import Approval, Edit
 from m2pem.journal.base import Deletion, Entry, RunHeader, RunInfo
-from m2pem.journal.codec import encode_part, run_id, run_number, unknown_entry, unknown_run
+from m2pem.journal.codec import (
+    encode_part,
+    refuse_stale_drawings,
+    run_id,
+    run_number,
+    unknown_entry,
+    unknown_run,
+)
 from m2pem.journal.fleet_server import FleetServer, this_process
 from m2pem.journal.position import RunPosition
 from m2pem.scheduling.entry import (
@@ -323,10 +330,15 @@ class MemoryJournal:
         self._check_open()
         return dict(sorted(self._alerts.get(fleet, {}).items()))
 
-    async def write_drawings(self, fleet: str, drawings: Mapping[int, str | None]) -> None:
+    async def write_drawings(
+        self, fleet: str, drawings: Mapping[int, str | None], *, last: int | None = None
+    ) -> None:
         """See `Journal.write_drawings`."""
         self._check_open()
-        _write(self._drawings.setdefault(fleet, {}), drawings)
+        kept = self._drawings.setdefault(fleet, {})
+        if last is not None:
+            refuse_stale_drawings(fleet, max(kept, default=0), last)
+        _write(kept, drawings)
 
     async def drawings(self, fleet: str) -> Mapping[int, str]:
         """See `Journal.drawings`."""

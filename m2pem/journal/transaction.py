@@ -20,6 +20,7 @@ from m2pem.journal.codec import (
     encode_library,
     encode_part,
     known_entry,
+    refuse_stale_drawings,
     run_id,
     run_number,
     unknown_entry,
@@ -371,9 +372,17 @@ class WriteTransaction:
                 )
         self._wrote = True
 
-    def write_drawings(self, fleet: str, drawings: Mapping[int, str | None]) -> None:
-        """Write or remove versions of drawings of a fleet."""
+    def write_drawings(
+        self, fleet: str, drawings: Mapping[int, str | None], last: int | None = None
+    ) -> None:
+        """Write or remove versions of drawings of a fleet, if its last one is as expected."""
         self._refuse_while_short()
+        if last is not None:
+            self._storage.exclude_others()
+            found = self._connection.execute(
+                "SELECT max(number) FROM drawings WHERE fleet = ?", (fleet,)
+            ).fetchone()[0]
+            refuse_stale_drawings(fleet, found or 0, last)
         for number, text in drawings.items():
             if text is None:
                 self._connection.execute(

@@ -1,7 +1,10 @@
 """Geometries that operators hand over for all runs: versions, deletion, restarts."""
 
 import asyncio
+import subprocess
+import sys
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -9,7 +12,7 @@ import pytest
 from m2pem.errors import JournalError, OperatorError
 from m2pem.executive.drawings import MOST_VERSIONS, Drawings
 from m2pem.fleet.fleet import simulated_fleet
-from m2pem.journal import MemoryJournal
+from m2pem.journal import MemoryJournal, open_journal
 from m2pem.testing import scenarios
 from tests.executive.conftest import World, mission, question, sequence
 
@@ -100,16 +103,21 @@ class BrokenJournal(MemoryJournal):
 
     unreadable = False
     stuck = False
+    written_all_the_same = False
 
     async def drawings(self, fleet: str) -> Mapping[int, str]:
         if self.unreadable:
             raise JournalError("it cannot be read")
         return await super().drawings(fleet)
 
-    async def write_drawings(self, fleet: str, drawings: Mapping[int, str | None]) -> None:
+    async def write_drawings(
+        self, fleet: str, drawings: Mapping[int, str | None], *, last: int | None = None
+    ) -> None:
+        if self.written_all_the_same:
+            await super().write_drawings(fleet, drawings, last=last)
         if self.stuck:
             await asyncio.Event().wait()
-        await super().write_drawings(fleet, drawings)
+        await super().write_drawings(fleet, drawings, last=last)
 
 
 def names_of(kept: Mapping[str, Any]) -> list[str]:
@@ -137,23 +145,25 @@ async def test_what_could_not_be_read_at_first_is_not_written_over() -> None:
     assert again.handed_over == after.handed_over
 
 
-async def test_who_hands_over_and_is_gone_at_once_leaves_it_to_be_written() -> None:
+@pytest.mark.parametrize("written", [False, True])
+async def test_who_hands_over_and_is_gone_at_once_leaves_it_to_be_written(written: bool) -> None:
     """As a browser that was closed while the journal was slow."""
     journal = BrokenJournal()
     drawings = Drawings(scenarios.fleet("sim", {"ugv1": {}}), journal, lambda: 1)
     await drawings.load()
-    journal.stuck = True
+    journal.stuck, journal.written_all_the_same = True, written
     drawings.change("gate", POINT, "anna")
     writing = asyncio.create_task(drawings.write("done"))
     await asyncio.sleep(0)
     writing.cancel()
     await asyncio.wait([writing])
-    journal.stuck = False
+    journal.stuck = journal.written_all_the_same = False
     drawings.change("hangar", OTHER, "ben")
     await drawings.write("done")
     again = Drawings(scenarios.fleet("sim", {"ugv1": {}}), journal, lambda: 2)
     await again.load()
     assert names_of(again.handed_over) == ["gate", "hangar"]
+    assert [each.by for each in again.versions("gate")] == ["anna"], "it is written once"
 
 
 async def test_a_simulated_fleet_knows_the_drawings_of_the_real_one_and_changes_none() -> None:
@@ -203,3 +213,62 @@ async def test_two_executives_of_a_fleet_write_over_nothing_of_each_other() -> N
     assert names_of(again.handed_over) == ["gate", "hangar"]
     assert again.handed_over["gate"].geometry == OTHER
     assert [each.number for each in again.versions("gate")] == [1, 3]
+
+
+_WRITER = """
+import asyncio, sys
+from m2pem.executive.drawings import Drawings
+from m2pem.journal import open_journal
+from m2pem.testing import scenarios
+
+async def write(url, who, times):
+    journal = open_journal(url)
+    drawings = Drawings(scenarios.fleet("sim", {"ugv1": {}}), journal, lambda: 1)
+    await drawings.load()
+    print("ready", flush=True)
+    sys.stdin.readline()
+    for number in range(int(times)):
+        place = {"type": "Point", "coordinates": [7.0, 50.0]}
+        drawings.change(f"{who}{number}", place, who)
+        await drawings.write("done")
+    await journal.close()
+
+asyncio.run(write(*sys.argv[1:]))
+"""
+
+
+def test_two_processes_that_write_at_the_same_time_lose_nothing(tmp_path: Path) -> None:
+    times = 40
+    url = str(tmp_path / "journal.db")
+    people = ("anna", "ben")
+    writers = [
+        subprocess.Popen(
+            [sys.executable, "-c", _WRITER, url, who, str(times)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        for who in people
+    ]
+    for writer in writers:
+        assert writer.stdout and writer.stdout.readline() == "ready\n"
+    for writer in writers:
+        assert writer.stdin
+        writer.stdin.write("go\n")
+        writer.stdin.flush()
+    for writer in writers:
+        writer.communicate(timeout=60)
+        assert writer.returncode == 0
+
+    async def read() -> Drawings:
+        journal = open_journal(url)
+        drawings = Drawings(scenarios.fleet("sim", {"ugv1": {}}), journal, lambda: 2)
+        await drawings.load()
+        await journal.close()
+        return drawings
+
+    drawings = asyncio.run(read())
+    expected = {f"{who}{number}": who for who in people for number in range(times)}
+    assert dict(drawings.drawn_by) == expected
+    numbers = [each.number for name in expected for each in drawings.versions(name)]
+    assert sorted(numbers) == list(range(1, 2 * times + 1))

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from m2pem.errors import JournalError, StaleEntryError
+from m2pem.errors import JournalError, StaleDrawingsError, StaleEntryError
 from m2pem.scheduling.entry import (
     EntryChange,
     EntryState,
@@ -228,6 +228,26 @@ class JournalSchedule(JournalFixtures):
         async with opened(open_journal) as journal:
             kept = await journal.drawings("north")
             assert list(kept.items()) == [(2, "two"), (3, "three again")]
+            assert await journal.drawings("south") == {1: "another"}
+
+    async def test_of_two_writers_that_have_read_the_same_drawings_one_is_refused(
+        self, open_journal: OpenJournal
+    ) -> None:
+        """The last number is compared and the versions are written in one transaction."""
+        async with opened(open_journal) as journal:
+            await journal.write_drawings("north", {1: "one"}, last=0)
+            written = await asyncio.gather(
+                journal.write_drawings("north", {2: "two"}, last=1),
+                journal.write_drawings("north", {1: None, 2: "other"}, last=1),
+                journal.write_drawings("south", {1: "another"}, last=0),
+                return_exceptions=True,
+            )
+            assert [type(each) for each in written] == [
+                type(None),
+                StaleDrawingsError,
+                type(None),
+            ]
+            assert await journal.drawings("north") == {1: "one", 2: "two"}
             assert await journal.drawings("south") == {1: "another"}
 
     @needs("durability")
