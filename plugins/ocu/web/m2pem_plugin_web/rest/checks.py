@@ -1,7 +1,5 @@
 """/api/checks, /api/editable: what is wrong with a drawing, and drawings for the editor."""
 
-import asyncio
-
 from fastapi import APIRouter
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -11,6 +9,7 @@ from m2pem_plugin_web.access.permissions import Viewer
 from m2pem_plugin_web.missions.folder import MissionFolder
 from m2pem_plugin_web.missions.names import PathNames
 from m2pem_plugin_web.problems import RESPONSES
+from m2pem_plugin_web.rest.bounded_threads import BoundedThreads
 from m2pem_plugin_web.rest.drafts import DraftModel, draft_of, source_of
 from m2pem_plugin_web.rest.models import Body, FindingModel, finding_models
 
@@ -88,26 +87,24 @@ class EditableModel(BaseModel):
 def router(control: MissionControl, folder: MissionFolder) -> APIRouter:
     """The routes of checks."""
     routes = APIRouter(prefix="/api", tags=["checks"], responses=RESPONSES)
-    turn = asyncio.Semaphore(AT_ONCE)
+    threads = BoundedThreads(AT_ONCE)
     called = PathNames(folder.path)
 
     @routes.post("/checks")
     async def check(_: Viewer, wanted: DraftModel) -> CheckModel:
         """Check a mission against the fleet, and list what is in it."""
         draft = await draft_of(wanted, folder)
-        async with turn:
-            findings = await asyncio.to_thread(
-                lambda: control.check(draft, process=wanted.process, data=wanted.data or ())
-            )
-            outline = await asyncio.to_thread(_outline, control, draft)
+        findings = await threads.run(
+            control.check, draft, process=wanted.process, data=wanted.data or ()
+        )
+        outline = await threads.run(_outline, control, draft)
         return CheckModel(findings=finding_models(called.findings(findings)), outline=outline)
 
     @routes.post("/editable")
     async def editable(_: Viewer, wanted: EditModel) -> EditableModel:
         """A file for the editor: with a diagram of everything in it."""
         source = source_of(wanted.xml)
-        async with turn:
-            found = await asyncio.to_thread(lambda: control.editable(source, anew=wanted.layout))
+        found = await threads.run(control.editable, source, anew=wanted.layout)
         return EditableModel(xml=found.source.decode(), notes=list(found.notes))
 
     return routes

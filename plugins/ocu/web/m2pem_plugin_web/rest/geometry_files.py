@@ -1,6 +1,5 @@
 """/api/geometry-files/read and export: files of routes, areas and points."""
 
-import asyncio
 from collections.abc import Sequence
 from typing import Annotated, Any
 
@@ -22,6 +21,7 @@ from m2pem.api import (
 from m2pem_plugin_web.access.permissions import Viewer
 from m2pem_plugin_web.missions.names import LONGEST, PATTERN
 from m2pem_plugin_web.problems import RESPONSES, ProblemError
+from m2pem_plugin_web.rest.bounded_threads import BoundedThreads
 from m2pem_plugin_web.rest.geometries import Kind, geometries_of_fleet, geometry_kind
 from m2pem_plugin_web.rest.models import Body
 
@@ -100,7 +100,7 @@ class ExportModel(Body):
 def router(control: MissionControl) -> APIRouter:
     """The routes of files."""
     routes = APIRouter(prefix="/api/geometry-files", tags=["geometries"], responses=RESPONSES)
-    turn = asyncio.Semaphore(FILES_AT_ONCE)
+    threads = BoundedThreads(FILES_AT_ONCE)
 
     @routes.post("/read", openapi_extra={"requestBody": FILE_BODY})
     async def read(
@@ -110,8 +110,7 @@ def router(control: MissionControl) -> APIRouter:
     ) -> GeometryFileModel:
         """The routes, areas and points of a file, whose bytes are the body; nothing is saved."""
         content = await request.body()
-        async with turn:
-            found = await asyncio.to_thread(read_geometry_file, name, content)
+        found = await threads.run(read_geometry_file, name, content)
         return GeometryFileModel(
             geometries=[_read_model(each) for each in found.geometries],
             problems=[
@@ -141,8 +140,7 @@ def router(control: MissionControl) -> APIRouter:
             if name not in known:
                 raise ProblemError(404, f"there is no route, area or point {name!r}")
         chosen = [known[name] for name in dict.fromkeys(names or sorted(known))]
-        async with turn:
-            return await _as_file(file_format, chosen, altitude_m)
+        return await _as_file(threads, file_format, chosen, altitude_m)
 
     @routes.post("/export", response_class=Response, responses=FILE_RESPONSE)
     async def export_drawn(_: Viewer, wanted: ExportModel) -> Response:
@@ -153,8 +151,7 @@ def router(control: MissionControl) -> APIRouter:
                 drawn.append(NamedGeometry(each.name, parse_geojson(each.geojson)))
             except GeometryError as error:
                 raise ProblemError(422, f"{each.name}: {error}") from None
-        async with turn:
-            return await _as_file(wanted.format, drawn, wanted.altitude_m)
+        return await _as_file(threads, wanted.format, drawn, wanted.altitude_m)
 
     return routes
 
@@ -166,10 +163,13 @@ def _read_model(read: NamedGeometry) -> ReadGeometryModel:
 
 
 async def _as_file(
-    file_format: FileFormat, geometries: Sequence[NamedGeometry], altitude_m: float | None
+    threads: BoundedThreads,
+    file_format: FileFormat,
+    geometries: Sequence[NamedGeometry],
+    altitude_m: float | None,
 ) -> Response:
     try:
-        content = await asyncio.to_thread(write_geometry_file, file_format, geometries, altitude_m)
+        content = await threads.run(write_geometry_file, file_format, geometries, altitude_m)
     except GeometryError as error:
         raise ProblemError(422, f".{file_format}: {error}") from None
     said = {"content-disposition": f'attachment; filename="geometries.{file_format}"'}

@@ -1,6 +1,5 @@
 """/api/survey-patterns: routes that cover an area, for one vehicle or several."""
 
-import asyncio
 import math
 from collections.abc import Sequence
 from typing import Annotated, Any, Literal
@@ -20,19 +19,18 @@ from m2pem.api import (
     as_geojson,
     image_plan,
     lasts_s,
-    parse_geojson,
     survey_routes,
 )
 from m2pem_plugin_web.access.permissions import Viewer
 from m2pem_plugin_web.problems import RESPONSES, ProblemError
+from m2pem_plugin_web.rest.bounded_threads import BoundedThreads
+from m2pem_plugin_web.rest.given_geometries import GivenGeometry, given_geometry
 from m2pem_plugin_web.rest.models import Body, Name
 
 Length = Annotated[float, Field(gt=0.0, le=100_000.0, strict=False)]
 Millimetres = Annotated[float, Field(gt=0.0, le=1_000.0, strict=False)]
 Pixels = Annotated[int, Field(gt=0, le=1_000_000)]
 Overlap = Annotated[float, Field(ge=0.0, lt=1.0, strict=False)]
-GivenArea = Name | dict[str, Any]
-"""The name of an area that missions may name, or a GeoJSON polygon."""
 
 
 class CameraModel(Body):
@@ -55,7 +53,7 @@ class PatternModel(Body):
     share it by their speeds; `speed_m_s`: of all of them, in place of their cruise speeds.
     """
 
-    area: GivenArea
+    area: GivenGeometry
     spacing_m: Length | None = None
     camera: CameraModel | None = None
     altitude_m: Annotated[float, Field(ge=-1_000.0, le=100_000.0, strict=False)] | None = None
@@ -65,7 +63,7 @@ class PatternModel(Body):
     turn_around_m: Annotated[float, Field(ge=0.0, le=10_000.0, strict=False)] = 0.0
     corner: Annotated[int, Field(ge=0, le=3)] = 0
     cross_hatch: bool = False
-    keep_out: Annotated[tuple[GivenArea, ...], Field(max_length=100, strict=False)] = ()
+    keep_out: Annotated[tuple[GivenGeometry, ...], Field(max_length=100, strict=False)] = ()
     clearance_m: Annotated[float, Field(ge=0.0, le=10_000.0, strict=False)] = 0.0
     vehicles: Annotated[tuple[Name, ...], Field(max_length=100, strict=False)] = ()
     speed_m_s: Annotated[float, Field(gt=0.0, le=1_000.0, strict=False)] | None = None
@@ -109,7 +107,7 @@ class SurveyRoutesModel(BaseModel):
 def router(control: MissionControl) -> APIRouter:
     """The route of survey patterns."""
     routes = APIRouter(prefix="/api", tags=["geometries"], responses=RESPONSES)
-    turn = asyncio.Semaphore(1)
+    threads = BoundedThreads()
 
     @routes.post("/survey-patterns")
     async def survey(_: Viewer, wanted: PatternModel) -> SurveyRoutesModel:
@@ -117,7 +115,7 @@ def router(control: MissionControl) -> APIRouter:
         images = _images(wanted)
         spacing_m = images.spacing_m if images is not None else wanted.spacing_m or 0.0
         pattern = SurveyPattern(
-            area=_area(control, wanted.area, "area"),
+            area=given_geometry(control, wanted.area, Area, "area"),
             spacing_m=spacing_m,
             heading_rad=None if wanted.heading_deg is None else math.radians(wanted.heading_deg),
             margin_m=wanted.margin_m,
@@ -125,7 +123,7 @@ def router(control: MissionControl) -> APIRouter:
             corner=wanted.corner,
             cross_hatch=wanted.cross_hatch,
             keep_out=[
-                _area(control, each, f"keep_out[{index}]")
+                given_geometry(control, each, Area, f"keep_out[{index}]")
                 for index, each in enumerate(wanted.keep_out)
             ],
             clearance_m=wanted.clearance_m,
@@ -133,11 +131,10 @@ def router(control: MissionControl) -> APIRouter:
             altitude_frame=wanted.altitude_frame,
         )
         surveyors = _surveyors(control, wanted)
-        async with turn:
-            try:
-                found = await asyncio.to_thread(survey_routes, pattern, surveyors)
-            except GeometryError as error:
-                raise ProblemError(422, str(error)) from None
+        try:
+            found = await threads.run(survey_routes, pattern, surveyors)
+        except GeometryError as error:
+            raise ProblemError(422, str(error)) from None
         timed = bool(wanted.vehicles) or wanted.speed_m_s is not None
         return SurveyRoutesModel(
             spacing_m=pattern.spacing_m,
@@ -169,24 +166,6 @@ def _images(wanted: PatternModel) -> ImagePlan | None:
         )
     except ValueError as error:
         raise ProblemError(422, str(error)) from None
-
-
-def _area(control: MissionControl, given: str | dict[str, Any], where: str) -> Area:
-    if isinstance(given, str):
-        handed = control.geometries().get(given)
-        found: object = control.fleet().geometries.get(given)
-        if handed is not None:
-            found = parse_geojson(handed.geometry)
-        if found is None:
-            raise ProblemError(404, f"{where}: there is no area {given!r}")
-    else:
-        try:
-            found = parse_geojson(given)
-        except GeometryError as error:
-            raise ProblemError(422, f"{where}: {error}") from None
-    if not isinstance(found, Area):
-        raise ProblemError(422, f"{where}: an area is expected")
-    return found
 
 
 def _surveyors(control: MissionControl, wanted: PatternModel) -> Sequence[Surveyor]:

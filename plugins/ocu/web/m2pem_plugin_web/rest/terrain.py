@@ -1,34 +1,33 @@
 """/api/terrain: the ground along a route, from elevation files of this machine."""
 
-import asyncio
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
 from m2pem.api import (
     TERRAIN_FOLDER,
-    GeometryError,
     MissionControl,
     ProfilePoint,
     Route,
     Terrain,
     TerrainError,
     lowest,
-    parse_geojson,
     profile,
 )
 from m2pem_plugin_web.access.permissions import Viewer
 from m2pem_plugin_web.problems import RESPONSES, ProblemError
-from m2pem_plugin_web.rest.models import Body, Name
+from m2pem_plugin_web.rest.bounded_threads import BoundedThreads
+from m2pem_plugin_web.rest.given_geometries import GivenGeometry, given_geometry
+from m2pem_plugin_web.rest.models import Body
 
 
 class ProfileModel(Body):
     """A route, by its name or as GeoJSON. `home_m`: what relative altitudes count from, in metres
     above mean sea level; null: the ground at the first waypoint."""
 
-    route: Name | dict[str, Any]
+    route: GivenGeometry
     step_m: Annotated[float, Field(ge=1.0, le=10_000.0, strict=False)] = 30.0
     home_m: Annotated[float, Field(ge=-1_000.0, le=10_000.0, strict=False)] | None = None
 
@@ -55,7 +54,7 @@ class RouteProfileModel(BaseModel):
 def router(control: MissionControl, folder: Path | None) -> APIRouter:
     """The route of profiles. `folder`: of elevation files, None: there is none."""
     routes = APIRouter(prefix="/api/terrain", tags=["geometries"], responses=RESPONSES)
-    turn = asyncio.Semaphore(1)
+    threads = BoundedThreads()
     found: list[Terrain] = []
 
     def profiled(route: Route, wanted: ProfileModel) -> list[ProfilePoint]:
@@ -70,12 +69,11 @@ def router(control: MissionControl, folder: Path | None) -> APIRouter:
             raise ProblemError(
                 404, f"no elevation files: name their folder as {TERRAIN_FOLDER} at the start"
             )
-        route = _route(control, wanted.route)
-        async with turn:
-            try:
-                points = await asyncio.to_thread(profiled, route, wanted)
-            except TerrainError as error:
-                raise ProblemError(503, str(error)) from None
+        route = given_geometry(control, wanted.route, Route, "route")
+        try:
+            points = await threads.run(profiled, route, wanted)
+        except TerrainError as error:
+            raise ProblemError(503, str(error)) from None
         low = lowest(points)
         return RouteProfileModel(
             points=[
@@ -94,21 +92,3 @@ def router(control: MissionControl, folder: Path | None) -> APIRouter:
         )
 
     return routes
-
-
-def _route(control: MissionControl, given: str | dict[str, Any]) -> Route:
-    if isinstance(given, str):
-        handed_over = control.geometries().get(given)
-        route: object = control.fleet().geometries.get(given)
-        if handed_over is not None:
-            route = parse_geojson(handed_over.geometry)
-        if route is None:
-            raise ProblemError(404, f"there is no route {given!r}")
-    else:
-        try:
-            route = parse_geojson(given)
-        except GeometryError as error:
-            raise ProblemError(422, f"route {error}") from None
-    if not isinstance(route, Route):
-        raise ProblemError(422, "a route is expected")
-    return route
