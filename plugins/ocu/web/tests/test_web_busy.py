@@ -36,9 +36,10 @@ async def test_pages_of_other_runs_say_which_run_drives_a_vehicle(desk: Desk) ->
         "run"
     ]
     await page.goto(f"{desk.executive.origin}/runs/{other}")
-    line = page.get_by_role("img", name=f"{VEHICLE}: driven by run {driver}", exact=True)
+    held = f"vehicle of another run: {driver}, DRIVE ROUTE"
+    line = page.get_by_role("img", name=f"{VEHICLE}: {held}", exact=True)
     await expect(line).to_be_visible()
-    await expect(page.locator(".card", has_text=VEHICLE)).to_contain_text(f"driven by run {driver}")
+    await expect(page.locator(".card", has_text=VEHICLE)).to_contain_text(held)
     await desk.ask("POST", "/api/resources/evsg2/take")
     await expect(page.get_by_role("img", name="evsg2: with anna", exact=True)).to_be_visible()
     await see_that_a_run_failed_before_its_page_loaded(desk)

@@ -223,6 +223,8 @@ export interface WaitingTask {
   task: string;
   waited_s: number;
   reason: string;
+  /** Who has what it could use, by resource or space. */
+  holders: Record<string, string>;
 }
 
 /** An area, or a corridor of `width_m` along a route, in which few vehicles may be at a time. */

@@ -7,7 +7,7 @@ import { may, session } from "../../shared/session";
 import { fill, strings } from "../../strings";
 import { useOperating } from "../context";
 import { Pane } from "../layout/Pane";
-import { sharedSpaces } from "../vehicles/sharedSpaces";
+import { resources } from "../vehicles/resources";
 import { workOf } from "../vehicles/work";
 import { DrawForm } from "./DrawForm";
 import { added, draftOf, emptyDraft, moved, type Kind } from "../../map/draft";
@@ -52,7 +52,7 @@ export function MapPane({ formInside }: { formInside: boolean }) {
         made.showGeometries(now);
         if (!fitted) made.fitAll();
       }),
-      sharedSpaces.subscribe((now) => made.showSpaces(now)),
+      resources.subscribe((now) => made.showSpaces(now.shared_space)),
       scene.vehicles.subscribe((states) => {
         made.vehicles.vehicles(states, scene.pace.peek());
         if (!fitted && made.vehicles.positions().length > 0) {

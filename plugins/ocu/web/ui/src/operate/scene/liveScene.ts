@@ -11,6 +11,7 @@ import type {
 } from "../../shared/types";
 import { historyOf, TelemetryHistory } from "../plots/history";
 import { HistoryRecorder } from "../plots/recorder";
+import { followResources } from "../vehicles/resources";
 import { ElementBoard } from "./elementBoard";
 import { RecordFeed, type Page } from "./recordFeed";
 import { TRAIL_POINTS, type Scene } from "./scene";
@@ -54,6 +55,7 @@ export class LiveScene implements Scene {
   private toldAt = performance.now();
   private told_s = 0;
   private readonly stopListening: () => void;
+  private readonly stopResources = followResources();
   private readonly ticking: ReturnType<typeof setInterval>;
 
   constructor(readonly run: string) {
@@ -93,6 +95,7 @@ export class LiveScene implements Scene {
   dispose(): void {
     clearInterval(this.ticking);
     this.stopListening();
+    this.stopResources();
     this.feed.dispose();
     executive.watch(null);
   }

@@ -9,7 +9,8 @@ import { useOperating } from "../context";
 import { Pane } from "../layout/Pane";
 import { usePaced } from "../layout/pace";
 import type { Scene } from "../scene/scene";
-import { heldElsewhere } from "../vehicles/work";
+import { resources } from "../vehicles/resources";
+import { heldElsewhere, waitersOf } from "../vehicles/work";
 import { Bars } from "./Bars";
 import { lanes, marks, type Bar } from "./scale";
 import { TimeCursor } from "./TimeCursor";
@@ -111,7 +112,7 @@ export function TimelinePane({ onSeek, plots }: TimelineProps) {
                   <Held
                     key={row.id}
                     row={row}
-                    held={heldElsewhere(scene.holders.value[row.id] ?? "", scene.run)}
+                    held={elsewhere(row.id, scene)}
                     x={Math.max(0, x(lastOf(row))) + HELD_PX}
                   />
                 ))}
@@ -132,6 +133,13 @@ export function TimelinePane({ onSeek, plots }: TimelineProps) {
       </div>
     </Pane>
   );
+}
+
+/** Who else has a vehicle or payload, and what waits for it, in words. */
+function elsewhere(resource: string, { holders, run }: Scene): string {
+  const { labels, waiting } = resources.value;
+  const held = heldElsewhere(resource, holders.value[resource] ?? "", run, labels);
+  return [held, held && waitersOf(resource, waiting)].filter(Boolean).join("; ");
 }
 
 /** Who else has the vehicle of a row, while this run does nothing with it. */

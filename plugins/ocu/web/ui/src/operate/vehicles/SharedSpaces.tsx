@@ -1,17 +1,14 @@
 // Areas and corridors in which few vehicles may be at a time: who is in them, and who waits.
-import { useEffect } from "preact/hooks";
 import { fill, strings } from "../../strings";
 import { useOperating } from "../context";
-import { followSharedSpaces, sharedSpaces } from "./sharedSpaces";
+import { resources } from "./resources";
 
 const text = strings.operate.vehicles.space;
 
 export function SharedSpaces() {
   const { scene } = useOperating();
-  const isLive = scene.mode === "live";
-  useEffect(() => (isLive ? followSharedSpaces() : undefined), [isLive]);
-  const spaces = sharedSpaces.value;
-  if (!isLive || spaces.length === 0) return null;
+  const spaces = resources.value.shared_space;
+  if (scene.mode !== "live" || spaces.length === 0) return null;
   return (
     <section class="teams" aria-label={text.title}>
       <table>

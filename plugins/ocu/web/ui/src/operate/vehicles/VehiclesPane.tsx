@@ -15,7 +15,8 @@ import { DomainSymbol } from "./DomainSymbol";
 import { Sparklines } from "../plots/Sparklines";
 import { SharedSpaces } from "./SharedSpaces";
 import { Teams } from "./Teams";
-import { heldElsewhere, isOperator, payloadsOf, workOf } from "./work";
+import { resources } from "./resources";
+import { heldElsewhere, isOperator, payloadsOf, waitersOf, workOf } from "./work";
 import { Turns, useSeen } from "./turns";
 import "./vehicles.css";
 
@@ -189,7 +190,9 @@ function Doing({ resource, name, look }: DoingProps) {
   const { scene, mission, selected } = useOperating();
   const work = workOf(resource, scene.commands.value);
   const holder = scene.holders.value[resource] ?? "";
-  const held = heldElsewhere(holder, scene.run);
+  const { labels, waiting } = resources.value;
+  const held = heldElsewhere(resource, holder, scene.run, labels);
+  const waits = waitersOf(resource, waiting);
   return (
     <p class="card-work">
       <span>{name}</span>{" "}
@@ -208,6 +211,7 @@ function Doing({ resource, name, look }: DoingProps) {
           </button>
         ))
       )}
+      {waits && <small>{waits}</small>}
       {look && look.footprint.length > 0 && <small> {directionOf(look)}</small>}
       {isPayload(resource) && <HandOver resource={resource} name={name} />}
     </p>

@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
-import type { Command } from "../../shared/types";
-import { heldElsewhere, isOperator, runOf, workOf } from "./work";
+import type { Command, WaitingTask } from "../../shared/types";
+import { heldElsewhere, isOperator, runOf, waitersOf, workOf } from "./work";
 
 const command = (name: string, since: number, ...resources: string[]): Command => ({
   name,
@@ -32,12 +32,35 @@ describe("work", () => {
   });
 
   it("says who else has a vehicle", () => {
-    const said = ["r12.b144", "r1.b2", "anna@gcs1", ""].map((each) => heldElsewhere(each, "r1"));
-    expect(said).toEqual(["driven by run r12", "", "with anna@gcs1", ""]);
+    const labels = { "r12.b144": "DRIVE of r12", "r1.b2": "SCAN of r1", "r3.b1": "LOOK of r3" };
+    const said = ["r12.b144", "r1.b2", "anna@gcs1", "", "r5.b1"].map((each) =>
+      heldElsewhere("v1", each, "r1", labels),
+    );
+    expect(said).toEqual([
+      "vehicle of another run: r12, DRIVE",
+      "",
+      "with anna@gcs1",
+      "",
+      "vehicle of another run: r5",
+    ]);
+    expect(heldElsewhere("v1/camera", "r3.b1", "r1", labels)).toBe(
+      "payload of another run: r3, LOOK",
+    );
+  });
+
+  it("says which tasks wait for a vehicle, and how many more", () => {
+    const waiting = [1, 2, 3, 4].map((number) => ({
+      run: `r${number}`,
+      task: "DRIVE",
+      holders: { [number < 4 ? "v1" : "v2"]: "r9.b1" },
+    })) as unknown as WaitingTask[];
+    expect(waitersOf("v1", waiting)).toBe("awaited by r1, DRIVE; r2, DRIVE; 1 more");
+    expect(waitersOf("v2", waiting)).toBe("awaited by r4, DRIVE");
+    expect(waitersOf("v3", waiting)).toBe("");
   });
 
   it("says what a run has that commands nothing now, its own run, too", () => {
-    expect(["r1.k1", "r2.k1", "r1.i3"].map((each) => heldElsewhere(each, "r1"))).toEqual([
+    expect(["r1.k1", "r2.k1", "r1.i3"].map((each) => heldElsewhere("v1", each, "r1", {}))).toEqual([
       "kept by run r1 between tasks",
       "kept by run r2 between tasks",
       "held for incident r1.i3",

@@ -1,8 +1,11 @@
 // What a vehicle and its payloads do, and for whom.
-import type { Command, Fleet } from "../../shared/types";
+import type { Command, Fleet, WaitingTask } from "../../shared/types";
 import { fill, strings } from "../../strings";
 
 const text = strings.operate.vehicles;
+
+/** The first in the order of service; the others are counted. */
+const NAMED_WAITERS = 2;
 
 export interface Work {
   behavior: string;
@@ -28,14 +31,32 @@ export const runOf = (holder: string): string => OF_RUN.exec(holder)?.[1] ?? "";
 
 /**
  * Which other run or operator has a resource, or for what a run has it that commands nothing now,
- * in words; "": none has.
+ * in words; "": none has. `labels`: the task and run of a holder, "DRIVE of r1".
  */
-export function heldElsewhere(holder: string, run: string): string {
+export function heldElsewhere(
+  resource: string,
+  holder: string,
+  run: string,
+  labels: Readonly<Record<string, string>>,
+): string {
   if (isOperator(holder)) return fill(text.heldBy, { by: holder });
   const [, other, kind] = OF_RUN.exec(holder) ?? [];
   if (other && kind === "k") return fill(text.keptByRun, { run: other });
   if (other && kind === "i") return fill(text.heldForIncident, { incident: holder });
-  return other && other !== run ? fill(text.heldByRun, { run: other }) : "";
+  if (!other || other === run) return "";
+  const task = (labels[holder] ?? "").replace(new RegExp(` of ${other}$`), "");
+  const said = resource.includes("/") ? text.payloadOfRun : text.vehicleOfRun;
+  return fill(said, { task: [other, task].filter(Boolean).join(", ") });
+}
+
+/** Which tasks wait for a vehicle or payload, in words; "": none does. */
+export function waitersOf(resource: string, waiting: readonly WaitingTask[]): string {
+  const found = waiting.filter(({ holders }) => resource in holders);
+  const named = found.slice(0, NAMED_WAITERS).map(({ run, task }) => `${run}, ${task}`);
+  if (found.length > NAMED_WAITERS) {
+    named.push(fill(text.moreWait, { count: found.length - NAMED_WAITERS }));
+  }
+  return named.length === 0 ? "" : fill(text.waitedFor, { tasks: named.join("; ") });
 }
 
 export const payloadsOf = (fleet: Fleet, vehicle: string): string[] =>
