@@ -16,6 +16,8 @@ from pathlib import Path
 from typing import Any
 from uuid import UUID
 
+import msgspec
+
 from m2pem.errors import JournalError, M2pemError
 from m2pem.journal.base import Entry, Loss
 from m2pem.journal.codec import decode_body, decode_library, decode_part, run_id
@@ -95,7 +97,8 @@ class Inspection:
     """What is intact in a journal. `problems`: of the file and the mark; of runs see `runs`.
 
     `schedule`: rows of the table; `lost_schedule`: how many of them cannot be read. `deletions`:
-    rows of the table. `holds`: who holds the schedule, by fleet.
+    rows of the table. `holds`: who holds the schedule, by fleet. `alerts`, `drawings`: rows of the
+    tables that can be read; of those that cannot, `problems` has how many.
     """
 
     path: Path
@@ -106,6 +109,8 @@ class Inspection:
     schedule: list[Row] = field(default_factory=list)
     holds: dict[str, Hold] = field(default_factory=dict)
     lost_schedule: int = 0
+    alerts: list[Row] = field(default_factory=list)
+    drawings: list[Row] = field(default_factory=list)
 
     @property
     def whole(self) -> bool:
@@ -232,6 +237,8 @@ def _read(connection: sqlite3.Connection, found: Inspection, marks: Mapping[int,
         if run.header is not None or run.damage or run.missing:
             found.runs.append(run)
     _read_schedule(connection, found)
+    found.alerts = _of_fleets(connection, "alerts", found)
+    found.drawings = _of_fleets(connection, "drawings", found)
 
 
 def _errors(connection: sqlite3.Connection) -> list[str]:
@@ -255,18 +262,22 @@ def _has(connection: sqlite3.Connection, query: str) -> bool:
     return False
 
 
-def _rows(connection: sqlite3.Connection, table: str, key: str) -> list[Row]:
-    """All rows of a table that can be read: from its beginning up to a damage, and from its end."""
-    found: dict[Any, Row] = {}
+def _rows(connection: sqlite3.Connection, table: str, *key: str) -> list[Row]:
+    """All rows of a table that can be read: from its beginning up to a damage, and from its end.
+
+    `key`: its first columns.
+    """
+    found: dict[Row, Row] = {}
     for order in ("ASC", "DESC"):
+        ordered = ", ".join(f"{column} {order}" for column in key)
         with suppress(sqlite3.Error):  # the table is of a later format, or it is damaged there
-            for row in connection.execute(f"SELECT * FROM {table} ORDER BY {key} {order}"):
-                if row[0] in found:
+            for row in connection.execute(f"SELECT * FROM {table} ORDER BY {ordered}"):
+                if row[: len(key)] in found:
                     break
-                found[row[0]] = row
+                found[row[: len(key)]] = row
             else:
                 break
-    return [found[number] for number in sorted(found, key=str)]
+    return [found[each] for each in sorted(found, key=str)]
 
 
 def _run(connection: sqlite3.Connection, number: int, mark: Mark | None) -> RunState:
@@ -372,6 +383,24 @@ def _read_schedule(connection: sqlite3.Connection, found: Inspection) -> None:
             found.holds[fleet] = decode_part(text, Hold)
         except _UNREADABLE:
             found.problems.append(f"who holds the schedule of {fleet} cannot be read")
+
+
+def _of_fleets(connection: sqlite3.Connection, table: str, found: Inspection) -> list[Row]:
+    """Rows of a table of fleet, number and JSON. What they say is read by those who use them."""
+    whole, damaged = [], 0
+    for row in _rows(connection, table, "fleet", "number"):
+        try:
+            _, number, text = row
+            readable = isinstance(number, int) and isinstance(msgspec.json.decode(text), dict)
+        except (*_UNREADABLE, msgspec.MsgspecError):
+            readable = False
+        if readable:
+            whole.append(row)
+        else:
+            damaged += 1
+    if damaged:
+        found.problems.append(f"{damaged} rows of the table `{table}` cannot be read")
+    return whole
 
 
 def entry_rows(connection: sqlite3.Connection, run: RunState) -> Iterator[Row]:

@@ -65,6 +65,8 @@ def _copy(
         for deletion in found.deletions:
             writing.execute("INSERT INTO deletions VALUES (?, ?, ?, ?, ?, ?, 1)", deletion[:6])
         _copy_schedule(writing, found)
+        writing.executemany("INSERT INTO alerts VALUES (?, ?, ?)", found.alerts)
+        writing.executemany("INSERT INTO drawings VALUES (?, ?, ?)", found.drawings)
         writing.execute(
             "INSERT INTO origin VALUES (?, ?, ?, ?)",
             (

@@ -164,6 +164,23 @@ async def test_the_schedule_is_salvaged_and_held(path: Path, tmp_path: Path) -> 
         assert hold.reason == f"salvaged from {path}"
 
 
+async def test_alerts_and_drawings_are_salvaged(path: Path, tmp_path: Path) -> None:
+    alerts = {number: f'{{"alert": "a{number}"}}' for number in (1, 2, 11)}
+    drawings = {1: '{"name": "gate"}'}
+    async with opened(lambda: SqliteJournal.open(path)) as journal:
+        for fleet in ("farm", "port"):
+            await journal.write_alerts(fleet, alerts)
+            await journal.write_drawings(fleet, drawings)
+    assert salvage(path, tmp_path / "whole.db", "anna").whole
+    change(path, "UPDATE alerts SET alert = CAST('{' AS BLOB) WHERE fleet = 'port' AND number = 2")
+    target = tmp_path / "new.db"
+    assert salvage(path, target, "anna").problems == ["1 rows of the table `alerts` cannot be read"]
+    async with opened(lambda: SqliteJournal.open(target)) as journal:
+        assert await journal.alerts("farm") == alerts
+        assert list(await journal.alerts("port")) == [1, 11]
+        assert await journal.drawings("farm") == await journal.drawings("port") == drawings
+
+
 async def test_a_run_that_is_gone_whole_is_not_forgotten(path: Path, tmp_path: Path) -> None:
     for table in ("runs", "standings", "entries"):
         change(path, f"DELETE FROM {table} WHERE run = 3")
