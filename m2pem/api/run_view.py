@@ -448,9 +448,11 @@ class RunView:
         if record.instances is not None and token is not None and not token.is_around:
             # The instances are counted, and not the token around them.
             token.is_around = True
-            state = self._element((record.process, record.element))
+            place = (record.process, record.element)
+            state = self._element(place)
             state.active -= 1
             state.hits -= 1
+            self._touch(place, state)
 
     def _close_scope(self, record: r.ScopeClosed) -> None:
         self.scopes.pop(record.scope, None)
