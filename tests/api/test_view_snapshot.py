@@ -117,5 +117,5 @@ def test_behaviors_of_tokens_are_those_of_the_view() -> None:
 def test_damaged_bytes_are_refused() -> None:
     content = snapshot_of(begun(None))
     for damaged in (b"", content[:-3], b"\x90"):
-        with pytest.raises(ValueError):  # noqa: PT011
+        with pytest.raises(ValueError):
             view_of(damaged)
