@@ -325,6 +325,23 @@ PROGRAMS = (
             Goal("longest_ms", "the page, the longest time between two pictures", "ms"),
         ),
     ),
+    Program(
+        "The same diagram, 50 browsers and two tabs of Chromium",
+        ("web_crowd", "60"),
+        ("web_crowd", "0.5", "1", "4", "0"),
+        (
+            Goal("ratio", "an engine with 50 browsers, times its speed without", "", 0.95, True),
+            Goal("records_per_s", "50 browsers, records, all counted by each", "/s", 10_000, True),
+            Goal("frames_per_s", "50 browsers, frames to the slowest", "/s"),
+            Goal("event_p50_ms", "50 browsers, from an event to the slowest, p50", "ms"),
+            Goal("event_p99_ms", "50 browsers, from an event to the slowest, p99", "ms"),
+            Goal("us_per_record", "50 browsers, CPU of the executive for a record", "us"),
+            Goal("alone_us_per_record", "the same without the page", "us"),
+            Goal("peak_mb", "50 browsers, memory of the executive", "MB"),
+            Goal("tab_fps", "50 browsers, pictures that a tab draws", "/s"),
+            Goal("tab_told_per_s", "50 browsers, frames to a tab", "/s"),
+        ),
+    ),
     _web_map(100, 30),
     _web_map(1000, 10),
     Program(

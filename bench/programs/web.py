@@ -9,15 +9,17 @@ lateness adds up. The page is served and looked at in every other turn; each tur
 
 import asyncio
 import json
+import os
 import sys
 import tempfile
 import time
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import AsyncIterator, Collection, Mapping
 from contextlib import AsyncExitStack, asynccontextmanager, suppress
 from pathlib import Path
 from statistics import median
 from typing import Any
 
+import m2pem_plugin_web.app  # noqa: F401  # the executive loads it before runs begin
 from m2pem_plugin_web.ocu import WebOcu
 
 from bench.graphs import file
@@ -61,35 +63,59 @@ def rings(round_s: float = ROUND_S) -> bytes:
 
 
 @asynccontextmanager
+async def served(running: Executive, folder: Path) -> AsyncIterator[WebOcu]:
+    """Serve the page of an executive; its files are in the folder."""
+    environment = {"M2PEM_WEB_PORT": "0", "XDG_STATE_HOME": str(folder)}
+    ocu = WebOcu(running.control, environment=environment)
+    serving = asyncio.create_task(ocu.serve())
+    try:
+        yield ocu
+    finally:
+        serving.cancel()
+        with suppress(asyncio.CancelledError):
+            await serving
+
+
+async def join(
+    ocu: WebOcu, viewers: int, *program: str, cores: Collection[int] = ()
+) -> asyncio.subprocess.Process:
+    """Start a program of this package that connects so many browsers; return when they are there.
+
+    Its first argument is the address with a token; the others are those of `program`. `cores`: the
+    processors that it and what it starts may use, if not all.
+    """
+    before = len(ocu.hub.viewers)
+    name, *words = program
+    command = (sys.executable, "-m", f"bench.programs.{name}", ocu.url, *words)
+    pipe = asyncio.subprocess.PIPE
+    process = await asyncio.create_subprocess_exec(*command, stdin=pipe, stdout=pipe)
+    if cores:
+        os.sched_setaffinity(process.pid, cores)
+    while len(ocu.hub.viewers) < before + viewers:
+        if process.returncode is not None:
+            raise RuntimeError(f"{name} ended with {process.returncode}: its browsers did not come")
+        await asyncio.sleep(0.02)
+    return process
+
+
+async def answer_of(process: asyncio.subprocess.Process, words: str = "") -> Mapping[str, float]:
+    """Write words to a program and return its answer, when it has ended."""
+    out, _ = await process.communicate(words.encode())
+    if process.returncode:
+        raise RuntimeError(f"the browsers ended with {process.returncode}")
+    answer: Mapping[str, float] = json.loads(out)
+    return answer
+
+
+@asynccontextmanager
 async def watched(running: Executive, run: str, folder: Path) -> AsyncIterator[Any]:
     """Serve the page and have it looked at.
 
     Yields what waits for the browsers' answer, and what says at which address one more comes in.
     """
-    environment = {"M2PEM_WEB_PORT": "0", "XDG_STATE_HOME": str(folder)}
-    ocu = WebOcu(running.control, environment=environment)
-    url = ocu.url
-    serving = asyncio.create_task(ocu.serve())
-    program = (sys.executable, "-m", "bench.programs.web_browsers", url, run)
-    browsers = await asyncio.create_subprocess_exec(*program, stdout=asyncio.subprocess.PIPE)
-
-    async def said() -> Mapping[str, float]:
-        out, _ = await browsers.communicate()
-        if browsers.returncode:
-            raise RuntimeError(f"the browsers ended with {browsers.returncode}")
-        answer: Mapping[str, float] = json.loads(out)
-        return answer
-
-    try:
-        while len(ocu.hub.viewers) < 3:  # nobody tells when they are there
-            if browsers.returncode is not None:
-                raise RuntimeError("the browsers did not come")
-            await asyncio.sleep(0.02)
-        yield said, lambda: ocu.url
-    finally:
-        serving.cancel()
-        with suppress(asyncio.CancelledError):
-            await serving
+    async with served(running, folder) as ocu:
+        browsers = await join(ocu, 3, "web_browsers", run)
+        yield lambda: answer_of(browsers), lambda: ocu.url
 
 
 async def turn(running: Executive, seconds: float, folder: Path | None) -> dict[str, float]:

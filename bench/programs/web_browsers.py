@@ -1,9 +1,10 @@
 """Browsers without a screen, in a process of their own: what they get of a run, and how late.
 
-python -m bench.programs.web_browsers <address with its token> <run>
+python -m bench.programs.web_browsers <address with its token> <run> [readers] [stalled]
 
-Two take in all that they are told, and one never reads: it asks, and stands still; when it is let
-go, it comes again. Ends with the run. The answer is about the one that lags most.
+Readers (2) take in all that they are sent; stalled ones (1) never read: they ask for the run, and
+connect again when they are disconnected. Ends with the run. The answer is about the reader that
+lags most.
 """
 
 import asyncio
@@ -16,15 +17,18 @@ from http.client import HTTPConnection
 from typing import Any
 from urllib.parse import urlsplit
 
+import msgspec
 import websockets
 
 US = 1_000_000
-LIMIT_S = 120.0
+LIMIT_S = 300.0
+
+_decode = msgspec.json.Decoder().decode
 
 
 @dataclass(slots=True)
 class Browser:
-    """What one was told. Latencies in ms: of frames, and of the newest event in each."""
+    """What one has received. Latencies in ms: of frames, and of the newest event in each."""
 
     address: str
     secrets: dict[str, str]
@@ -54,11 +58,11 @@ class Browser:
         return socket
 
     async def look(self) -> None:
-        """Until the run has ended, and all of it was told."""
+        """Read until the run has ended, and all of it was received."""
         socket = await self.connect()
         final: int | None = None
         async for text in socket:
-            message = json.loads(text)
+            message = _decode(text)
             kind = message["type"]
             if kind in ("snapshot", "frame"):
                 self._take(message)
@@ -122,15 +126,18 @@ def percentile(values: list[float], share: float) -> float:
     return sorted(values)[min(len(values) - 1, int(len(values) * share))] if values else 0.0
 
 
-async def watch(url: str, run: str) -> dict[str, Any]:
-    """All three; the answer."""
+async def watch(url: str, run: str, readers: int, stalled: int) -> dict[str, Any]:
+    """All of them; the answer."""
     address, secrets = url.partition("?")[0], sign_in(url)
-    quick = [Browser(address, secrets, run) for _ in range(2)]
-    stalled = asyncio.create_task(Browser(address, secrets, run).stand_still())
+    quick = [Browser(address, secrets, run) for _ in range(readers)]
+    stalling = [
+        asyncio.create_task(Browser(address, secrets, run).stand_still()) for _ in range(stalled)
+    ]
     async with asyncio.timeout(LIMIT_S):
         await asyncio.gather(*(each.look() for each in quick))
-    stalled.cancel()
-    await asyncio.gather(stalled, return_exceptions=True)
+    for each in stalling:
+        each.cancel()
+    await asyncio.gather(*stalling, return_exceptions=True)
     return {
         "frames_per_s": min(each.frames / (each.ended - each.began) for each in quick),
         "events": min(each.events for each in quick),
@@ -143,4 +150,6 @@ async def watch(url: str, run: str) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    print(json.dumps(asyncio.run(watch(sys.argv[1], sys.argv[2]))))
+    words = sys.argv[1:]
+    counts = [int(each) for each in words[2:]] or [2, 1]
+    print(json.dumps(asyncio.run(watch(words[0], words[1], counts[0], counts[1]))))

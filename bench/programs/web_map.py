@@ -10,7 +10,6 @@ of the simulator do; the page shows trails and names. Chromium draws without a g
 import asyncio
 import json
 import math
-import shutil
 import sys
 import tempfile
 from collections.abc import Mapping
@@ -18,11 +17,10 @@ from pathlib import Path
 from typing import Any
 
 from m2pem_plugin_web.ocu import WebOcu
-from playwright.async_api import CDPSession, Page, async_playwright
 
 from bench.graphs import file
 from bench.programs.stage import asking, executive, flows
-from bench.programs.web_page import ARGUMENTS, COUNT_FRAMES, WITHIN_MS
+from bench.programs.web_chromium import blank_page, count_pictures
 from m2pem.api.arbiter import ArbiterContext, Connection
 from m2pem.api.telemetry import GeoPosition, VehicleState
 from m2pem.fleet.fleet import Domain, Fleet, Vehicle
@@ -113,59 +111,20 @@ class Driving(FakeArbiter):
             await asyncio.sleep(1 / STATES_PER_S / SHARES)
 
 
-async def cpu_s(tools: CDPSession) -> float:
-    """CPU time of the page's process so far."""
-    answer = await tools.send("Performance.getMetrics")
-    metrics = {each["name"]: each["value"] for each in answer["metrics"]}
-    return float(metrics["ProcessTime"])
-
-
-async def look(page: Page, address: str, seconds: float, picture: str | None) -> dict[str, Any]:
-    """Open the run's page by an address that signs in, and count while vehicles drive."""
-    told = 0
-
-    def received(text: str | bytes) -> None:
-        nonlocal told
-        told += str(text).startswith('{"type":"frame"')
-
-    page.on("websocket", lambda socket: socket.on("framereceived", received))
-    await page.goto(address)
-    await page.locator(".drawing .djs-shape").first.wait_for()
-    await asyncio.sleep(GROW_S)
-    tools = await page.context.new_cdp_session(page)
-    await tools.send("Performance.enable")
-    before, before_s = told, await cpu_s(tools)
-    answer: dict[str, Any] = await page.evaluate(COUNT_FRAMES, seconds)
-    answer |= {
-        "told_per_s": (told - before) / seconds,
-        "cpu_percent": (await cpu_s(tools) - before_s) / seconds * 100,
-    }
-    if picture is not None:
-        await page.screenshot(path=picture)
-    return answer
-
-
 async def measure(
     count: int, seconds: float, folder: Path, picture: str | None = None
 ) -> dict[str, Any]:
     """What Chromium drew of one run."""
     journal = SqliteJournal.open(folder / "journal.db")
-    async with executive(journal, fleet(count), Driving) as running, async_playwright() as made:
-        chromium = await made.chromium.launch(
-            executable_path=shutil.which("chromium-headless-shell") or shutil.which("chromium"),
-            args=ARGUMENTS,
-        )
-        page = await chromium.new_page(viewport={"width": 1440, "height": 900})
-        page.set_default_timeout(WITHIN_MS)
+    async with executive(journal, fleet(count), Driving) as running, blank_page() as page:
         run = await running.control.start(MISSION)
         environment = {"M2PEM_WEB_PORT": "0", "XDG_STATE_HOME": str(folder)}
         ocu = WebOcu(running.control, environment=environment)
         address = ocu.url.replace("/?", f"/runs/{run}?")
         serving = asyncio.create_task(ocu.serve())
         try:
-            answer = await look(page, address, seconds, picture)
+            answer = await count_pictures(page, address, GROW_S, seconds, picture)
         finally:
-            await chromium.close()
             serving.cancel()
             await asyncio.gather(serving, return_exceptions=True)
         await running.control.stop(run)
