@@ -20,8 +20,8 @@ UI = PLUGIN / "ui"
 MOST_BYTES = 520_000
 """Of what a browser loads for any page, compressed, from an empty cache."""
 
-ON_DEMAND = ("readAnswers-*.js", "PlotsPane-*.*", "CamerasPane-*.*", "hls.light-*.js")
-"""Loaded by no page, but by a button of one."""
+ON_DEMAND = ("readAnswers-*.js", "PlotsPane-*.*", "CamerasPane-*.*", "hls.light-*.js", "de-*.js")
+"""Loaded by no page, but by a button of one, or for those who chose a language."""
 
 NO_PROGRAMS = ("sh", "bash", "env")
 """What a machine without Node.js has still."""

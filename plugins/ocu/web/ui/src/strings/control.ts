@@ -1,8 +1,10 @@
 // Texts of the blocks for the course of a mission: what comes when, and what happens otherwise.
+import { OPEN_PLACES } from "./openPlaces";
+
 export const control = {
   group: "Course of the mission",
   /** What still has to be chosen begins with this: the next block takes its place. */
-  open: "Choose what is done",
+  open: OPEN_PLACES.en,
   names: {
     first: "Choose what is done first",
     also: "Choose what is done at the same time",

@@ -1,40 +1,23 @@
-// Every text that a person reads, one section a page.
-import { cameras } from "./cameras";
-import { requirements, verify } from "./checks";
-import { control } from "./control";
-import { alerts } from "./alerts";
-import { busy } from "./busy";
-import { editor } from "./editor";
-import { fleet } from "./fleet";
-import { home } from "./home";
-import { operate } from "./operate";
-import { plots } from "./plots";
-import { people } from "./people";
-import { plan } from "./plan";
-import { runs } from "./runs";
-import { begin, run } from "./run";
-import { shell, signIn } from "./shell";
+// Every text that a person reads, in the language of the page. Others are loaded only when they
+// are used; modules that import this one wait for that, so that texts are constants for them.
+import { english, type English } from "./english";
+import { language } from "./language";
+import { translated, type Texts, type Translation } from "./texts";
 
-export const strings = {
-  shell,
-  signIn,
-  home,
-  busy,
-  alerts,
-  people,
-  editor,
-  plan,
-  control,
-  verify,
-  requirements,
-  run,
-  runs,
-  begin,
-  operate,
-  plots,
-  fleet,
-  cameras,
-};
+async function translation(): Promise<Translation<English> | undefined> {
+  if (language === "en") return undefined;
+  try {
+    return (await import("./de")).german;
+  } catch {
+    return undefined; // The file did not arrive: a page in English is better than none.
+  }
+}
+
+const found = await translation();
+
+export const strings: Texts<English> = translated(english, found);
+
+if (typeof document !== "undefined") document.documentElement.lang = found ? language : "en";
 
 /** `{name}` in a text becomes its value. */
 export function fill(text: string, values: Record<string, string | number>): string {

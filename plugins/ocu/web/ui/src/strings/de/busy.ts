@@ -1,0 +1,25 @@
+import type * as english from "../busy";
+import type { Translation } from "../texts";
+
+export const busy: Translation<typeof english.busy> = {
+  title: "Fahrzeuge sind belegt",
+  text: "Andere haben Fahrzeuge, die {mission} nennt:",
+  vehicle: "Fahrzeug",
+  holder: "Belegt von",
+  does: "Tut",
+  operator: "{who}, von Hand",
+  nothing: "von der Mission genannt, derzeit von keiner Aufgabe belegt",
+  free: "jetzt frei",
+  wait: "In die Warteschlange",
+  waitHint: "Sie startet, sobald alle ihre Fahrzeuge frei sind.",
+  queued: "{mission} wartet als {entry}, bis ihre Fahrzeuge frei sind.",
+  choose: "Andere Fahrzeuge wählen",
+  chooseHint:
+    "Wählen Sie eine Aufgabe aus und geben Sie ihr ein anderes Fahrzeug. „Wird beim Start der Aufgabe gewählt“ nimmt ein freies, das passt.",
+  stop: "{run} stoppen…",
+  stopSure: "{run} stoppen: Die Mission endet",
+  stopping: "{run} wird gestoppt. Seine Fahrzeuge sind frei, wenn sie angehalten haben.",
+  start: "Jetzt starten",
+  yes: "Trotzdem starten",
+  no: "Nicht starten",
+};

@@ -1,0 +1,39 @@
+// Every text that a person reads, one section a page.
+import { alerts } from "./alerts";
+import { busy } from "./busy";
+import { cameras } from "./cameras";
+import { requirements, verify } from "./checks";
+import { control } from "./control";
+import { editor } from "./editor";
+import { fleet } from "./fleet";
+import { home } from "./home";
+import { operate } from "./operate";
+import { people } from "./people";
+import { plan } from "./plan";
+import { plots } from "./plots";
+import { begin, run } from "./run";
+import { runs } from "./runs";
+import { shell, signIn } from "./shell";
+
+export const english = {
+  shell,
+  signIn,
+  home,
+  busy,
+  alerts,
+  people,
+  editor,
+  plan,
+  control,
+  verify,
+  requirements,
+  run,
+  runs,
+  begin,
+  operate,
+  plots,
+  fleet,
+  cameras,
+};
+
+export type English = typeof english;
