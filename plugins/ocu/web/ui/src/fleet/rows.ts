@@ -3,6 +3,7 @@
 import { speed_m_s, STALE_S } from "../shared/format";
 import { healthOf, isLow, rankOf, type Health } from "../map/health";
 import type { Fleet, PayloadState, VehicleState } from "../shared/types";
+import { locale } from "../strings/language";
 
 export type Domain = Fleet["vehicles"][number]["domain"];
 export type Filter = "lost" | "notReady" | "lowBattery" | "free" | "taken" | "inRun";
@@ -188,7 +189,7 @@ export function keyOf(row: Row, column: Column): string | number | null {
   }
 }
 
-const byText = new Intl.Collator(undefined, { numeric: true });
+const byText = new Intl.Collator(locale, { numeric: true });
 
 export interface Sorting {
   column: Column;

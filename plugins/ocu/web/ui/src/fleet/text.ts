@@ -1,5 +1,5 @@
 // What is known of a vehicle or payload, in words.
-import { age, STALE_S } from "../shared/format";
+import { age, fixed, STALE_S } from "../shared/format";
 import { session } from "../shared/session";
 import { fill, strings } from "../strings";
 import type { Column, Row } from "./rows";
@@ -26,9 +26,9 @@ export function cellOf(row: Row, column: Column): string {
     case "doing":
       return row.status?.held ? `${row.doing} (${text.heldBehavior})` : row.doing;
     case "speed":
-      return row.speed === null ? "" : `${row.speed.toFixed(1)} m/s`;
+      return row.speed === null ? "" : `${fixed(row.speed, 1)} m/s`;
     case "height":
-      return row.height_m === null ? "" : `${row.height_m.toFixed(1)} m`;
+      return row.height_m === null ? "" : `${fixed(row.height_m, 1)} m`;
     case "failsafe":
       return row.isPayload ? "" : failsafeOf(row);
     case "position":

@@ -21,6 +21,7 @@ import {
   type RunQuery,
   type SortedBy,
 } from "./runQuery";
+import { grouped } from "../shared/format";
 
 const words = strings.home;
 const texts = strings.runs;
@@ -249,7 +250,7 @@ function Pages({ query: { page }, total, turn }: PagesProps) {
         {texts.previous}
       </button>
       <span role="status">
-        {fill(texts.page, { from, to, total: total.toLocaleString() })}
+        {fill(texts.page, { from, to, total: grouped(total) })}
       </span>
       <button
         type="button"

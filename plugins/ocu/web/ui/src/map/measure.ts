@@ -1,5 +1,6 @@
 // Lengths and areas on the ground. The sphere is good enough over a few kilometres.
 import type { Vertex } from "./draft";
+import { locale } from "../strings/language";
 
 const EARTH_M = 6_371_008.8;
 const RAD = Math.PI / 180;
@@ -45,7 +46,7 @@ export function middleOf(vertices: readonly Place[]): Place {
 }
 
 const figures = (value: number, decimals: number): string =>
-  value.toLocaleString("en", { maximumFractionDigits: decimals });
+  value.toLocaleString(locale, { maximumFractionDigits: decimals });
 
 /** `85 m`, `1.25 km`. */
 export const writtenLength = (metres: number): string =>

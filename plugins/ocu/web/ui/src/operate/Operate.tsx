@@ -19,6 +19,7 @@ import { ReplayScene } from "./scene/replayScene";
 import type { Scene } from "./scene/scene";
 import { waitForRehearsal } from "./rehearsal";
 import "./operate.css";
+import { grouped } from "../shared/format";
 
 const text = strings.operate;
 
@@ -67,7 +68,7 @@ export default function Operate({ source }: { source: Source }) {
     return (
       <p class="nothing" role="status">
         {progress.value > 0
-          ? fill(text.replay.loading, { count: progress.value.toLocaleString() })
+          ? fill(text.replay.loading, { count: grouped(progress.value) })
           : text.run.loading}
       </p>
     );

@@ -7,6 +7,7 @@ import { may, session } from "../shared/session";
 import { toast } from "../shared/Toasts";
 import { counted, fill, strings } from "../strings";
 import "./people.css";
+import { moment } from "../shared/moments";
 
 const words = strings.people.approval;
 const AGAIN_MS = 5000;
@@ -100,4 +101,4 @@ export function Approval({ mission, isDirty }: { mission: string; isDirty: boole
 }
 
 const when = (at_us: number): string =>
-  new Date(at_us / 1000).toLocaleString([], { dateStyle: "medium", timeStyle: "short" });
+  moment(at_us / 1000);

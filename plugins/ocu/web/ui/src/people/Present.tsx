@@ -5,6 +5,7 @@ import { counted, fill, strings } from "../strings";
 import { present } from "./people";
 import { persons, type Presence } from "./persons";
 import "./people.css";
+import { locale } from "../strings/language";
 
 const words = strings.people;
 
@@ -72,7 +73,7 @@ export function Present() {
 }
 
 function Person({ person: { by, unit, role, run, since_us } }: { person: Presence }) {
-  const since = new Date(since_us / 1000).toLocaleTimeString([], { timeStyle: "short" });
+  const since = new Date(since_us / 1000).toLocaleTimeString(locale, { timeStyle: "short" });
   const known = strings.shell.roles[role as keyof typeof strings.shell.roles];
   return (
     <li>

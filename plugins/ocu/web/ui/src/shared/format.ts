@@ -1,4 +1,5 @@
 // Numbers as people read them.
+import { locale } from "../strings/language";
 
 /** 4 s is "0:04", two hours and a bit "2:00:09". */
 export function clock(seconds: number): string {
@@ -30,4 +31,16 @@ export const heading_deg = (yaw_rad: number): number =>
 export const speed_m_s = ([east, north, up]: [number, number, number]): number =>
   Math.hypot(east, north, up);
 
-export const dateTime = (time_us: number): string => new Date(time_us / 1000).toLocaleString();
+export const dateTime = (time_us: number): string =>
+  new Date(time_us / 1000).toLocaleString(locale);
+
+/** A whole number, in groups: "1,234". */
+export const grouped = (value: number): string => value.toLocaleString(locale);
+
+const FIXED = [0, 1, 2, 3].map((decimals) => {
+  const digits = { minimumFractionDigits: decimals, maximumFractionDigits: decimals };
+  return new Intl.NumberFormat(locale, { ...digits, useGrouping: false });
+});
+
+/** So many decimals, 0 to 3: "1.5", in German "1,5". For what is read, not for what is entered. */
+export const fixed = (value: number, decimals: number): string => FIXED[decimals]!.format(value);

@@ -1,5 +1,7 @@
 // Dates and times as people of this place write them.
-const MOMENT = new Intl.DateTimeFormat(undefined, { dateStyle: "medium", timeStyle: "short" });
+import { locale } from "../strings/language";
+
+const MOMENT = new Intl.DateTimeFormat(locale, { dateStyle: "medium", timeStyle: "short" });
 
 /** `ms`: since the Unix epoch. */
 export function moment(ms: number): string {

@@ -94,7 +94,7 @@ function textsIn(file: string, content: string): string[] {
   return found;
 }
 
-test("no text is written into a component", () => {
+test("no text is written into a component", { timeout: 60_000 }, () => {
   const components = Object.entries(COMPONENTS);
   expect(components.length).toBeGreaterThan(50);
   expect(components.flatMap(([file, content]) => textsIn(file, content))).toEqual([]);

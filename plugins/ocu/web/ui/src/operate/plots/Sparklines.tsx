@@ -1,5 +1,5 @@
 // Battery and link of the last minutes, small, on the card of a vehicle.
-import { age } from "../../shared/format";
+import { age, fixed } from "../../shared/format";
 import { fill, strings } from "../../strings";
 import { useOperating } from "../context";
 import { LINK_LEVELS } from "./fields";
@@ -75,7 +75,7 @@ const isKnown = (value: Drawn): value is number => typeof value === "number";
 function firstOf(series: Parameters<typeof drawn>[0] | null, from_s: number): string {
   const at = series ? Math.max(0, series.countAt(from_s) - 1) : 0;
   const value = series && series.length > at ? series.valueAt(at) : NaN;
-  return Number.isNaN(value) ? text.spark.unknown : `${value.toFixed(1)} %`;
+  return Number.isNaN(value) ? text.spark.unknown : `${fixed(value, 1)} %`;
 }
 
 /** An SVG path; gaps are gaps. */

@@ -2,6 +2,7 @@
 import { strings } from "../../strings";
 import { LINK_LEVELS, unitOf } from "./fields";
 import type { TelemetryHistory } from "./history";
+import { fixed } from "../../shared/format";
 
 export function readValue(
   history: TelemetryHistory,
@@ -17,5 +18,5 @@ export function readValue(
 
 function written(value: number): string {
   const size = Math.abs(value);
-  return value.toFixed(size >= 100 ? 0 : size >= 1 ? 1 : 2);
+  return fixed(value, size >= 100 ? 0 : size >= 1 ? 1 : 2);
 }

@@ -2,7 +2,7 @@
 import { useSignal } from "@preact/signals";
 import { command } from "../../shared/command";
 import { activeRuns } from "../../shared/executive";
-import { clock, dateTime } from "../../shared/format";
+import { clock, dateTime, grouped } from "../../shared/format";
 import { go } from "../../shared/router";
 import { titleOf } from "../../shared/runs";
 import { may } from "../../shared/session";
@@ -106,7 +106,7 @@ function Clock() {
         <span title={text.speed}>{Number(pace.toPrecision(3))}×</span>
       )}
       <span class="events">
-        {events.toLocaleString()} {text.events}
+        {grouped(events)} {text.events}
       </span>
     </>
   );

@@ -1,7 +1,7 @@
 // How a run ended, and why: said once, at its end.
 import type { RunRecord } from "../../shared/types";
 import { lineOf } from "../../records/logLine";
-import { clock } from "../../shared/format";
+import { clock, grouped } from "../../shared/format";
 import { Dialog } from "../../shared/Dialog";
 import { strings } from "../../strings";
 import { useOperating } from "../context";
@@ -51,7 +51,7 @@ export function RunEnd({ onClose }: { onClose: () => void }) {
         <dt>{text.duration}</dt>
         <dd>{clock(records.at(-1)?.t ?? scene.now())}</dd>
         <dt>{text.records}</dt>
-        <dd>{scene.events.value.toLocaleString()}</dd>
+        <dd>{grouped(scene.events.value)}</dd>
         <dt>{text.decisions}</dt>
         <dd>{decisions.length === 0 ? text.none : decisions.map(said)}</dd>
         <dt>{text.faults}</dt>

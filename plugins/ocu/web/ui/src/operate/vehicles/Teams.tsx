@@ -3,6 +3,7 @@ import { usePaced } from "../layout/pace";
 import { fill, strings } from "../../strings";
 import type { TeamState } from "../../shared/types";
 import { useOperating } from "../context";
+import { fixed } from "../../shared/format";
 
 const text = strings.operate.vehicles;
 
@@ -16,7 +17,7 @@ export function Teams() {
       {marching.map((team) => (
         <table key={team.behavior}>
           <caption>
-            {team.name} · {fill(text.team, { spacing: team.spacing_m.toFixed(0) })}
+            {team.name} · {fill(text.team, { spacing: fixed(team.spacing_m, 0) })}
           </caption>
           <tbody>
             {team.members.map((member) => (
@@ -24,7 +25,7 @@ export function Teams() {
                 <th scope="row">{member.resource}</th>
                 <td>{place(member)}</td>
                 <td>
-                  {member.gap_m !== null && fill(text.gap, { metres: member.gap_m.toFixed(1) })}
+                  {member.gap_m !== null && fill(text.gap, { metres: fixed(member.gap_m, 1) })}
                 </td>
               </tr>
             ))}
@@ -37,7 +38,7 @@ export function Teams() {
 
 function place({ along_m, aside_m }: TeamState["members"][number]): string {
   const parts: string[] = [];
-  const metres = (value: number) => ({ metres: Math.abs(value).toFixed(1) });
+  const metres = (value: number) => ({ metres: fixed(Math.abs(value), 1) });
   if (along_m !== null && Math.abs(along_m) >= 0.5) {
     parts.push(fill(along_m > 0 ? text.ahead : text.behind, metres(along_m)));
   }

@@ -2,7 +2,7 @@
 import { Component } from "preact";
 import { useRef } from "preact/hooks";
 import { usePaced } from "../layout/pace";
-import { age, heading_deg, speed_m_s, STALE_S } from "../../shared/format";
+import { age, fixed, heading_deg, speed_m_s, STALE_S } from "../../shared/format";
 import { askFor, requests } from "../../people/people";
 import { may, session } from "../../shared/session";
 import { command } from "../../shared/command";
@@ -162,10 +162,10 @@ function Numbers({ state }: { state: VehicleState }) {
   const { mode, velocity_enu_m_s, altitude_above_home_m, yaw_rad } = state;
   const facts: [string, string][] = [];
   if (mode) facts.push([text.mode, mode]);
-  if (velocity_enu_m_s) facts.push([text.speed, `${speed_m_s(velocity_enu_m_s).toFixed(1)} m/s`]);
+  if (velocity_enu_m_s) facts.push([text.speed, `${fixed(speed_m_s(velocity_enu_m_s), 1)} m/s`]);
   if (yaw_rad !== null) facts.push([text.heading, `${Math.round(heading_deg(yaw_rad)) % 360}°`]);
   if (altitude_above_home_m !== null) {
-    facts.push([text.altitude, `${altitude_above_home_m.toFixed(1)} m`]);
+    facts.push([text.altitude, `${fixed(altitude_above_home_m, 1)} m`]);
   }
   return (
     <dl class="card-numbers">
@@ -226,7 +226,7 @@ function directionOf({ pan_rad, tilt_rad, zoom }: PayloadState): string {
   return [
     pan_rad !== null && `↻ ${degrees(pan_rad)}`,
     tilt_rad !== null && `↕ ${degrees(tilt_rad)}`,
-    zoom !== null && zoom !== 1 && `×${zoom.toFixed(1)}`,
+    zoom !== null && zoom !== 1 && `×${fixed(zoom, 1)}`,
   ]
     .filter(Boolean)
     .join(" ");

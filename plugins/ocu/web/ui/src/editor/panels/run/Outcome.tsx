@@ -5,6 +5,7 @@ import { PROMPTS, SERVICES, WAITS, type Span } from "../../../records/spans";
 import type { EditorContext } from "../panel";
 import { Explained } from "./Explained";
 import type { Unsaid } from "./unsaid";
+import { locale } from "../../../strings/language";
 
 const words = strings.run;
 const STATUS = strings.operate.run.status;
@@ -111,8 +112,10 @@ function Bar({ editor, span, last }: { editor: EditorContext; span: Span; last: 
   );
 }
 
+const tenths = new Intl.NumberFormat(locale, { maximumFractionDigits: 1 });
+
 export function duration(seconds: number): string {
-  if (seconds < 60) return `${Number(seconds.toFixed(1))} s`;
+  if (seconds < 60) return `${tenths.format(seconds)} s`;
   const whole = Math.round(seconds);
   const [hours, minutes] = [Math.floor(whole / 3600), Math.floor((whole % 3600) / 60)];
   const rest = String(whole % 60).padStart(2, "0");

@@ -5,9 +5,10 @@ import type { EditorContext } from "../panel";
 import { Assumed } from "./Assumed";
 import { counted, tell, type Outcome, type Report, type Told } from "./report";
 import type { Verification } from "./verification";
+import { locale } from "../../../strings/language";
 
 const words = strings.verify;
-const NUMBER = new Intl.NumberFormat("en");
+const NUMBER = new Intl.NumberFormat(locale);
 
 interface PartProps {
   editor: EditorContext;

@@ -17,6 +17,7 @@ import { ViolationView } from "./ViolationView";
 import "../begin/begin.css";
 import "./verify.css";
 import "./canvas.css";
+import { locale } from "../../../strings/language";
 
 const words = strings.verify;
 
@@ -121,7 +122,7 @@ function Ask({ editor, verification }: PartProps) {
   );
 }
 
-const NUMBER = new Intl.NumberFormat("en");
+const NUMBER = new Intl.NumberFormat(locale);
 
 /** How far the search is, or why there is no report. */
 function Progress({ editor, verification }: PartProps) {
