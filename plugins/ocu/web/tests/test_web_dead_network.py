@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import pytest
 from playwright.async_api import Locator, Page, expect
+from test_web_alerts import look
 from web_desk import IN_ONE_LOOP, Desk, element, forget
 from web_proxy import Proxy, proxy_to
 from web_running import answer, press_twice, wait_for_status
@@ -128,6 +129,28 @@ async def test_an_answer_that_the_network_held_back_is_not_given(
         await expect(answer(here.page, "Continue")).to_be_enabled()
         await answer(here.page, "Continue").click()
         await expect(element(here.page, "DriveRoute")).to_contain_class("m2-active")
+
+
+async def test_what_is_shown_of_the_fleet_and_the_alerts_is_said_to_be_old(desk: Desk) -> None:
+    async with field(desk) as here:
+        page = here.page
+        await page.goto(f"{here.origin}/alerts")
+        await expect(page.get_by_role("heading", name="Alerts", level=1)).to_be_visible()
+        await page.get_by_role("link", name="Fleet").click()
+        table = page.get_by_role("grid", name="Vehicles")
+        vehicle = table.get_by_role("row", name="evsg1", exact=False).first
+        await expect(vehicle).to_contain_text("connected")
+        here.proxy.stall()
+        await expect(vehicle).to_contain_text(re.compile(r"not known since \d+:\d\d:\d\d"))
+        await expect(vehicle).to_contain_text("Not known")
+        await expect(table.get_by_text("Lost", exact=True)).to_have_count(0)
+        await look(page, "fleet_not_connected")
+        await page.go_back()
+        await expect(page.locator(".alert-page.stale")).to_have_count(1)
+        here.proxy.heal()
+        await expect(page.locator(".alert-page.stale")).to_have_count(0)
+        await page.go_forward()
+        await expect(vehicle).to_contain_text("connected")
 
 
 # The map is a canvas: in how many pieces the trail was drawn that has most of them.

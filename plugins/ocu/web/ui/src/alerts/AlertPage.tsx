@@ -1,7 +1,7 @@
 // All alerts, those that are over too, and how this browser tells new ones.
 import { useEffect, useState } from "preact/hooks";
 import { get } from "../shared/api";
-import { alertChanges } from "../shared/executive";
+import { alertChanges, unknownSince } from "../shared/executive";
 import { moment } from "../shared/moments";
 import { may } from "../shared/session";
 import { fill, strings } from "../strings";
@@ -36,7 +36,7 @@ export default function AlertPage() {
   const now = openAlerts.value.filter(wanted);
   const over = past.filter(wanted);
   return (
-    <div class="alert-page">
+    <div class={unknownSince.value === null ? "alert-page" : "alert-page stale"}>
       <div class="home-head">
         <h1>{words.title}</h1>
         <label>

@@ -4,7 +4,7 @@ import type { JSX } from "preact";
 import { useEffect, useMemo } from "preact/hooks";
 import { Catalogue } from "../editor/session/catalogue";
 import { usePaced } from "../operate/layout/pace";
-import { connection, payloads, silentFor_s, vehicles, watch } from "../shared/executive";
+import { connection, payloads, silentFor_s, unknownSince, vehicles, watch } from "../shared/executive";
 import { Split } from "../shared/Split";
 import { TabList } from "../shared/Tabs";
 import { useMedia } from "../shared/useMedia";
@@ -89,7 +89,7 @@ function Loaded({ catalogue }: { catalogue: Catalogue }) {
   const onMap = useMemo(() => shown.filter(({ isPayload }) => !isPayload), [shown]);
   const tab = useSignal("table");
   const wide = useMedia(WIDE);
-  const isStale = useComputed(() => connection.value === "lost");
+  const isStale = useComputed(() => unknownSince.value !== null);
 
   const table = (
     <section class="fleet-pane" aria-label={text.panes.table}>
@@ -216,7 +216,8 @@ function useRows(catalogue: Catalogue): readonly Row[] {
         payloads: looks,
         status: status.value,
         silentFor_s,
+        unknownSince: unknownSince.value,
       }),
-    [catalogue, states, looks, status.value, second.value],
+    [catalogue, states, looks, status.value, second.value, unknownSince.value],
   );
 }

@@ -240,7 +240,7 @@ interface RowLineProps {
 
 function RowLine({ row, id, index, isActive, onChoose, onCommands }: RowLineProps) {
   const isSelected = selected.value.has(row.id);
-  const isStale = row.health === "lost" || row.health === "unheard";
+  const isStale = ["lost", "unheard", "unknown"].includes(row.health);
   const classes = [
     row.isPayload && "fleet-payload",
     isActive && "fleet-active",

@@ -36,6 +36,17 @@ describe("rows", () => {
     });
   });
 
+  it("say that nothing is known while the executive is not connected, and nothing of a loss", () => {
+    const found = rows({
+      vehicles: [vehicle("v1"), vehicle("v2")],
+      states: [state("v1"), state("v2", { link: "lost" })],
+      silent: { v1: 90, v2: 90 },
+      unknownSince: Date.UTC(2026, 0, 1, 12, 0, 5),
+    });
+    expect(found.map(({ health }) => health)).toEqual(["unknown", "unknown"]);
+    expect(found.map(({ flags }) => flags.lost)).toEqual([false, true]);
+  });
+
   it("say who has a vehicle", () => {
     const found = rows({
       vehicles: [vehicle("v1"), vehicle("v2"), vehicle("v3"), vehicle("m", { manned: true })],

@@ -60,6 +60,8 @@ export interface Row {
   /** How the vehicle's own differ from that; null: they were not compared. */
   failsafeProblems: readonly string[] | null;
   link: "connected" | "degraded" | "lost" | "unknown";
+  /** Since when nothing is known of it, as the executive is not connected; null: it is. */
+  unknownSince: number | null;
   /** Seconds since its last state; null: there was none. */
   age_s: number | null;
   battery: number | null;
@@ -86,6 +88,8 @@ export interface Sources {
   payloads: Record<string, PayloadState>;
   status: Record<string, ResourceStatus>;
   silentFor_s(resource: string): number | null;
+  /** When the executive said anything last, milliseconds since the Unix epoch; null: connected. */
+  unknownSince: number | null;
 }
 
 const OF_RUN = /^r\d+\.\w+$/;
@@ -102,7 +106,7 @@ export function rowsOf(sources: Sources): Row[] {
 }
 
 function rowOf(
-  { status, silentFor_s }: Sources,
+  { status, silentFor_s, unknownSince }: Sources,
   id: string,
   { domain, manned, host, failsafe, id: owner }: Fleet["vehicles"][number],
   arbiter: string,
@@ -114,7 +118,9 @@ function rowOf(
   const age_s = silentFor_s(id);
   const position = vehicle?.position ?? null;
   const battery = vehicle?.battery_fraction ?? null;
-  const isLost = state?.link === "lost" || (age_s !== null && age_s > STALE_S);
+  // That nothing comes is no fault of the vehicle then.
+  const isUnknown = unknownSince !== null;
+  const isLost = state?.link === "lost" || (!isUnknown && age_s !== null && age_s > STALE_S);
   const operator = now && now.holder && !OF_RUN.test(now.holder) ? now.holder : "";
   const row = {
     id,
@@ -126,6 +132,7 @@ function rowOf(
     failsafe: isPayload ? "" : failsafe,
     failsafeProblems: vehicle?.failsafe_problems ?? null,
     link: state?.link ?? ("unknown" as const),
+    unknownSince,
     age_s,
     battery,
     mode: vehicle?.mode ?? "",
@@ -144,6 +151,7 @@ function rowOf(
   return {
     ...row,
     health: healthOf({
+      isUnknown,
       isKnown: state !== undefined,
       isLost,
       ready: row.ready,

@@ -48,9 +48,10 @@ interface World {
   payloads?: Record<string, PayloadState>;
   status?: Record<string, ResourceStatus>;
   silent?: Record<string, number>;
+  unknownSince?: number;
 }
 
-export function rows({ vehicles, states = [], payloads = {}, status = {}, silent = {} }: World): Row[] {
+export function rows({ vehicles, states = [], payloads = {}, status = {}, silent = {}, unknownSince }: World): Row[] {
   const fleet: Fleet = {
     name: "f",
     origin: { lat: 0, lon: 0, alt: 0 },
@@ -68,6 +69,7 @@ export function rows({ vehicles, states = [], payloads = {}, status = {}, silent
     vehicles: known,
     payloads,
     status,
+    unknownSince: unknownSince ?? null,
     silentFor_s: (resource) => silent[resource] ?? (resource in known ? 0.2 : null),
   });
 }

@@ -1,5 +1,6 @@
 // What is known of a vehicle or payload, in words.
 import { age, fixed, STALE_S } from "../shared/format";
+import { timeOfDay } from "../shared/moments";
 import { session } from "../shared/session";
 import { fill, strings } from "../strings";
 import type { Column, Row } from "./rows";
@@ -50,7 +51,10 @@ function failsafeOf({ failsafe, failsafeProblems }: Row): string {
   return fill(failsafeProblems.length > 0 ? failsafeDiffers : failsafeCompared, { failsafe });
 }
 
-function linkOf({ link, age_s }: Row): string {
+function linkOf({ link, age_s, unknownSince }: Row): string {
+  if (unknownSince !== null) {
+    return fill(strings.shell.unknownSince, { time: timeOfDay(unknownSince) });
+  }
   if (age_s === null) return text.links.unknown;
   const silent = age_s > STALE_S ? fill(text.silent, { age: age(age_s) }) : "";
   if (!silent) return text.links[link];

@@ -1,7 +1,7 @@
 // How a vehicle is, in one word: on maps and in the table of the fleet.
 import type { VehicleState } from "../shared/types";
 
-export type Health = "ok" | "degraded" | "lowBattery" | "notReady" | "unheard" | "lost";
+export type Health = "ok" | "degraded" | "lowBattery" | "notReady" | "unheard" | "unknown" | "lost";
 
 export const LOW_BATTERY = 0.25;
 
@@ -12,6 +12,7 @@ const HEALTHS: readonly Health[] = [
   "lowBattery",
   "notReady",
   "unheard",
+  "unknown",
   "lost",
 ];
 
@@ -20,6 +21,8 @@ export const rankOf = (health: Health): number => HEALTHS.indexOf(health);
 export interface Condition {
   /** Whether it was ever heard. */
   isKnown: boolean;
+  /** The executive is not connected: what was received before may be over. */
+  isUnknown?: boolean;
   /** By its link, or as it has been silent for too long. */
   isLost: boolean;
   ready: boolean | null;
@@ -27,7 +30,8 @@ export interface Condition {
   link: VehicleState["link"] | "unknown";
 }
 
-export function healthOf({ isKnown, isLost, ready, isLow, link }: Condition): Health {
+export function healthOf({ isUnknown, isKnown, isLost, ready, isLow, link }: Condition): Health {
+  if (isUnknown) return "unknown";
   if (isLost) return "lost";
   if (!isKnown) return "unheard";
   if (ready === false) return "notReady";

@@ -36,10 +36,14 @@ const HEADINGS = 72;
 const BADGES: Partial<Record<Health, string>> = {
   lost: "✕",
   unheard: "?",
+  unknown: "?",
   notReady: "!",
   lowBattery: "▾",
   degraded: "~",
 };
+
+/** Where it is now is not known. */
+const HOLLOW: ReadonlySet<Health> = new Set(["lost", "unheard", "unknown"]);
 
 /** From the style sheet: they differ between themes, and where colours are forced. */
 export function coloursOf(element: HTMLElement): Colours {
@@ -51,6 +55,7 @@ export function coloursOf(element: HTMLElement): Colours {
     lowBattery: colour("low"),
     notReady: colour("not-ready"),
     unheard: colour("unheard"),
+    unknown: colour("unheard"),
     lost: colour("lost"),
     ink: colour("ink"),
     halo: colour("halo"),
@@ -149,7 +154,7 @@ export class VehicleSymbols {
     context.scale(SYMBOL_PX / 24, SYMBOL_PX / 24);
     context.translate(-12, -12);
     const shape = this.shapeOf(domain);
-    const isHollow = health === "lost" || health === "unheard" || manned;
+    const isHollow = HOLLOW.has(health) || manned;
     context.fillStyle = isHollow ? colours.paper : colours[health];
     context.strokeStyle = isHollow ? colours[health] : colours.paper;
     context.lineWidth = 1.5;

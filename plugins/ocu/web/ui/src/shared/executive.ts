@@ -24,6 +24,13 @@ export const vehicles = signal<Record<string, VehicleState>>({});
 export const payloads = signal<Record<string, PayloadState>>({});
 export const teams = signal<Record<string, TeamState>>({});
 
+/**
+ * When the executive said anything last, in milliseconds since the Unix epoch; null: it is connected.
+ * What is shown of vehicles was so then, and is not known now.
+ */
+export const unknownSince = signal<number | null>(null);
+let receivedAt_ms = Date.now();
+
 /** Known from the stream, while it is connected. */
 export const serverClock = new ServerClock();
 
@@ -55,6 +62,7 @@ export function listen(listener: Listener): () => void {
 
 const client = new LiveClient(browser, {
   received: (message) => {
+    receivedAt_ms = Date.now();
     if ("now" in message) serverClock.heard(message.now);
     batch(() => {
       take(message);
@@ -62,7 +70,11 @@ const client = new LiveClient(browser, {
     });
   },
   connection: (state) => {
-    connection.value = state;
+    batch(() => {
+      connection.value = state;
+      if (state === "open") unknownSince.value = null;
+      else if (state === "lost") unknownSince.value ??= receivedAt_ms;
+    });
     if (state !== "lost") serverClock.forget();
     if (state === "lost") void afterLoss();
     if (state === "refused") signedOut();

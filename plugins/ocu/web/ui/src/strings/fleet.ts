@@ -55,6 +55,7 @@ export const fleet = {
     lowBattery: "Low battery",
     notReady: "Not ready",
     unheard: "No state yet",
+    unknown: "Not known",
     lost: "Lost",
   },
   links: { connected: "connected", degraded: "weak", lost: "LOST", unknown: "–" },

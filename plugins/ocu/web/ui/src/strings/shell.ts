@@ -36,6 +36,7 @@ export const shell = {
   connected: "Connected to the executive.",
   connecting: "Connecting to the executive…",
   offline: "Not connected to the executive. What is shown may be old.",
+  unknownSince: "not known since {time}",
   offlineShort: "Not connected",
   retry: "Try now",
   standby: "Standby:",

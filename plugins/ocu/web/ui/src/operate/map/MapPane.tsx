@@ -2,6 +2,7 @@
 import { useComputed, useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { clock, STALE_S } from "../../shared/format";
+import { unknownSince } from "../../shared/executive";
 import { remember, remembered } from "../../shared/memory";
 import { may, session } from "../../shared/session";
 import { fill, strings } from "../../strings";
@@ -77,7 +78,10 @@ export function MapPane({ formInside }: { formInside: boolean }) {
       }),
     ];
     const aging = setInterval(() => {
-      made.vehicles.ages((resource) => (scene.silentFor_s(resource) ?? Infinity) > STALE_S);
+      made.vehicles.ages((resource) => {
+        if (scene.mode === "live" && unknownSince.peek() !== null) return "unknown";
+        return (scene.silentFor_s(resource) ?? Infinity) > STALE_S ? "stale" : "current";
+      });
     }, AGES_MS);
     return () => {
       clearInterval(aging);

@@ -22,9 +22,12 @@ const LISTED_MS = 500;
 
 interface Shown {
   state: VehicleState;
-  isStale: boolean;
+  receipt: Receipt;
   mark: VehicleMark;
 }
+
+/** Whether its state comes: not for a while, or not known, as nothing comes from the executive. */
+export type Receipt = "current" | "stale" | "unknown";
 
 export interface Shows {
   trails: boolean;
@@ -116,12 +119,12 @@ export class VehicleLayer {
     for (const [resource, { state }] of this.shown) this.trace(resource, state.position!);
   }
 
-  /** What is not heard of for a while is drawn as lost. */
-  ages(isStale: (resource: string) => boolean): void {
+  /** What is not received for a while is drawn as lost, or as not known. */
+  ages(receiptOf: (resource: string) => Receipt): void {
     for (const [resource, shown] of this.shown) {
-      const now = isStale(resource);
-      if (now === shown.isStale) continue;
-      shown.isStale = now;
+      const now = receiptOf(resource);
+      if (now === shown.receipt) continue;
+      shown.receipt = now;
       const { health } = symbolOf(shown.mark.vehicle, shown.state, now);
       shown.mark = { ...shown.mark, vehicle: { ...shown.mark.vehicle, health } };
       this.canvas.redraw();
@@ -159,11 +162,11 @@ export class VehicleLayer {
     const { latitude_deg: latitude, longitude_deg: longitude } = position;
     const mark: VehicleMark = {
       kind: "vehicle",
-      vehicle: symbolOf(vehicle, state, false),
+      vehicle: symbolOf(vehicle, state, "current"),
       latitude,
       longitude,
     };
-    this.shown.set(vehicle.id, { state, isStale: false, mark });
+    this.shown.set(vehicle.id, { state, receipt: "current", mark });
     if (!shown) return this.trace(vehicle.id, position);
     const since_s = (state.time_us - shown.state.time_us) / 1e6;
     this.trails.extend(vehicle.id, place(position), since_s, this.longest_s);
@@ -193,7 +196,7 @@ export class VehicleLayer {
 const symbolOf = (
   { id, domain, manned }: Pick<Vehicle, "id" | "domain" | "manned">,
   { yaw_rad, link, ready, battery_fraction }: VehicleState,
-  isStale: boolean,
+  receipt: Receipt,
 ) => ({
   id,
   domain,
@@ -201,7 +204,8 @@ const symbolOf = (
   yaw_rad,
   health: healthOf({
     isKnown: true,
-    isLost: isStale || link === "lost",
+    isUnknown: receipt === "unknown",
+    isLost: receipt === "stale" || link === "lost",
     ready,
     isLow: isLow(battery_fraction),
     link,

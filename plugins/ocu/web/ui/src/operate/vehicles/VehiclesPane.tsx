@@ -4,6 +4,8 @@ import { useRef } from "preact/hooks";
 import { usePaced } from "../layout/pace";
 import { age, fixed, heading_deg, speed_m_s, STALE_S } from "../../shared/format";
 import { askFor, requests } from "../../people/people";
+import { unknownSince } from "../../shared/executive";
+import { timeOfDay } from "../../shared/moments";
 import { may, session } from "../../shared/session";
 import { command } from "../../shared/command";
 import { toast } from "../../shared/Toasts";
@@ -77,7 +79,8 @@ class CardInTurn extends Component<CardProps & { hasTurn: boolean }> {
 function Card({ vehicle, state, payloads, silent_s }: CardProps) {
   const { scene, fleet, followed, centred } = useOperating();
   const { hasTelemetry } = scene;
-  const stale = hasTelemetry && isStale(state, silent_s);
+  const since = scene.mode === "live" ? unknownSince.value : null;
+  const stale = hasTelemetry && (since !== null || isStale(state, silent_s));
   return (
     <li class={stale ? "card card-stale" : "card"}>
       <div class="card-head">
@@ -88,8 +91,11 @@ function Card({ vehicle, state, payloads, silent_s }: CardProps) {
         <span class="card-badges">
           {state && <Badges state={state} />}
           {hasTelemetry && silent_s === null && <em>{text.unheard}</em>}
-          {silent_s !== null && silent_s > STALE_S && (
-            <em>{fill(text.silent, { age: age(silent_s) })}</em>
+          {since !== null ? (
+            <em>{fill(strings.shell.unknownSince, { time: timeOfDay(since) })}</em>
+          ) : (
+            silent_s !== null &&
+            silent_s > STALE_S && <em>{fill(text.silent, { age: age(silent_s) })}</em>
           )}
         </span>
       </div>
