@@ -37,11 +37,14 @@ async def test_what_is_kept_of_a_deleted_run_goes_with_it(tmp_path, monkeypatch)
         await with_run(journal, *ENDED)
         tracks = tmp_path / "journal.db-tracks"
         tracks.mkdir()
+        replays = tmp_path / "journal.db-replays"
+        replays.mkdir()
         recordings = tmp_path / "journal.db-recordings"
         recordings.mkdir()
         kept, gone = (
             [
                 tracks / f"{run}.jsonl",
+                replays / f"{run}.index",
                 recordings / f"{run}-20261126-160312.mcap",
                 recordings / f"{run}-20261126-160312.2.mcap",
                 tmp_path / f"journal.db-stopped-{run}",
@@ -52,8 +55,8 @@ async def test_what_is_kept_of_a_deleted_run_goes_with_it(tmp_path, monkeypatch)
         for file in (*kept, *gone):
             file.touch()
         await delete_runs(journal, ["r2"], by="ann")
-        assert [file.exists() for file in gone] == [False] * 5
-        assert [file.exists() for file in kept] == [True] * 5
+        assert [file.exists() for file in gone] == [False] * 6
+        assert [file.exists() for file in kept] == [True] * 6
 
 
 async def test_only_runs_that_ended_before_are_deleted():

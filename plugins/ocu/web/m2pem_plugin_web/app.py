@@ -19,6 +19,7 @@ from m2pem_plugin_web.live.hub import Hub
 from m2pem_plugin_web.live.standbys import Standbys
 from m2pem_plugin_web.pages import Pages
 from m2pem_plugin_web.problems import ProblemModel, handle_problems
+from m2pem_plugin_web.replay.replays import Replays
 from m2pem_plugin_web.rest import (
     alerts,
     approvals,
@@ -31,6 +32,7 @@ from m2pem_plugin_web.rest import (
     missions,
     people,
     rehearsals,
+    replays,
     run_pages,
     runs,
     schedule,
@@ -52,7 +54,12 @@ OPENAPI = "/api/openapi.json"
 
 
 def routers_of(
-    services: Services, settings: Settings, hub: Hub, entry: Entry, recorder: Recorder
+    services: Services,
+    settings: Settings,
+    hub: Hub,
+    entry: Entry,
+    recorder: Recorder,
+    replaying: Replays,
 ) -> list[APIRouter]:
     """Return the routers of the REST interface, the WebSocket and the page."""
     control, folder = services.control, services.folder
@@ -61,6 +68,7 @@ def routers_of(
         session.router(control, settings, entry, tiles.pictured if tiles is not None else None),
         runs.router(control, folder),
         run_pages.router(control),
+        replays.router(control, replaying, services.rehearsals),
         schedule.router(control, folder),
         tracks.router(control, recorder),
         steering.router(control, hub),

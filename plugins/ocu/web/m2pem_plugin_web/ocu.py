@@ -47,6 +47,7 @@ class WebOcu:
         from m2pem_plugin_web.access.video_origins import origins_of  # noqa: PLC0415
         from m2pem_plugin_web.app import create_app, routers_of  # noqa: PLC0415
         from m2pem_plugin_web.live.hub import Hub  # noqa: PLC0415
+        from m2pem_plugin_web.replay.replays import Replays  # noqa: PLC0415
         from m2pem_plugin_web.server import Server  # noqa: PLC0415
         from m2pem_plugin_web.services import services_of  # noqa: PLC0415
         from m2pem_plugin_web.tracks.recorder import Recorder  # noqa: PLC0415
@@ -59,13 +60,16 @@ class WebOcu:
         """The address of the page, with the valid token if there is one."""
         try:
             entry = self._entry(settings)
-            self.hub = Hub(control)
+            self._replays = Replays(control)
+            self.hub = Hub(control, self._replays.recordings)
             store = store_beside(control.journal_file())
             self._recorder = Recorder(control, self.hub.follower.views, self.hub.fleet, store)
             self._services = services_of(control, settings.missions)
 
             def app() -> "ASGIApp":
-                routers = routers_of(self._services, settings, self.hub, entry, self._recorder)
+                routers = routers_of(
+                    self._services, settings, self.hub, entry, self._recorder, self._replays
+                )
                 videos = origins_of(control.fleet())
                 slots, standbys = self._server.slots, self.hub.standbys
                 return create_app(routers, entry, settings, slots, standbys, videos)
@@ -90,6 +94,7 @@ class WebOcu:
             async with asyncio.TaskGroup() as tasks:
                 tasks.create_task(self.hub.run(), name="web: hub")
                 tasks.create_task(self._recorder.run(), name="web: recorder")
+                tasks.create_task(self._replays.run(), name="web: replays")
                 tasks.create_task(self._server.serve(app), name="web: server")
         finally:
             self._server.close()

@@ -40,6 +40,7 @@ from m2pem_plugin_web.live.latest_states import FleetStates, LatestStates
 from m2pem_plugin_web.live.live_run import LiveRun, command
 from m2pem_plugin_web.live.standbys import Standbys
 from m2pem_plugin_web.live.viewer import Unsent, Viewer
+from m2pem_plugin_web.replay.replays import Recordings
 
 FRAME_S = 0.04
 
@@ -58,14 +59,15 @@ _encode = msgspec.json.Encoder().encode
 
 class Hub(Listener):
     """All browsers and their watched runs. It needs all records: create it before the executive
-    runs."""
+    runs. `recordings`: the indexes of runs that go on; None: none are made."""
 
-    def __init__(self, control: MissionControl) -> None:
+    def __init__(self, control: MissionControl, recordings: Recordings | None = None) -> None:
         self.viewers: set[Viewer] = set()
         self.runs: dict[RunId, LiveRun] = {}
         self.follower = follow(control, self)
         self.fleet = FleetStates(control, self._lost)
         self.standbys = Standbys(control)
+        self._recordings = recordings
         self._control = control
         self._holders: dict[str, str] = {}
         self._holders_at = 0.0
@@ -136,7 +138,10 @@ class Hub(Listener):
         self.runs[view.run] = LiveRun(view)
 
     def recorded(self, view: RunView, stamped: StampedRecord, *, is_new: bool) -> None:
-        """Send faults that the mission does not handle to every page."""
+        """Index the record for a replay; send faults that the mission does not handle to every
+        page."""
+        if self._recordings is not None:
+            self._recordings.recorded(view, stamped)
         if is_new and type(stamped.record) in FAULT_RECORDS and _is_fault(stamped.record):
             text = describe(stamped, view).text
             own = text.startswith(f"{view.run} ")

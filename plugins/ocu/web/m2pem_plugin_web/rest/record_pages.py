@@ -74,11 +74,12 @@ def new_view(
 def page_of(page: Sequence[StampedRecord], view: RunView, limit: int) -> bytes:
     """Apply the records of a page to the view before it; return them as JSON."""
     after_next = page[-1].seq if len(page) >= limit else None
-    records = [msgspec.Raw(each) for each in _with_changes(page, view)]
+    records = [msgspec.Raw(each) for each in with_changes(page, view)]
     return _encode({"records": records, "next": after_next})
 
 
-def _with_changes(page: Iterable[StampedRecord], view: RunView) -> Iterable[bytes]:
+def with_changes(page: Iterable[StampedRecord], view: RunView) -> Iterable[bytes]:
+    """Apply records to the view before them; yield each as JSON, with what it changes."""
     changes = view.changes = Changes()
     for stamped in page:
         status = view.status

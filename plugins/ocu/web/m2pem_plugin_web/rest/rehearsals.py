@@ -113,10 +113,10 @@ def router(
         limit: Annotated[int, Query(ge=1, le=MOST_RECORDS)] = 1000,
     ) -> Response:
         """Its records after one of them: 0, or the `next` of the page before."""
-        result = _result(jobs.get(identifier))
+        result = result_of(jobs.get(identifier))
 
         def page() -> bytes:
-            view = new_view(result.summary, names=_names(control, result.files))
+            view = new_view(result.summary, names=names_of(control, result.files))
             for stamped in result.records[:after]:
                 view.apply(stamped)
             return page_of(result.records[after : after + limit], view, limit)
@@ -127,7 +127,7 @@ def router(
     @routes.get("/{identifier}/mission")
     async def mission(_: Viewer, identifier: str) -> RunMissionModel:
         """What was rehearsed: its file, and those that it calls into."""
-        result = _result(jobs.get(identifier))
+        result = result_of(jobs.get(identifier))
         return RunMissionModel(
             name=result.summary.mission,
             process=result.summary.process,
@@ -139,7 +139,7 @@ def router(
         """Where the vehicles were, over mission time."""
         samples: Sequence[Any] = [
             {"t": each.t_s, "vehicles": each.vehicles, "payloads": each.payloads}
-            for each in _result(jobs.get(identifier)).telemetry
+            for each in result_of(jobs.get(identifier)).telemetry
         ]
         return Response(_encode(samples), media_type="application/json")
 
@@ -151,7 +151,7 @@ def _microseconds(moment: datetime) -> int:
     return (since.days * 86_400 + since.seconds) * 1_000_000 + since.microseconds
 
 
-def _names(control: MissionControl, files: Iterable[MissionFile]) -> dict[str, str]:
+def names_of(control: MissionControl, files: Iterable[MissionFile]) -> dict[str, str]:
     """Return the names of what the files define, by the ids that records have."""
     names = {}
     for file in files:
@@ -164,7 +164,12 @@ def _names(control: MissionControl, files: Iterable[MissionFile]) -> dict[str, s
     return names
 
 
-def _result(job: Job[SimulationResult]) -> SimulationResult:
+def result_of(job: Job[SimulationResult]) -> SimulationResult:
+    """Return the result of a rehearsal.
+
+    Raises:
+        ProblemError: 409, it is not done.
+    """
     if job.result is None:
         raise ProblemError(409, f"the rehearsal is {job.state}")
     return job.result

@@ -23,7 +23,8 @@ MEMORY_BYTES = 2_000_000
 """The most bytes of the track of a run."""
 
 _RUN = re.compile(r"r[1-9][0-9]{0,17}")
-_SUFFIX = ".jsonl"
+TRACKS = ".jsonl"
+"""How the names of files of tracks end."""
 _CLOSED = -1
 
 
@@ -90,10 +91,14 @@ def store_beside(journal: Path | None) -> TrackStore:
 
 
 class FolderStore:
-    """A file for each run, which only its owner may read. `path` is made when needed."""
+    """A file for each run, which only its owner may read. `path` is made when needed.
 
-    def __init__(self, path: Path, most_bytes: int = FILE_BYTES) -> None:
+    `suffix`: how names of the files end.
+    """
+
+    def __init__(self, path: Path, most_bytes: int = FILE_BYTES, suffix: str = TRACKS) -> None:
         self._path = path
+        self._suffix = suffix
         self.most_bytes = most_bytes
 
     def open(self, run: RunId) -> "TextFile":
@@ -101,9 +106,7 @@ class FolderStore:
         file = self._file(run)
         self._path.mkdir(mode=0o700, exist_ok=True)
         if self._path.lstat().st_uid != os.geteuid():
-            raise PermissionError(
-                errno.EPERM, "the folder of tracks belongs to another user", self._path
-            )
+            raise PermissionError(errno.EPERM, "the folder belongs to another user", self._path)
         return TextFile(file)
 
     def read(self, run: RunId, size: int = -1) -> bytes:
@@ -116,7 +119,9 @@ class FolderStore:
 
     def runs(self) -> Iterable[RunId]:
         """See `TrackStore.runs`: files of others are left alone."""
-        return [path.stem for path in self._path.glob(f"*{_SUFFIX}") if _RUN.fullmatch(path.stem)]
+        return [
+            path.stem for path in self._path.glob(f"*{self._suffix}") if _RUN.fullmatch(path.stem)
+        ]
 
     def remove(self, run: RunId) -> None:
         """See `TrackStore.remove`."""
@@ -125,7 +130,7 @@ class FolderStore:
     def _file(self, run: RunId) -> Path:
         if not _RUN.fullmatch(run):
             raise OSError(errno.EINVAL, f"{run!r} is not the id of a run")
-        return self._path / f"{run}{_SUFFIX}"
+        return self._path / f"{run}{self._suffix}"
 
 
 class TextFile:
