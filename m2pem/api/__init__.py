@@ -157,7 +157,7 @@ if TYPE_CHECKING:
     from m2pem.fleet.behaviors import SHARED
     from m2pem.fleet.endurance import lasts_s
     from m2pem.fleet.fleet import Fleet
-    from m2pem.geo.cameras import ImagePlan, SurveyCamera, image_plan
+    from m2pem.geo.cameras import KNOWN_CAMERAS, ImagePlan, SurveyCamera, image_plan
     from m2pem.geo.fence import Fence
     from m2pem.geo.geojson import GeometryError, as_geojson, kind_of, parse_geojson
     from m2pem.geo.geometry_files import (
@@ -173,7 +173,13 @@ if TYPE_CHECKING:
     from m2pem.geo.local_frame import EastNorth, LatLon, LocalFrame, distance_m, offset
     from m2pem.geo.polygon import convex_hull, edges_enclose, middle_of
     from m2pem.geo.polyline import Polyline, Segment
-    from m2pem.geo.survey_pattern import Surveyor, SurveyPattern, SurveyRoute, survey_routes
+    from m2pem.geo.survey_pattern import (
+        Surveyor,
+        SurveyPattern,
+        SurveyRoute,
+        best_heading_rad,
+        survey_routes,
+    )
     from m2pem.geo.survey_tracks import SurveyTracks
     from m2pem.geo.terrain import (
         TERRAIN_FOLDER,
@@ -276,7 +282,7 @@ _MODULES = {
     "m2pem.mission.geometry": "Area Point Route VehiclePosition",
     "m2pem.mission.values": "Value",
     "m2pem.fleet.behaviors": "SHARED",
-    "m2pem.geo.cameras": "ImagePlan SurveyCamera image_plan",
+    "m2pem.geo.cameras": "ImagePlan KNOWN_CAMERAS SurveyCamera image_plan",
     "m2pem.geo.fence": "Fence",
     "m2pem.fleet.endurance": "lasts_s",
     "m2pem.fleet.approval": "file_digest person_of",
@@ -290,7 +296,7 @@ _MODULES = {
     "m2pem.geo.local_frame": "EastNorth LatLon LocalFrame distance_m offset",
     "m2pem.geo.polygon": "convex_hull edges_enclose middle_of",
     "m2pem.geo.polyline": "Polyline Segment",
-    "m2pem.geo.survey_pattern": "SurveyPattern SurveyRoute Surveyor survey_routes",
+    "m2pem.geo.survey_pattern": "SurveyPattern SurveyRoute Surveyor best_heading_rad survey_routes",
     "m2pem.geo.survey_tracks": "SurveyTracks",
     "m2pem.geo.terrain": ("ProfilePoint TERRAIN_FOLDER Terrain TerrainError lowest profile"),
     "m2pem.suggestions": "did_you_mean",
@@ -468,11 +474,13 @@ __all__ = [
     "StampedRecord",
     "SubscriptionStatistics",
     "ImagePlan",
+    "KNOWN_CAMERAS",
     "SurveyCamera",
     "SurveyPattern",
     "SurveyRoute",
     "SurveyTracks",
     "Surveyor",
+    "best_heading_rad",
     "image_plan",
     "lasts_s",
     "lowest",

@@ -206,7 +206,20 @@ _TABLE = (
     OwnElement(
         "geometry",
         "A route, area or point of the mission, which parameters name.",
-        (Attribute("name", Type.NAME, "its name, instead of the fleet's of that name"),),
+        (
+            Attribute("name", Type.NAME, "its name, instead of the fleet's of that name"),
+            Attribute(
+                "survey",
+                Type.TEXT,
+                "the [survey pattern](survey-patterns.md) that a route was made by, as JSON; "
+                "editors make it again by that",
+            ),
+            Attribute(
+                "surveyor",
+                Type.NAME,
+                "the vehicle whose part of the survey the route is, if the pattern names vehicles",
+            ),
+        ),
         text="GeoJSON, as in a [fleet's files](fleets.md#routes-areas-and-points)",
         places=("process",),
         prefixed=False,

@@ -1,5 +1,6 @@
 """What a camera that looks straight down sees: spacing, trigger distance and ground resolution."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 
@@ -12,6 +13,20 @@ class SurveyCamera:
     focal_length_mm: float
     image_width_px: int
     image_height_px: int
+
+
+KNOWN_CAMERAS: Mapping[str, SurveyCamera] = {
+    "Canon EOS-M, 22 mm": SurveyCamera(22.3, 14.9, 22.0, 5184, 3456),
+    "Canon PowerShot S100, 5.2 mm": SurveyCamera(7.6, 5.7, 5.2, 4000, 3000),
+    "DJI Mavic 2 Pro": SurveyCamera(13.2, 8.8, 10.26, 5472, 3648),
+    "DJI Phantom 4 Pro": SurveyCamera(13.2, 8.8, 8.8, 5472, 3648),
+    "DJI Zenmuse P1, 35 mm": SurveyCamera(35.9, 24.0, 35.0, 8192, 5460),
+    "MicaSense RedEdge": SurveyCamera(4.8, 3.6, 5.5, 1280, 960),
+    "Sony a6000, 16 mm": SurveyCamera(23.5, 15.6, 16.0, 6000, 4000),
+    "Sony DSC-RX1R II, 35 mm": SurveyCamera(35.9, 24.0, 35.0, 7952, 5304),
+    "Sony QX1, 16 mm": SurveyCamera(23.2, 15.4, 16.0, 5456, 3632),
+}
+"""Cameras of surveys, with the numbers of their makers' data sheets."""
 
 
 @dataclass(frozen=True, slots=True)

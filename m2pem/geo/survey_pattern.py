@@ -8,7 +8,7 @@ kept out. Several vehicles get passes in a row, by their speeds.
 import heapq
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any, TypeAlias
 
@@ -34,6 +34,7 @@ _AROUND_M = 0.05
 """How far from its corners a way leads around it, beside the clearance."""
 
 _SHORTEST_M = 0.01
+_SAME_HEADING_RAD = 1e-6
 _ROW_DIGITS = 4
 
 Pass: TypeAlias = tuple[EastNorth, EastNorth]
@@ -98,17 +99,9 @@ def survey_routes(pattern: SurveyPattern, surveyors: Sequence[Surveyor]) -> list
     """
     if not surveyors:
         raise GeometryError("a survey needs a vehicle")
-    if not 0 < pattern.spacing_m < math.inf:
-        raise GeometryError(f"spacing: {pattern.spacing_m:g} m is not above 0")
     for each in surveyors:
         if not 0 < each.speed_m_s < math.inf:
             raise GeometryError(f"{each.name or 'speed'}: {each.speed_m_s:g} m/s is not above 0")
-    if sum(len(ring) for each in (pattern.area, *pattern.keep_out) for ring in each.rings) > (
-        MAX_CORNERS
-    ):
-        raise GeometryError(
-            f"the area and what is kept out have more than {MAX_CORNERS} corners: simplify them"
-        )
     frame = LocalFrame(pattern.area.rings[0][0][:2])
     ground = _Ground.of(pattern, frame)
     yaw = _yaw(pattern, ground)
@@ -126,6 +119,19 @@ def survey_routes(pattern: SurveyPattern, surveyors: Sequence[Surveyor]) -> list
     return routes
 
 
+def best_heading_rad(pattern: SurveyPattern) -> float:
+    """Return the heading of the passes with the fewest turns: from true north, clockwise, from 0 to
+    below pi, as a pass is flown both ways.
+
+    Raises:
+        GeometryError: as `survey_routes`.
+    """
+    free = replace(pattern, heading_rad=None)
+    frame = LocalFrame(pattern.area.rings[0][0][:2])
+    heading = (math.pi / 2 - _yaw(free, _Ground.of(free, frame))) % math.pi
+    return 0.0 if math.pi - heading < _SAME_HEADING_RAD else heading
+
+
 @dataclass
 class _Ground:
     """What is surveyed and what is kept out, in metres. `inner`: where no way is."""
@@ -138,6 +144,18 @@ class _Ground:
 
     @classmethod
     def of(cls, pattern: SurveyPattern, frame: LocalFrame) -> "_Ground":
+        """Return it in the frame.
+
+        Raises:
+            GeometryError: the spacing is not above 0, or there are too many corners.
+        """
+        if not 0 < pattern.spacing_m < math.inf:
+            raise GeometryError(f"spacing: {pattern.spacing_m:g} m is not above 0")
+        areas = (pattern.area, *pattern.keep_out)
+        if sum(len(ring) for each in areas for ring in each.rings) > MAX_CORNERS:
+            raise GeometryError(
+                f"the area and what is kept out have more than {MAX_CORNERS} corners: simplify them"
+            )
         outer, *holes = (_polygon(ring, frame) for ring in pattern.area.rings)
         obstacles = [*holes, *(_whole(area, frame) for area in pattern.keep_out)]
         closed: BaseGeometry = shapely.union_all(obstacles) if obstacles else shapely.Polygon()

@@ -34,6 +34,12 @@ async def test_a_camera_and_a_speed_give_a_route(tmp_path: Path) -> None:
         first, *_ = route["geojson"]["geometry"]["coordinates"]
         assert first[2] == 60
         assert found["problems"] == []
+        assert found["best_heading_deg"] == pytest.approx(90.0, abs=0.1)  # the field is wide
+        turned = await rest.post("/survey-patterns", {**wanted, "heading_deg": 10})
+        assert turned["best_heading_deg"] == pytest.approx(90.0, abs=0.1)
+        cameras = {each.pop("name"): each for each in await rest.get("/survey-cameras")}
+        known = {name: value for name, value in CAMERA.items() if "overlap" not in name}
+        assert cameras["DJI Phantom 4 Pro"] == known
 
 
 async def test_vehicles_of_the_fleet_share_it(tmp_path: Path) -> None:

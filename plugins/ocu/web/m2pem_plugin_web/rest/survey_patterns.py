@@ -8,6 +8,7 @@ from fastapi import APIRouter
 from pydantic import BaseModel, Field, model_validator
 
 from m2pem.api import (
+    KNOWN_CAMERAS,
     Area,
     GeometryError,
     ImagePlan,
@@ -17,6 +18,7 @@ from m2pem.api import (
     SurveyPattern,
     SurveyRoute,
     as_geojson,
+    best_heading_rad,
     image_plan,
     lasts_s,
     survey_routes,
@@ -31,6 +33,17 @@ Length = Annotated[float, Field(gt=0.0, le=100_000.0, strict=False)]
 Millimetres = Annotated[float, Field(gt=0.0, le=1_000.0, strict=False)]
 Pixels = Annotated[int, Field(gt=0, le=1_000_000)]
 Overlap = Annotated[float, Field(ge=0.0, lt=1.0, strict=False)]
+
+
+class KnownCameraModel(BaseModel):
+    """A camera of a maker: the sensor, the lens and the images."""
+
+    name: str
+    sensor_width_mm: float
+    sensor_height_mm: float
+    focal_length_mm: float
+    image_width_px: int
+    image_height_px: int
 
 
 class CameraModel(Body):
@@ -82,6 +95,7 @@ class SurveyRouteModel(BaseModel):
 
     `vehicle` is "" where none was named. `time_s` is without turns, and null without a speed.
     `lasts_s`: how long the vehicle can go with a full battery and a reserve, null: not known.
+    `battery_fraction`: of a full battery that the route takes, null: not known.
     """
 
     vehicle: str
@@ -91,13 +105,18 @@ class SurveyRouteModel(BaseModel):
     surveyed_m: float
     time_s: float | None
     lasts_s: float | None
+    battery_fraction: float | None
     images: int | None
 
 
 class SurveyRoutesModel(BaseModel):
-    """The routes; `problems`: vehicles whose routes take longer than they last."""
+    """The routes; `problems`: vehicles whose routes take longer than they last.
+
+    `best_heading_deg`: of the passes with the fewest turns, from 0 to below 180.
+    """
 
     spacing_m: float
+    best_heading_deg: float
     trigger_distance_m: float | None
     ground_resolution_m: float | None
     routes: list[SurveyRouteModel]
@@ -108,6 +127,21 @@ def router(control: MissionControl) -> APIRouter:
     """The route of survey patterns."""
     routes = APIRouter(prefix="/api", tags=["geometries"], responses=RESPONSES)
     threads = BoundedThreads()
+
+    @routes.get("/survey-cameras")
+    async def cameras(_: Viewer) -> list[KnownCameraModel]:
+        """Cameras of makers, for the `camera` of a survey pattern."""
+        return [
+            KnownCameraModel(
+                name=name,
+                sensor_width_mm=each.sensor_width_mm,
+                sensor_height_mm=each.sensor_height_mm,
+                focal_length_mm=each.focal_length_mm,
+                image_width_px=each.image_width_px,
+                image_height_px=each.image_height_px,
+            )
+            for name, each in KNOWN_CAMERAS.items()
+        ]
 
     @routes.post("/survey-patterns")
     async def survey(_: Viewer, wanted: PatternModel) -> SurveyRoutesModel:
@@ -132,19 +166,26 @@ def router(control: MissionControl) -> APIRouter:
         )
         surveyors = _surveyors(control, wanted)
         try:
-            found = await threads.run(survey_routes, pattern, surveyors)
+            found, best_rad = await threads.run(_survey, pattern, surveyors)
         except GeometryError as error:
             raise ProblemError(422, str(error)) from None
         timed = bool(wanted.vehicles) or wanted.speed_m_s is not None
         return SurveyRoutesModel(
             spacing_m=pattern.spacing_m,
+            best_heading_deg=math.degrees(best_rad),
             trigger_distance_m=None if images is None else images.trigger_distance_m,
             ground_resolution_m=None if images is None else images.ground_resolution_m,
-            routes=[_model(each, images, timed) for each in found],
+            routes=[_model(control, each, images, timed) for each in found],
             problems=list(_too_long(found)),
         )
 
     return routes
+
+
+def _survey(
+    pattern: SurveyPattern, surveyors: Sequence[Surveyor]
+) -> tuple[list[SurveyRoute], float]:
+    return survey_routes(pattern, surveyors), best_heading_rad(pattern)
 
 
 def _images(wanted: PatternModel) -> ImagePlan | None:
@@ -196,7 +237,12 @@ def _too_long(found: Sequence[SurveyRoute]) -> Sequence[str]:
     ]
 
 
-def _model(found: SurveyRoute, images: ImagePlan | None, timed: bool) -> SurveyRouteModel:
+def _model(
+    control: MissionControl, found: SurveyRoute, images: ImagePlan | None, timed: bool
+) -> SurveyRouteModel:
+    vehicles = control.fleet().vehicles.values()
+    vehicle = next((each for each in vehicles if each.id == found.surveyor.name), None)
+    endurance_s = None if vehicle is None else vehicle.endurance_s
     count = None
     if images is not None:
         count = math.ceil(found.surveyed_m / images.trigger_distance_m) + found.passes
@@ -208,5 +254,6 @@ def _model(found: SurveyRoute, images: ImagePlan | None, timed: bool) -> SurveyR
         surveyed_m=found.surveyed_m,
         time_s=found.time_s if timed else None,
         lasts_s=found.surveyor.lasts_s,
+        battery_fraction=None if endurance_s is None else found.time_s / endurance_s,
         images=count,
     )

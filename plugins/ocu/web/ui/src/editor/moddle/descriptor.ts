@@ -79,7 +79,11 @@ export const m2pemDescriptor = {
       ],
     },
     { name: "Arg", superClass: ["Element"], properties: ["name", "value"].map(attribute) },
-    { name: "Geometry", superClass: ["Element"], properties: [attribute("name"), text] },
+    {
+      name: "Geometry",
+      superClass: ["Element"],
+      properties: [...["name", "survey", "surveyor"].map(attribute), text],
+    },
     { name: "AskingTask", extends: ["bpmn:UserTask", "bpmn:GlobalUserTask"], properties: task },
     {
       name: "ServingTask",
