@@ -345,8 +345,15 @@ class MissionControl(Protocol):
         """
         ...
 
-    async def give_back(self, resource: str, *, by: str = "") -> None:
-        """Give it back to the missions; signals with `m2pem:returned` of it are thrown."""
+    async def give_back(self, resource: str, *, reason: str = "", by: str = "") -> None:
+        """Give it back to the missions; signals with `m2pem:returned` of it are thrown.
+
+        The operator who has it may. Another one gives a `reason`, and is refused while the one who
+        has it is there: see "Handing over" in docs/operating.md. All operators see it then.
+
+        Raises:
+            OperatorError: no operator has it, or `by` may not give it back.
+        """
         ...
 
     async def request_control(self, resource: str, *, by: str = "") -> None:
@@ -381,12 +388,14 @@ class MissionControl(Protocol):
         role: str = "",
         run: RunId = "",
         page: str = "",
+        editing: str = "",
         by: str = "",
     ) -> None:
         """An operator is present at a unit with the id `client`. Units say so each
         `PRESENCE_EVERY_S`; after `ABSENT_AFTER_S` without it the operator counts as gone.
 
-        `run`, `page`: what the unit shows; `role`: what it lets the operator do.
+        `run`, `page`: what the unit shows; `editing`: the mission that is edited there; `role`:
+        what it lets the operator do.
         """
         ...
 

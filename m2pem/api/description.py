@@ -157,7 +157,10 @@ def _operator_took(_: RunView, record: r.OperatorTookControl) -> _Sentence:
 
 
 def _operator_gave_back(_: RunView, record: r.OperatorGaveControlBack) -> _Sentence:
-    return f"{record.resource} given back{_by(record)}", Importance.NORMAL
+    text = f"{record.resource} given back{_by(record)}"
+    if not record.holder:
+        return text, Importance.NORMAL
+    return f"{text}, from {record.holder}{_after_colon(record.reason)}", Importance.WARNING
 
 
 def _control_requested(_: RunView, record: r.ControlRequested) -> _Sentence:

@@ -175,9 +175,17 @@ class DeleteGeometry(OfGeometry, frozen=True):
 
 
 class Resource(Params, frozen=True):
-    """As `MissionControl.take`, `give_back` and `request_control`."""
+    """As `MissionControl.take` and `request_control`."""
 
     resource: str
+    by: str = ""
+
+
+class GiveBack(Params, frozen=True):
+    """As `MissionControl.give_back`."""
+
+    resource: str
+    reason: str = ""
     by: str = ""
 
 
@@ -203,6 +211,7 @@ class AnnouncePresence(Params, frozen=True):
     role: str = ""
     run: str = ""
     page: str = ""
+    editing: str = ""
     by: str = ""
 
 
@@ -410,7 +419,7 @@ OPERATIONS: dict[str, Operation] = {
         Operation("geometry_users", OfGeometry, list[str]),
         Operation("take", Resource),
         Operation("preview_take", Preview, list[TakeEffect]),
-        Operation("give_back", Resource),
+        Operation("give_back", GiveBack),
         Operation("request_control", Resource),
         Operation("answer_control", AnswerControl),
         Operation("control_requests", Nothing, list[OpenControlRequest]),

@@ -20,7 +20,8 @@ class OperatorPresence:
     """An operator is present at a unit: a page, a terminal.
 
     `role`: what the unit lets the operator do; "": it does not say. `run`: what it shows, "": none
-    in particular; `page`: which page. `since_us`: microseconds since the Unix epoch.
+    in particular; `page`: which page; `editing`: the mission that the operator edits there, "":
+    none. `since_us`: microseconds since the Unix epoch.
     """
 
     by: str
@@ -29,11 +30,13 @@ class OperatorPresence:
     run: RunId = ""
     page: str = ""
     since_us: int = 0
+    editing: str = ""
 
     def __str__(self) -> str:
         role = f" ({self.role})" if self.role else ""
-        what = f", watches {self.run}" if self.run else ""
-        return f"{self.by}{role} at {self.unit}{what}"
+        run = f", run {self.run}" if self.run else ""
+        editing = f", edits {self.editing}" if self.editing else ""
+        return f"{self.by}{role}: {self.unit}{run}{editing}"
 
 
 @dataclass(frozen=True, slots=True)

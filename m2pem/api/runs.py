@@ -174,6 +174,9 @@ APPROVAL = "APPROVAL"
 """The code of alerts that say who has approved a mission, or withdrawn it."""
 CONTROL_REQUEST = "CONTROL_REQUEST"
 """The code of alerts that say who asks whom for a vehicle, and how that has ended."""
+CONTROL_FORCED = "CONTROL_FORCED"
+"""The code of the alert of a vehicle that an operator gave back to the missions though another one
+had it."""
 NEWS = frozenset({SCHEDULE, APPROVAL, CONTROL_REQUEST})
 """The codes of alerts that tell what operators have done: nothing is wrong."""
 FACE = "FACE"

@@ -46,7 +46,7 @@ HELP = """\
   schedule hold      hold all of it (hold s1: one entry)
   schedule release   release it
   takeover evsg1     take a vehicle or payload from the missions, to steer it by hand
-  handback evsg1     give it back
+  handback evsg1     give it back; what another operator has who is gone: handback evsg1 REASON
   who                print the holder of each vehicle and payload, and which tasks wait
   runs               list the runs and their states
   quit               leave; missions go on without an operator here
@@ -378,9 +378,9 @@ class PlainOcu:
         self._say(f"{words[0]} is yours; handback {words[0]} gives it back")
 
     async def _give(self, words: list[str]) -> None:
-        if len(words) != 1:
-            raise OperatorError("say which: handback RESOURCE")
-        await self._control.give_back(words[0], by=NAME)
+        if not words:
+            raise OperatorError("say which: handback RESOURCE, or handback RESOURCE REASON")
+        await self._control.give_back(words[0], reason=" ".join(words[1:]), by=NAME)
         self._say(f"{words[0]} is the missions' again")
 
     async def _who(self, _: list[str]) -> None:

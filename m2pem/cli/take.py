@@ -51,19 +51,27 @@ def take(resource: str, yes: bool, asks: bool, journal: str | None, by: str | No
 
 @click.command(epilog=example("m2pem give-back uav1"))
 @click.argument("resource")
+@click.option(
+    "--force",
+    "reason",
+    metavar="REASON",
+    default="",
+    help="Give back what an operator has who is gone; all operators see why.",
+)
 @journal_option
 @by_option
-def give_back(resource: str, journal: str | None, by: str | None) -> None:
+def give_back(resource: str, reason: str, journal: str | None, by: str | None) -> None:
     """Give a vehicle or payload that an operator has taken back to the missions.
 
-    They may command it again from then on: it may move.
+    They may command it again from then on: it may move. Who has it gives it back; others only as
+    docs/operating.md says under "Handing over".
     """
     from m2pem.api.operator import operator_name
     from m2pem.cli.notes import note
     from m2pem.control_socket.client import ask
 
     path = _executive_of(resource, journal)
-    ask(path, "give_back", resource=resource, by=by or operator_name())
+    ask(path, "give_back", resource=resource, reason=reason, by=by or operator_name())
     note(f"{resource} is given back")
 
 

@@ -243,10 +243,13 @@ class ControlTaken(_Input, frozen=True):
 
 
 class ControlReturned(_Input, frozen=True):
-    """An operator has released control of a vehicle or payload to the missions."""
+    """An operator has released control of a vehicle or payload to the missions. `holder`: the one
+    who had it, if `by` is another; `reason`: why `by` did it then."""
 
     resource: str
     by: str
+    holder: str = ""
+    reason: str = ""
 
 
 class RequestOutcome(StrEnum):

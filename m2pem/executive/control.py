@@ -152,6 +152,7 @@ class Control:
         by: str = "",
     ) -> RunId:
         """Command one behavior from outside of a mission."""
+        self._supervisor.seen(by)
         return await self._direct.execute(resource, behavior, _bounded(parameters) or {}, by)
 
     async def missions(self) -> Sequence[str]:
@@ -376,26 +377,28 @@ class Control:
 
     async def take(self, resource: str, *, by: str = "") -> None:
         """Take a vehicle or payload from the missions."""
+        self._supervisor.seen(by)
         await self._direct.take(resource, by)
 
     async def preview_take(self, resource: str) -> Sequence[TakeEffect]:
         """What `take` of a resource would end now."""
         return self._supervisor.handover.preview(resource, self._supervisor.runners.values())
 
-    async def give_back(self, resource: str, *, by: str = "") -> None:
+    async def give_back(self, resource: str, *, reason: str = "", by: str = "") -> None:
         """Give it back to the missions."""
-        supervisor = self._supervisor
-        try:
-            await supervisor.handover.give_back(resource, by, supervisor.runners.values())
-        finally:  # also if a run could not be told
-            await supervisor.control_requests.returned(resource, by)
+        self._supervisor.seen(by)
+        await self._supervisor.control_release.give_back(
+            resource, by, reason, self._supervisor.runners.values()
+        )
 
     async def request_control(self, resource: str, *, by: str = "") -> None:
         """Ask the operator who has a vehicle or payload for it."""
+        self._supervisor.seen(by)
         await self._supervisor.control_requests.ask(resource, by)
 
     async def answer_control(self, resource: str, *, give: bool, by: str = "") -> None:
         """Give a vehicle or payload to the operator who asks for it, or refuse."""
+        self._supervisor.seen(by)
         await self._supervisor.control_requests.answer(resource, by, give=give)
 
     async def control_requests(self) -> Sequence[OpenControlRequest]:
@@ -410,10 +413,12 @@ class Control:
         role: str = "",
         run: RunId = "",
         page: str = "",
+        editing: str = "",
         by: str = "",
     ) -> None:
         """An operator is present at a unit."""
-        presence = OperatorPresence(by or UNNAMED_OPERATOR, unit, role, run, page)
+        name = by or UNNAMED_OPERATOR
+        presence = OperatorPresence(name, unit, role, run, page, editing=editing)
         self._supervisor.presence.announce(client, presence)
 
     async def end_presence(self, client: str) -> None:

@@ -60,6 +60,7 @@ class ControlRequests:
         self._publish = publish
         self._changed = changed
         self._open: dict[ResourceId, _Open] = {}
+        self._unanswered: dict[ResourceId, str] = {}
 
     def all(self) -> list[OpenControlRequest]:
         """Return the requests that are open."""
@@ -121,9 +122,22 @@ class ControlRequests:
             outcome = RequestOutcome.GIVEN if give else RequestOutcome.REFUSED
         await self._end(resource, outcome, by)
 
+    def left_unanswered(self, name: str) -> bool:
+        """Return whether the operator who has a resource has let the last request for it expire."""
+        resource = ResourceId(name)
+        holder = self._handover.taken.get(resource)
+        return holder is not None and self._unanswered.get(resource) == holder
+
+    def seen(self, by: str) -> None:
+        """An operator has commanded something: what was left unanswered before does not count."""
+        for resource, holder in list(self._unanswered.items()):
+            if person_of(holder) == person_of(by):
+                del self._unanswered[resource]
+
     async def returned(self, name: str, by: str) -> None:
         """A resource was given back to the missions: no operator has it, who could be asked."""
         resource = ResourceId(name)
+        self._unanswered.pop(resource, None)
         request = self._open.get(resource)
         if request is not None and self._was_returned(resource, request):
             await self._end(resource, RequestOutcome.RETURNED, by)
@@ -162,6 +176,9 @@ class ControlRequests:
 
     async def _end(self, resource: ResourceId, outcome: RequestOutcome, by: str) -> None:
         request = self._open.pop(resource)
+        self._unanswered.pop(resource, None)
+        if outcome is RequestOutcome.EXPIRED:
+            self._unanswered[resource] = request.holder
         if request.timer is not None and request.timer is not asyncio.current_task():
             request.timer.cancel()
         if outcome is RequestOutcome.GIVEN:

@@ -89,22 +89,23 @@ class Handover:
         token = state.tokens[behavior.token]
         return error_policy(state, self._fleet, token) is ErrorPolicy.INCIDENT
 
-    async def give_back(self, name: str, by: str, runners: Iterable[Runner]) -> None:
-        """Give a resource back to the missions.
-
-        Raises:
-            OperatorError: no operator has it.
-        """
-        resource = self.known(name)
-        if resource not in self.taken:
-            raise OperatorError(f"{resource} is not with an operator")
+    async def give_back(
+        self,
+        resource: ResourceId,
+        by: str,
+        runners: Iterable[Runner],
+        holder: str = "",
+        reason: str = "",
+    ) -> None:
+        """Give what an operator has back to the missions. `holder`: the operator who has it, if
+        `by` is another; `reason`: why, then."""
         del self.taken[resource]
         self._availability.restore(resource)
         if why := self.why_not_free(resource):
             self._availability.withdraw(resource, why)
         for runner in list(runners):
             if not runner.done.is_set():
-                await runner.submit(ControlReturned(resource, by or UNNAMED_OPERATOR))
+                await runner.submit(ControlReturned(resource, by, holder, reason))
 
     def pass_on(self, resource: ResourceId, to: str) -> None:
         """Another operator has a resource from now on that an operator has."""

@@ -1,6 +1,7 @@
 """Which operators are present: as their control units announce it again and again."""
 
 import asyncio
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -18,12 +19,17 @@ class _Announced:
 
 class Presence:
     """The operators who are present. `now_us`: the executive's clock; how long one was silent
-    counts by the event loop's. `changed`: is called when it is no more what it was."""
+    counts by the event loop's. `changed`: is called when it is no more what it was.
+
+    An operator who commands something is there, though at no unit that announces it: how long one
+    is gone counts from the last command, too.
+    """
 
     def __init__(self, now_us: Callable[[], int], changed: Callable[[], None]) -> None:
         self._now_us = now_us
         self._changed = changed
         self._units: dict[str, _Announced] = {}
+        self._seen_s: dict[str, float] = {}
 
     def announce(self, client: str, presence: OperatorPresence) -> None:
         """An operator is present at a unit, and was not gone since the last time. `client`: the id
@@ -41,8 +47,23 @@ class Presence:
 
     def leave(self, client: str) -> None:
         """A unit has ended."""
-        if self._units.pop(client, None) is not None:
+        left = self._units.pop(client, None)
+        if left is not None:
+            self.seen(left.presence.by)
             self._changed()
+
+    def seen(self, by: str) -> None:
+        """An operator has commanded something, or left a unit just now."""
+        self._note(by, asyncio.get_running_loop().time())
+
+    def _note(self, by: str, at_s: float) -> None:
+        """Note when an operator was there; of more than `MOST_UNITS`, the one before all others is
+        forgotten: its vehicles can be given back at once."""
+        person = person_of(by)
+        at_s = max(at_s, self._seen_s.pop(person, at_s))
+        while len(self._seen_s) >= MOST_UNITS:
+            del self._seen_s[next(iter(self._seen_s))]
+        self._seen_s[person] = at_s
 
     def present(self) -> list[OperatorPresence]:
         """Return who is present, in the order of their names."""
@@ -55,9 +76,18 @@ class Presence:
         person = person_of(by)
         return all(person_of(each.by) != person for each in self.present())
 
+    def gone_s(self, by: str) -> float:
+        """Return for how long an operator is at no unit and has commanded nothing, in seconds; 0
+        while one announces it."""
+        if not self.is_gone(by):
+            return 0.0
+        now_s = asyncio.get_running_loop().time()
+        return now_s - self._seen_s.get(person_of(by), -math.inf)
+
     def _forget(self, now_s: float) -> None:
         gone = [key for key, each in self._units.items() if now_s - each.at_s > ABSENT_AFTER_S]
         for key in gone:
-            del self._units[key]
+            left = self._units.pop(key)
+            self._note(left.presence.by, left.at_s)
         if gone:
             self._changed()

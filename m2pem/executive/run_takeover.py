@@ -96,6 +96,8 @@ class RunTakeover:
         await supervisor.dispatcher.fence(number, epoch)
         taken_before, requests = control_of(run.state)
         supervisor.handover.take_up(taken_before)
+        for holder in taken_before.values():
+            supervisor.seen(holder)
         supervisor.control_requests.take_up(requests)
         outage_s = self._outage_s(number, last_us)
         lent = supervisor.handover.lent_to(run.state)

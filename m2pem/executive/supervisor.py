@@ -43,6 +43,7 @@ from m2pem.executive.behavior_lifecycle import (
 )
 from m2pem.executive.behavior_reports import reported
 from m2pem.executive.control_events import ControlEvents, RecordObservers
+from m2pem.executive.control_release import ControlRelease
 from m2pem.executive.control_requests import ControlRequests
 from m2pem.executive.counts import RunCounts
 from m2pem.executive.dispatcher import Dispatcher
@@ -193,6 +194,9 @@ class Supervisor:
             events.publish,
             lambda: events.publish(OperatorsChanged()),
         )
+        self.control_release = ControlRelease(
+            arbiters.fleet, self.handover, self.control_requests, self.presence, events.publish
+        )
         self.losses = JournalLossPrompts(
             journal,
             arbiters,
@@ -285,6 +289,11 @@ class Supervisor:
             if not runner.done.is_set() or runner.failure is not None:  # that one is held
                 self.replaced(runner.id, why)
         await asyncio.gather(*self._tasks.values())
+
+    def seen(self, by: str) -> None:
+        """An operator has commanded something, so is not gone."""
+        self.presence.seen(by)
+        self.control_requests.seen(by)
 
     async def end_calls(self) -> None:
         """Let go of lost resources, services and calls of arbiters, once every run has ended."""

@@ -166,7 +166,9 @@ class Fleet:
     every operator has every role. `approval_persons`: how many persons other than its last editor
     must have approved a mission before it starts; 0: none. `approval_role`: which operators may
     approve; "": all. `control_answer_s`: how long an operator who is asked for a vehicle or payload
-    may take to answer; `control_unanswered`: what becomes of it then. `hosts`: the other computers
+    may take to answer; `control_unanswered`: what becomes of it then. `control_gone_after_s`: after
+    how long at no unit an operator counts as gone, so that others may give back what that operator
+    has; `supervisor_role`: which operators may at any time, "": none. `hosts`: the other computers
     that arbiters run on, by name. `faces`: the settings of each face; `videos`: of cameras that
     operators can look through. No run depends on them, and no journal has them.
     """
@@ -201,6 +203,8 @@ class Fleet:
     approval_role: str = ""
     control_answer_s: float = 30.0
     control_unanswered: Unanswered = Unanswered.KEEP
+    control_gone_after_s: float = 60.0
+    supervisor_role: str = ""
     hosts: Mapping[str, Host] = field(default_factory=dict)
     faces: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     videos: Mapping[ResourceId, Video] = field(default_factory=dict)

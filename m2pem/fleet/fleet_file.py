@@ -177,6 +177,7 @@ def _check_roles(source: YamlSource) -> None:
     for path, role in (
         (("incident_role",), source.mapping().get("incident_role")),
         (("approval", "role"), source.mapping("approval").get("role")),
+        (("hand_over", "supervisor"), source.mapping("hand_over").get("supervisor")),
     ):
         if isinstance(role, str) and operators and role not in operators:
             hint = suggest(role, operators, "roles")
@@ -336,6 +337,8 @@ def _build(source: YamlSource, model: FleetModel, geometries: dict[str, Geometry
         approval_role=(model.approval.role if model.approval else None) or "",
         control_answer_s=handing_over.answer_within,
         control_unanswered=Unanswered(handing_over.unanswered),
+        control_gone_after_s=handing_over.gone_after,
+        supervisor_role=handing_over.supervisor or "",
         hosts={name: _host(source, name, each) for name, each in model.hosts.items()},
         faces={name: settings or {} for name, settings in model.faces.items()},
         videos={

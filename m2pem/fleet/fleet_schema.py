@@ -358,6 +358,17 @@ class HandOverModel(_Model):
         Literal["keep", "give"],
         Field(description="Whether one that nobody answers for stays, or goes to who asks."),
     ] = "keep"
+    gone_after: Annotated[
+        Annotated[Duration, Field(gt=0)],
+        Field(
+            description="After how long at no page or terminal others may give back what an "
+            "operator has."
+        ),
+    ] = 60.0
+    supervisor: Annotated[
+        Text | None,
+        Field(description="The role of the operators who may give back what others have."),
+    ] = None
 
 
 class FleetModel(_Model):

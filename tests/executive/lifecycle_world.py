@@ -206,7 +206,7 @@ class World:
         await self.executive.control.take(vehicle, by="ann")
 
     async def give_back(self, vehicle: str) -> None:
-        await self.executive.control.give_back(vehicle)
+        await self.executive.control.give_back(vehicle, by="ann")
 
     async def answer(self, decision: str) -> None:
         for prompt in self.executive.control.prompts():

@@ -152,6 +152,158 @@ def test_the_next_executive_asks_again_and_for_the_whole_time(play):
     assert holders == {"ugv1": "otto"}
 
 
+# --- what another one has -------------------------------------------------------------------------
+
+FORCED = r.OperatorGaveControlBack("ugv1", "otto", "anna", "she has gone home")
+
+
+async def held_by_anna(world: World) -> None:
+    """A run goes on; anna has ugv1, and her page is open."""
+    control = world.executive.control
+    await control.start(ASKS)
+    await control.announce_presence("p1", unit="page", by="anna")
+    await control.take("ugv1", by="anna")
+
+
+async def forced(world: World, by: str = "otto") -> None:
+    await world.executive.control.give_back("ugv1", by=by, reason=" she has gone home ")
+
+
+def returned(world: World) -> list[r.Record]:
+    return [each for each in world.seen if isinstance(each, r.OperatorGaveControlBack)]
+
+
+def test_only_who_has_a_vehicle_gives_it_back_while_they_are_there(play):
+    async def story(world: World):
+        control = world.executive.control
+        await held_by_anna(world)
+        for by, reason in (("otto", ""), ("otto", "I want it"), ("", "because")):
+            with pytest.raises(OperatorError, match="ugv1 is with anna, who gives it back"):
+                await control.give_back("ugv1", by=by, reason=reason)
+        assert (await control.holders())["ugv1"] == "anna"
+        await control.give_back("ugv1", by="Anna@gcs2")
+        return returned(world), await control.alerts()
+
+    assert play(story, "ugv1") == ([r.OperatorGaveControlBack("ugv1", "Anna@gcs2")], [])
+
+
+def test_what_one_has_who_is_gone_goes_back_with_a_reason_that_all_see(play):
+    chosen = replace(fleet("ugv1"), control_gone_after_s=60.0)
+
+    async def story(world: World):
+        control = world.executive.control
+        await held_by_anna(world)
+        await control.end_presence("p1")
+        await world.clock.sleep(59)
+        with pytest.raises(OperatorError, match=r"at no page or terminal for 60 s \(now: 59 s\)"):
+            await forced(world)
+        await world.clock.sleep(1)
+        with pytest.raises(OperatorError, match="say why you give it back"):
+            await control.give_back("ugv1", by="otto", reason=" ")
+        await forced(world)
+        (alert,) = await control.alerts()
+        return await control.holders(), returned(world), alert.code, alert.text
+
+    holders, records, code, text = play(story, fleet=chosen)
+    assert (holders, records, code) == ({"ugv1": ""}, [FORCED], "CONTROL_FORCED")
+    assert text == "otto has given ugv1 back to the missions, which anna had: she has gone home"
+
+
+def test_one_who_commands_without_a_unit_is_not_gone(play):
+    """At a radio control, or a ground station, that announces no operator."""
+
+    async def story(world: World):
+        control = world.executive.control
+        await control.start(ASKS)
+        await control.take("ugv1", by="anna")
+        await world.clock.sleep(50)
+        await control.execute_behavior("ugv1", "drive_stop", by="anna")
+        await world.clock.sleep(50)
+        with pytest.raises(OperatorError, match="now: 50 s"):
+            await forced(world)
+        await world.clock.sleep(10)
+        await forced(world)
+        return (await control.holders())["ugv1"]
+
+    assert play(story, "ugv1") == "r2.b1"  # what she commanded goes on, and can be stopped
+
+
+def test_a_page_whose_machine_dies_does_not_keep_a_vehicle(play):
+    async def story(world: World):
+        await held_by_anna(world)  # and announces nothing any more
+        await world.clock.sleep(61)
+        await forced(world)
+        return (await world.executive.control.holders())["ugv1"]
+
+    assert play(story, "ugv1") == ""
+
+
+def test_one_who_is_there_and_does_not_answer_is_asked_first(play):
+    """A page may be open, and nobody before it."""
+
+    async def announced(world: World, seconds: int) -> None:
+        for _ in range(seconds // 5):
+            await world.executive.control.announce_presence("p1", unit="page", by="anna")
+            await world.clock.sleep(5)
+
+    async def story(world: World):
+        control = world.executive.control
+        await held_by_anna(world)
+        await control.request_control("ugv1", by="otto")
+        await announced(world, 25)
+        with pytest.raises(OperatorError, match="or leaves a request for it unanswered"):
+            await forced(world)
+        await control.answer_control("ugv1", give=False, by="anna")
+        with pytest.raises(OperatorError, match="who gives it back"):
+            await forced(world)
+        await control.request_control("ugv1", by="otto")
+        await announced(world, 40)
+        await control.execute_behavior("ugv1", "drive_stop", by="anna")
+        with pytest.raises(OperatorError, match="who gives it back"):  # she is at it
+            await forced(world)
+        await control.request_control("ugv1", by="otto")
+        await announced(world, 40)
+        await forced(world)
+        return (await control.holders())["ugv1"]
+
+    assert play(story, "ugv1") == "r2.b1"
+
+
+def test_where_the_fleet_names_supervisors_they_may_at_once_and_others_not(play):
+    operators = {"chief": ("otto",), "pilot": ("anna", "carla")}
+    chosen = replace(fleet("ugv1"), supervisor_role="chief", operators=operators)
+
+    async def story(world: World):
+        control = world.executive.control
+        await held_by_anna(world)
+        await control.request_control("ugv1", by="carla")
+        for _ in range(7):
+            await control.announce_presence("p1", unit="page", by="anna")
+            await world.clock.sleep(5)
+        with pytest.raises(OperatorError, match="for 60 s, or as chief"):
+            await forced(world, "carla")
+        with pytest.raises(OperatorError, match="say why"):
+            await control.give_back("ugv1", by="otto")
+        await forced(world)
+        return returned(world)
+
+    assert play(story, fleet=chosen) == [FORCED]
+
+
+def test_after_a_restart_the_time_of_one_who_is_gone_begins_again(play):
+    journal = left_behind(ASKS, ControlTaken("ugv1", "anna"))
+
+    async def story(world: World):
+        await world.executive.resume("r1")
+        with pytest.raises(OperatorError, match="for 60 s, or"):
+            await forced(world)
+        await world.clock.sleep(60)
+        await forced(world)
+        return (await world.executive.control.holders())["ugv1"]
+
+    assert play(story, "ugv1", journal=journal) == ""
+
+
 # --- who is present -------------------------------------------------------------------------------
 
 
@@ -174,7 +326,7 @@ def test_who_is_present_is_known_until_their_unit_says_nothing(play):
         return first, second, there, (await control.control_requests())[0].holder_gone
 
     first, second, there, gone = play(story, "ugv1")
-    assert first == ["anna (operator) at page, watches r1", "anna@gcs1 at terminal"]
+    assert first == ["anna (operator): page, run r1", "anna@gcs1: terminal"]
     assert (second, there, gone) == (["terminal"], False, True)
 
 

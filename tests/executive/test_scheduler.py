@@ -295,7 +295,7 @@ def test_a_vehicle_that_an_operator_has_or_whose_link_is_lost_is_waited_for():
         await world.schedule(drive("ugv1"))
         await world.at(5)
         taken = (await world.entry("s1")).reason
-        await control.give_back("ugv1")
+        await control.give_back("ugv1", by="bob")
         world.say("ugv1", link=LinkState.LOST)
         await world.at(10)
         return taken, await world.entry("s1")

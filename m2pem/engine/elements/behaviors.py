@@ -397,7 +397,7 @@ def control_returned(x: Execution, item: i.ControlReturned) -> None:
     if item.resource not in x.state.taken:
         x.ignore(f"{item.resource} is not with an operator")
         return
-    x.emit(r.OperatorGaveControlBack(item.resource, item.by))
+    x.emit(r.OperatorGaveControlBack(item.resource, item.by, item.holder, item.reason))
     for signal in x.mission.signals.values():
         if signal.returned == item.resource:
             x.emit(r.SignalThrown(signal.id, by=item.by))

@@ -78,10 +78,13 @@ class OperatorTookControl(BaseRecord, frozen=True):
 
 
 class OperatorGaveControlBack(BaseRecord, frozen=True):
-    """The operator has released control of `resource` to the missions."""
+    """The operator has released control of `resource` to the missions. `holder`: the operator who
+    had it, if `by` is another; `reason`: why `by` did it then."""
 
     resource: str
     by: str
+    holder: str = ""
+    reason: str = ""
 
 
 class ControlRequested(BaseRecord, frozen=True):

@@ -75,7 +75,7 @@ class Services:
             (srv.SetArea, "set_area", requests.set_area),
             (srv.SetWaypoints, "set_waypoints", requests.set_waypoints),
             (srv.TakeVehicle, "take_vehicle", _operation("take")),
-            (srv.GiveBackVehicle, "give_back_vehicle", _operation("give_back")),
+            (srv.GiveBackVehicle, "give_back_vehicle", _operation("give_back", reason="")),
             (srv.AnswerPrompt, "answer_prompt", self._answer_prompt),
         ):
             self._offer(service_type, name, handler, SEVERAL)
@@ -144,8 +144,8 @@ class Services:
             response.runs.append(messages.run_status(summary, time_s))
 
 
-def _operation(name: str) -> Handler:
+def _operation(name: str, **parameters: Any) -> Handler:
     async def handler(control: MissionControl, request: Any, _: Any) -> None:
-        await requests.carry_out(control, name, request)
+        await requests.carry_out(control, name, request, **parameters)
 
     return handler

@@ -12,13 +12,14 @@ from m2pem.errors import M2pemError
 from m2pem_plugin_terminal.alerting import Alerting
 from m2pem_plugin_terminal.dialogs import Choice, Choose, Read, help_text
 from m2pem_plugin_terminal.direct_commands import DirectCommands
+from m2pem_plugin_terminal.people import People
 from m2pem_plugin_terminal.shared_space import TITLE as TITLE_SPACE
 from m2pem_plugin_terminal.shared_space import space_text
 from m2pem_plugin_terminal.starting import Starting
 from m2pem_plugin_terminal.status_lines import STOP_ALL
 
 
-class TerminalApp(Starting, Alerting, DirectCommands):
+class TerminalApp(Starting, Alerting, People, DirectCommands):
     """The display with its keys."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
@@ -35,6 +36,8 @@ class TerminalApp(Starting, Alerting, DirectCommands):
         Binding("d", "command"),
         Binding("m", "missions"),
         Binding("i", "incidents"),
+        Binding("o", "operators"),
+        Binding("n", "note"),
         Binding("r", "runs"),
         Binding("right_square_bracket", "next_run(1)"),
         Binding("left_square_bracket", "next_run(-1)"),

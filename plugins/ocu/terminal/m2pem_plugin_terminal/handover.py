@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     from m2pem.fleet.fleet import Fleet
 
 TITLE = "Take, or give back"
-TEXT = "Take a resource that is free or in a mission, or give one of yours back."
+TEXT = "Take a resource that is free or in a mission; give yours back; ask others for theirs."
+FORCED = "Why do you give it back? All operators see it."
 RETURNED = "Missions may command it again from then on: it may move."
 REMARK_CELLS = 34
 OF_MISSIONS = re.compile(r"r\d+\.[abik]\d+")

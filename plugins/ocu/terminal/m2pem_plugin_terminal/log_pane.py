@@ -22,6 +22,7 @@ LOGGED = frozenset(
         r.RunEnded,
         r.OperatorTookControl,
         r.OperatorGaveControlBack,
+        r.OperatorNote,
         r.GeometryReceived,
         r.AllocationDelayed,
         r.ResourcesAllocated,

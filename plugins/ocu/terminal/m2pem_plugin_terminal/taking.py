@@ -5,8 +5,9 @@ from rich.text import Text
 from m2pem.api import ResourceId
 from m2pem.errors import M2pemError, OperatorError
 from m2pem_plugin_terminal.actions import Actions
-from m2pem_plugin_terminal.dialogs import Choose
+from m2pem_plugin_terminal.dialogs import Ask, Choice, Choose
 from m2pem_plugin_terminal.handover import (
+    FORCED,
     RETURNED,
     TEXT,
     TITLE,
@@ -38,7 +39,7 @@ class Taking(Actions):
             if holder == self.by:
                 self.carry_out("Give back", self._ask_to_give_back(resource))
             elif with_operator(holder):
-                self.say(f"{resource} is with {holder}", alarm=True)
+                self.run_worker(self._of_another(resource, holder), exit_on_error=False)
             else:
                 self.carry_out("Take", self._ask_to_take(resource))
 
@@ -71,6 +72,24 @@ class Taking(Actions):
         if with_operator(holder) and holder != self.by:
             raise OperatorError(f"{resource} is with {holder}")
         await self.control.give_back(resource, by=self.by)
+
+    async def _of_another(self, resource: str, holder: str) -> None:
+        """Ask the operator who has a resource for it; or, if that one is gone, give it back."""
+        listed = [
+            Choice("ask", f"Ask {holder} for {resource}"),
+            Choice("force", "Give it back to the missions", "only if they are gone"),
+        ]
+        wanted = await self.push_screen_wait(Choose(f"{resource} is with {holder}", listed))
+        try:
+            if wanted == "ask":
+                await self.control.request_control(resource, by=self.by)
+            elif wanted == "force":
+                title = f"Give back {resource} for {holder}?"
+                reason = await self.push_screen_wait(Ask(title, f"{RETURNED} {FORCED}"))
+                if reason is not None:
+                    await self.control.give_back(resource, reason=reason, by=self.by)
+        except M2pemError as error:
+            self.say(str(error), alarm=True)
 
     def task_label(self, holder: str) -> str:
         """Return the task of a run that is known here, by what has a resource for it; else ""."""

@@ -27,9 +27,7 @@ async def test_taking_a_vehicle_ends_what_it_did_and_says_who_has_it(world: Worl
         assert await holder(world) == "anna@gcs1"
         await terminal.until_shown("  with anna@gcs1", "DRIVE: error TAKEN_OVER", "FAILED")
         world.fake.report("r1.b1", BehaviorState.CANCELLED)
-        await world.control.give_back(
-            "scout", by="bob@gcs2"
-        )  # of which the ended run has no record
+        await world.control.give_back("scout", by="anna@gcs1")  # the ended run has no record of it
         await terminal.until_gone("  with anna@gcs1")
 
 
@@ -87,7 +85,7 @@ async def test_choosing_what_one_has_gives_it_back(world: World) -> None:
         assert await holder(world, "uav/eye") == ""
 
 
-async def test_what_another_operator_has_is_refused_with_the_name(world: World) -> None:
+async def test_another_operator_is_asked_for_what_they_have(world: World) -> None:
     async with world.terminal() as terminal:
         await world.start()
         await terminal.until_shown("RUNNING")
@@ -96,8 +94,61 @@ async def test_what_another_operator_has_is_refused_with_the_name(world: World) 
         await terminal.press("t")
         await terminal.until_shown("2 uav  bob@gcs2")
         await terminal.press("2")
-        await terminal.until_shown("uav is with bob@gcs2")
+        await terminal.until_shown("uav is with bob@gcs2", "1 Ask bob@gcs2 for uav")
+        await terminal.press("1")
+        await terminal.until_shown("anna@gcs1 asks bob@gcs2")
+        (request,) = await world.control.control_requests()
+        assert (request.resource, request.by) == ("uav", "anna@gcs1")
+        await terminal.press("o")
+        await terminal.until_shown("1 anna@gcs1 asks bob@gcs2 for uav")
+        await terminal.press("1")
+        await terminal.until_shown("1 Ask no longer")
+        await terminal.press("1")
+        await terminal.until_gone("1 Ask no longer")
         assert await holder(world, "uav") == "bob@gcs2"
+        assert not await world.control.control_requests()
+
+
+async def test_the_one_who_is_asked_gives_it(world: World) -> None:
+    async with world.terminal() as terminal:
+        await world.start()
+        await terminal.until_shown("RUNNING")
+        await world.control.take("uav", by="anna@gcs1")
+        await world.control.request_control("uav", by="bob@gcs2")
+        await terminal.until_shown("bob@gcs2 asks anna@gcs1")
+        await terminal.press("o")
+        await terminal.until_shown("1 bob@gcs2 asks you for uav")
+        await terminal.press("1")
+        await terminal.until_shown("1 Give uav to bob@gcs2", "2 Keep uav")
+        await terminal.press("1")
+        await terminal.until_shown("with bob@gcs2")
+        assert await holder(world, "uav") == "bob@gcs2"
+
+
+async def test_what_one_has_who_is_there_is_not_given_back(world: World) -> None:
+    async with world.terminal() as terminal:
+        await world.start()
+        await terminal.until_shown("RUNNING")
+        await world.control.take("uav", by="bob@gcs2")
+        await terminal.press("t")
+        await terminal.until_shown("2 uav  bob@gcs2")
+        await terminal.press("2")
+        await terminal.until_shown("2 Give it back to the missions")
+        await terminal.press("2")
+        await terminal.until_shown("Give back uav for bob@gcs2?", "All operators see it")
+        await terminal.press("x", "enter")
+        await terminal.until_shown("uav is with bob@gcs2, who gives it back")
+        assert await holder(world, "uav") == "bob@gcs2"
+
+
+async def test_a_note_is_written_into_the_log(world: World) -> None:
+    async with world.terminal() as terminal:
+        await world.start()
+        await terminal.until_shown("RUNNING")
+        await terminal.press("n")
+        await terminal.until_shown("Note for the log of r1")
+        await terminal.press(*"windy", "enter")
+        await terminal.until_shown("anna@gcs1: windy")
 
 
 @pytest.mark.long
@@ -106,7 +157,7 @@ async def test_what_became_anothers_while_the_list_was_shown_is_left(world: Worl
         await world.control.take("scout", by="anna@gcs1")
         await terminal.press("t")
         await terminal.until_shown("1 scout  anna@gcs1 (you)", "2 uav  free")
-        await world.control.give_back("scout", by="bob@gcs2")
+        await world.control.give_back("scout", by="anna@gcs1")
         await world.control.take("scout", by="bob@gcs2")
         await world.control.take("uav", by="bob@gcs2")
         await terminal.press("1")

@@ -11,6 +11,8 @@ DIALOGS = {
     "t": (["t"], "Take, or give back"),
     "i": (["i"], "No error stops a task here"),
     "r": (["r"], "─ Runs ─"),
+    "o": (["o"], "No operator is present"),
+    "n": (["n"], "Note for the log of r1"),
     "c": (["c"], "Nothing is scheduled"),
     "f": (["f"], "Shared space and waiting tasks"),
     "a": (["a"], "─ Alerts ─"),

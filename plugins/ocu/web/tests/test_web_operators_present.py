@@ -50,6 +50,52 @@ async def test_an_operator_asks_another_for_a_vehicle(world: MakeWorld) -> None:
         await live.until(lambda said: "anna has given" in said.get("text", ""))
 
 
+async def test_who_edits_a_mission_is_known_to_others(world: MakeWorld) -> None:
+    users = {"carla": Role.COMMANDER, "otto": Role.OPERATOR}
+    async with world(users=users) as here:
+        carla, otto = await here.browser("carla"), await here.browser("otto")
+        live, page = await otto.live(), await carla.live()
+        await live.watch(None)
+        await page.watch(None)
+
+        async def editing() -> list[tuple[str, str]]:
+            found = (await otto.http.get("/api/operators")).json()["operators"]
+            return [(each["by"], each["editing"]) for each in found]
+
+        before = len(live.said)
+        await page.send(type="edit", mission="patrol")
+        await live.until(lambda said: said["type"] == "operators", before)
+        assert await editing() == [("carla", "patrol"), ("otto", "")]
+        await live.send(type="edit", mission="patrol")  # an operator edits nothing
+        before = len(live.said)
+        await page.send(type="edit", mission=None)
+        await live.until(lambda said: said["type"] == "operators", before)
+        assert await editing() == [("carla", ""), ("otto", "")]
+
+
+async def test_what_one_has_who_is_there_goes_back_only_by_them(world: MakeWorld) -> None:
+    async with world(users=USERS) as here:
+        anna, otto, vera = [await here.browser(name) for name in USERS]
+        page = await anna.live()
+        await page.watch(None)
+        path = f"/api/resources/{VEHICLE}"
+        await anna.http.post(f"{path}/take")
+        for body in (None, {"reason": "I want it"}):
+            answer = await otto.http.post(f"{path}/give-back", json=body)
+            assert answer.status_code == 409
+            assert "is with anna, who gives it back" in answer.json()["detail"]
+        many = {"resources": [VEHICLE], "reason": "I want it"}
+        answer = await otto.http.post("/api/fleet/give-back", json=many)
+        assert "is with anna" in answer.json()["results"][0]["problem"]
+        assert (await vera.http.post("/api/fleet/request", json=many)).status_code == 403
+        wanted = {"resources": [VEHICLE]}
+        assert (await otto.http.post("/api/fleet/request", json=wanted)).json()["results"] == [
+            {"resource": VEHICLE, "run": "", "problem": ""}
+        ]
+        assert (await anna.http.post(f"{path}/give-back")).status_code == 204
+        assert (await here.control.holders())[VEHICLE] == ""
+
+
 async def test_a_note_is_in_the_log_of_every_page(world: MakeWorld) -> None:
     async with world(users=USERS) as here:
         prompt = await here.asked()

@@ -196,7 +196,7 @@ class Orders:
         command = pending.command
         if vehicle.resource not in self._allowed:
             raise RefusedCommandError(OFF)
-        by = name_of(frame, station)
+        by = name_of(frame.source, station)
         if command.id == REQUEST_OPERATOR_CONTROL:
             return self._hand_over(key, pending, station, vehicle, by)
         if command.id == CONFIGURE_GIMBAL:
@@ -248,7 +248,7 @@ class Orders:
             if takes:
                 await self._control.take(vehicle.resource, by=by)
             else:
-                # `give_back` leaves it to operators whose vehicle they give back.
+                # A station gives back only what it has itself, for whatever reason.
                 holder = (await self._control.holders()).get(vehicle.resource)
                 if holder != by:
                     raise OperatorError(f"it is not with {by}, but with {holder or 'no operator'}")
@@ -332,7 +332,7 @@ class Orders:
         self._targets[key] = order
         if key not in self._followed:
             self._followed.add(key)
-            self._begin(self._follow(key, station, vehicle, name_of(frame, station)))
+            self._begin(self._follow(key, station, vehicle, name_of(frame.source, station)))
 
     async def _follow(
         self, key: tuple[Peer, Address, int], station: Station, vehicle: ShownVehicle, by: str
@@ -393,9 +393,9 @@ def acknowledgement(command: int, result: int, to: Address) -> Any:
     )
 
 
-def name_of(frame: RawFrame, station: Station) -> str:
+def name_of(source: Address, station: Station) -> str:
     """Return who asks, for the journal."""
-    return f"mavlink {frame.source.system}/{frame.source.component} at {station.name}"
+    return f"mavlink {source.system}/{source.component} at {station.name}"
 
 
 def _same(order: Order, other: Order) -> bool:

@@ -3,10 +3,12 @@
 import asyncio
 import logging
 from collections import OrderedDict
+from contextlib import suppress
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem.api import (
+    PRESENCE_EVERY_S,
     EventThrower,
     MissionControl,
     PayloadState,
@@ -15,6 +17,7 @@ from m2pem.api import (
     VehicleState,
     follow,
 )
+from m2pem.errors import M2pemError
 from m2pem_plugin_mavlink.face.commands import (
     POSITION_TARGET,
     Command,
@@ -26,7 +29,7 @@ from m2pem_plugin_mavlink.face.components import cameras_of
 from m2pem_plugin_mavlink.face.event_settings import EventRules
 from m2pem_plugin_mavlink.face.events import Events
 from m2pem_plugin_mavlink.face.forwarding import COMMAND_INT, COMMAND_LONG, Forwarder
-from m2pem_plugin_mavlink.face.orders import DENIED, Orders, acknowledgement
+from m2pem_plugin_mavlink.face.orders import DENIED, Orders, acknowledgement, name_of
 from m2pem_plugin_mavlink.face.received_messages import MessageReceiver
 from m2pem_plugin_mavlink.face.requests import Requests
 from m2pem_plugin_mavlink.face.sent_messages import MessageSender
@@ -146,6 +149,7 @@ class FaceServer:
                 group.create_task(self._events.follow_holders(self._control))
                 group.create_task(self._stations.maintain())
                 group.create_task(self._streams.run())
+                group.create_task(self._announce_holders())
                 group.create_task(thrower.run())
                 if self._thrown is not None:
                     sender = MessageSender(
@@ -158,6 +162,17 @@ class FaceServer:
             self._forwarder.close()
             await self._orders.close()
             await self._stations.close()
+
+    async def _announce_holders(self) -> None:
+        """Announce the stations that have vehicles as present, for as long as they are received."""
+        while True:
+            with suppress(M2pemError):
+                have = set((await self._control.holders()).values())
+                for station in list(self._stations):
+                    for each in sorted(station.addresses):
+                        if (by := name_of(each, station)) in have:
+                            await self._control.announce_presence(by, unit="mavlink", by=by)
+            await asyncio.sleep(PRESENCE_EVERY_S)
 
     def _sources(self) -> dict[ResourceId, Address]:
         """Return in whose name m2pem tells ground stations about each vehicle."""

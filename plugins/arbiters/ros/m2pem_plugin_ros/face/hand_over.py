@@ -54,6 +54,6 @@ class HandOver:
 
     async def _give_back(self, vehicle: str, by: str) -> None:
         holder = (await self._control.holders()).get(vehicle, "")  # type: ignore[call-overload]
-        if holder and not holder.startswith(f"{self._prefix} "):
+        if holder and holder != by:
             raise OperatorError(f"{vehicle} is with {holder}, who gives it back")
         await self._control.give_back(vehicle, by=by)

@@ -35,6 +35,7 @@ from m2pem.api import records as r
 from m2pem.api.run_view import Place
 from m2pem.errors import M2pemError
 from m2pem_plugin_web.access.requests import now_s
+from m2pem_plugin_web.access.roles import Role
 from m2pem_plugin_web.live import messages
 from m2pem_plugin_web.live.latest_states import FleetStates, LatestStates
 from m2pem_plugin_web.live.live_run import LiveRun, command
@@ -98,7 +99,7 @@ class Hub(Listener):
         role, name = str(viewer.person.role), viewer.person.name
         with suppress(M2pemError):
             await self._control.announce_presence(
-                viewer.id, unit="page", role=role, run=run, by=name
+                viewer.id, unit="page", role=role, run=run, editing=viewer.editing, by=name
             )
 
     async def left(self, viewer: Viewer) -> None:
@@ -128,6 +129,13 @@ class Hub(Listener):
         viewer.unsent = Unsent()
         viewer.watch(live)
         await self._present(viewer)
+
+    async def edit(self, viewer: Viewer, mission: str) -> None:
+        """Announce which mission a person edits, if the person may; "": none."""
+        may = viewer.person is not None and viewer.person.role.covers(Role.COMMANDER)
+        if viewer.editing != (mission if may else ""):
+            viewer.editing = mission
+            await self._present(viewer)
 
     # --- at once --------------------------------------------------------------------------------
 

@@ -4,6 +4,7 @@ import asyncio
 import logging
 from collections.abc import Callable
 from contextlib import suppress
+from typing import Annotated
 
 import msgspec
 from fastapi import APIRouter, WebSocket
@@ -15,6 +16,7 @@ from m2pem_plugin_web.access.sign_in import SUBPROTOCOL, Entry, key_of
 from m2pem_plugin_web.live import messages
 from m2pem_plugin_web.live.hub import MOST_VIEWERS, Hub
 from m2pem_plugin_web.live.viewer import HEARTBEAT_S, Viewer
+from m2pem_plugin_web.missions.names import LONGEST
 
 LONGEST_MESSAGE = 4096
 """Most bytes of a message from a browser."""
@@ -49,7 +51,15 @@ class _Ack(msgspec.Struct, tag="ack", frozen=True):
     seq: int
 
 
-_decoder: msgspec.json.Decoder[_Watch | _Ack] = msgspec.json.Decoder(_Watch | _Ack)
+class _Edit(msgspec.Struct, tag="edit", frozen=True):
+    """`mission`: the name of the one that the page edits now; None: none."""
+
+    mission: Annotated[str, msgspec.Meta(max_length=LONGEST)] | None = None
+
+
+_decoder: msgspec.json.Decoder[_Watch | _Ack | _Edit] = msgspec.json.Decoder(
+    _Watch | _Ack | _Edit
+)
 
 
 class _Leave(Exception):  # noqa: N818  # nothing went wrong here
@@ -137,6 +147,8 @@ async def _listen(socket: WebSocket, hub: Hub, viewer: Viewer) -> None:
         match said:
             case _Ack(seq=seq):
                 viewer.acknowledge(seq)
+            case _Edit(mission=mission):
+                await hub.edit(viewer, mission or "")
             case _Watch(run=run):
                 try:
                     await _watch(hub, viewer, run)

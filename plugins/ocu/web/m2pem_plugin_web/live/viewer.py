@@ -57,6 +57,8 @@ class Viewer:
         self.person = person
         self.id = f"page-{uuid4()}"
         self.live: LiveRun | None = None
+        self.editing = ""
+        """The name of the mission that the page edits."""
         self.watches = False
         """Whether the browser has sent a request."""
         self.unsent = Unsent()

@@ -25,7 +25,7 @@ from m2pem.errors import BusyError, FindingsError, M2pemError
 from m2pem_plugin_web.access.permissions import Operator, Viewer
 from m2pem_plugin_web.live.hub import Hub
 from m2pem_plugin_web.problems import RESPONSES
-from m2pem_plugin_web.rest.models import Body, Data, Name
+from m2pem_plugin_web.rest.models import Body, Data, Name, Reason
 
 MOST_RESOURCES = 1000
 
@@ -67,6 +67,12 @@ class ResourcesModel(Body):
     """Vehicles and payloads of the fleet."""
 
     resources: Resources
+
+
+class GiveBackManyModel(ResourcesModel):
+    """`reason`: of an operator who gives back what others have, who are gone."""
+
+    reason: Reason = ""
 
 
 class HoldModel(ResourcesModel):
@@ -157,11 +163,21 @@ def router(control: MissionControl, hub: Hub) -> APIRouter:
         return await _each(wanted.resources, command)
 
     @routes.post("/give-back")
-    async def give_back(person: Operator, wanted: ResourcesModel) -> ResultsModel:
-        """Give them back to the missions."""
+    async def give_back(person: Operator, wanted: GiveBackManyModel) -> ResultsModel:
+        """Give them back to the missions. Only who has one may, or another one with a reason."""
 
         async def command(resource: str) -> RunId:
-            await control.give_back(resource, by=person.name)
+            await control.give_back(resource, reason=wanted.reason, by=person.name)
+            return ""
+
+        return await _each(wanted.resources, command)
+
+    @routes.post("/request")
+    async def request(person: Operator, wanted: ResourcesModel) -> ResultsModel:
+        """Ask the operators who have them for them."""
+
+        async def command(resource: str) -> RunId:
+            await control.request_control(resource, by=person.name)
             return ""
 
         return await _each(wanted.resources, command)

@@ -20,6 +20,7 @@ class PresenceModel(BaseModel):
     run: str
     page: str
     since_us: int
+    editing: str
 
 
 class ControlRequestModel(BaseModel):

@@ -198,6 +198,12 @@ class HoldersModel(BaseModel):
     unavailable: dict[str, str]
 
 
+class GiveBackModel(Body):
+    """`reason`: of an operator who gives back what another one has, who is gone."""
+
+    reason: Reason = ""
+
+
 def resource_router(control: MissionControl) -> APIRouter:
     """The routes of resources."""
     routes = APIRouter(prefix="/api/resources", tags=["resources"], responses=RESPONSES)
@@ -230,9 +236,12 @@ def resource_router(control: MissionControl) -> APIRouter:
         await control.take(resource, by=person.name)
 
     @routes.post("/{resource:path}/give-back", status_code=204)
-    async def give_back(person: Operator, resource: str) -> None:
-        """Give it back to the missions."""
+    async def give_back(
+        person: Operator, resource: str, wanted: GiveBackModel | None = None
+    ) -> None:
+        """Give it back to the missions. Only who has it may, or another one with a reason."""
         await known(resource)
-        await control.give_back(resource, by=person.name)
+        reason = wanted.reason if wanted is not None else ""
+        await control.give_back(resource, reason=reason, by=person.name)
 
     return routes

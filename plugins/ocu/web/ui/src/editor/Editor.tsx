@@ -2,6 +2,7 @@
 import { lazy, Suspense } from "preact/compat";
 import { useEffect, useRef, useState } from "preact/hooks";
 import { ApiError } from "../shared/api";
+import { edit } from "../shared/executive";
 import { remember, remembered } from "../shared/memory";
 import { guardLeaving } from "../shared/router";
 import { Split } from "../shared/Split";
@@ -92,6 +93,10 @@ function Workplace({ work, fail }: WorkplaceProps) {
     requestAnimationFrame(() => session.fit());
   }, [showsMap]);
   useEffect(() => followKeys(work), [work]);
+  useEffect(() => {
+    edit(work.mission);
+    return () => edit(null);
+  }, [work]);
   useEffect(() => {
     // Somebody may have drawn a route or area on the map in the meantime.
     const refresh = () => void session.catalogue.refreshGeometries().catch(() => undefined);

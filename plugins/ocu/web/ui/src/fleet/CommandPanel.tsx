@@ -6,7 +6,9 @@ import type { Catalogue } from "../editor/session/catalogue";
 import { Link } from "../home/Link";
 import { DomainSymbol } from "../operate/vehicles/DomainSymbol";
 import { heading_deg } from "../shared/format";
-import { may, session } from "../shared/session";
+import { ForceGiveBack } from "../people/ForceGiveBack";
+import { isSelf } from "../people/people";
+import { may } from "../shared/session";
 import type { Behavior } from "../shared/types";
 import { counted, fill, strings } from "../strings";
 import { CommandForm } from "./CommandForm";
@@ -183,7 +185,7 @@ function Commands({ catalogue, offers, known, resources }: CommandsProps) {
   const behavior = common.find(({ name }) => name === chosen.value);
   const key = resources.join(" ");
   useEffect(() => void (chosen.value = ""), [key]);
-  const user = session.value?.user;
+  const others = known.filter(({ operator }) => operator && !isSelf(operator));
   const isBusy = sending.value !== null;
   const verb = (name: Verb, label: string, isPossible: boolean) => (
     <button
@@ -216,7 +218,25 @@ function Commands({ catalogue, offers, known, resources }: CommandsProps) {
         {verb("hold", words.hold, mayHold)}
         {verb("resume", words.resume, known.some(({ status }) => status?.held))}
         {verb("take", words.take, known.some(({ operator, manned }) => !operator && !manned))}
-        {verb("give-back", words.giveBack, known.some(({ operator }) => operator === user))}
+        {verb("give-back", words.giveBack, known.some(({ operator }) => isSelf(operator)))}
+        {others.length > 0 && (
+          <>
+            <button
+              type="button"
+              class="secondary"
+              disabled={isBusy}
+              onClick={() =>
+                void order({ verb: "request", resources: others.map(({ id }) => id) })
+              }
+            >
+              {others.length === 1 ? words.request : words.requestMany}
+            </button>
+            <ForceGiveBack
+              kind="secondary"
+              held={others.map(({ id, operator }) => ({ resource: id, holder: operator }))}
+            />
+          </>
+        )}
       </p>
       {common.length === 0 ? (
         <p class="m2-note">{resources.length === 1 ? words.noneOfOne : words.none}</p>

@@ -11,7 +11,7 @@ const text = strings.fleet.commands;
 /** Vehicles of one request: it is answered in time, and the next says how far it is. */
 const AT_ONCE = 25;
 
-export type Verb = "take" | "give-back" | "hold" | "resume" | "execute";
+export type Verb = "take" | "give-back" | "request" | "hold" | "resume" | "execute";
 
 export interface Order {
   verb: Verb;
@@ -75,6 +75,7 @@ async function effectsOf({ verb, resources }: Order): Promise<readonly Effect[] 
   // What was commanded outside of a mission is held as it is, and goes on later.
   const endsNothing = (resource: string) =>
     verb === "give-back" ||
+    verb === "request" ||
     verb === "resume" ||
     (verb === "hold" && status.peek()[resource]?.direct === true);
   const questioned = resources.filter((resource) => !endsNothing(resource));

@@ -1,7 +1,7 @@
 // What is known of a vehicle or payload, in words.
 import { age, fixed, STALE_S } from "../shared/format";
 import { timeOfDay } from "../shared/moments";
-import { session } from "../shared/session";
+import { isSelf } from "../people/people";
 import { fill, strings } from "../strings";
 import type { Column, Row } from "./rows";
 
@@ -64,7 +64,7 @@ function linkOf({ link, age_s, unknownSince }: Row): string {
 /** Without the run that commands it. */
 export function holderOf({ operator, status, manned }: Row): string {
   if (operator) {
-    return operator === session.value?.user ? text.withYou : fill(text.with, { by: operator });
+    return isSelf(operator) ? text.withYou : fill(text.with, { by: operator });
   }
   if (status?.run) return "";
   if (status?.unavailable) return status.unavailable;

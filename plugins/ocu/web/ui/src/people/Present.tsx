@@ -1,8 +1,7 @@
 // In the header: how many persons are present; a panel says who, and what they watch.
 import { useEffect, useRef, useState } from "preact/hooks";
-import { session } from "../shared/session";
 import { counted, fill, strings } from "../strings";
-import { present } from "./people";
+import { isSelf, present } from "./people";
 import { persons, type Presence } from "./persons";
 import "./people.css";
 import { locale } from "../strings/language";
@@ -72,17 +71,22 @@ export function Present() {
   );
 }
 
-function Person({ person: { by, unit, role, run, since_us } }: { person: Presence }) {
+function Person({ person: { by, unit, role, run, editing, since_us } }: { person: Presence }) {
   const since = new Date(since_us / 1000).toLocaleTimeString(locale, { timeStyle: "short" });
   const known = strings.shell.roles[role as keyof typeof strings.shell.roles];
   return (
     <li>
       <strong>{by}</strong>
-      {by === session.value?.user && <span> ({words.you})</span>} {known && <small>{known}</small>}
+      {isSelf(by) && <span> ({words.you})</span>} {known && <small>{known}</small>}
       <div>
-        {run && <>{fill(words.watches, { run })}, </>}
-        {fill(words.at, { unit, since })}
+        {fill(words.since, { where: whereOf({ unit, run, editing }), since })}
       </div>
     </li>
   );
+}
+
+function whereOf({ unit, run, editing }: Pick<Presence, "unit" | "run" | "editing">): string {
+  const texts = words.units[unit as keyof typeof words.units] ?? words.units.other;
+  const text = (editing && texts.editing) || (run && texts.run) || texts.none;
+  return fill(text, { unit, run, mission: editing });
 }

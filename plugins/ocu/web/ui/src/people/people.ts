@@ -4,7 +4,7 @@ import { get } from "../shared/api";
 import { command } from "../shared/command";
 import { operatorChanges } from "../shared/executive";
 import { session } from "../shared/session";
-import type { Presence } from "./persons";
+import { personOf, type Presence } from "./persons";
 
 export interface ControlRequest {
   resource: string;
@@ -47,6 +47,10 @@ async function load(): Promise<void> {
 effect(() => {
   if (session.value && operatorChanges.value > 0) void load();
 });
+
+/** Whether the user of this page is the person behind the name of an operator. */
+export const isSelf = (operator: string): boolean =>
+  operator !== "" && personOf(operator) === personOf(session.value?.user ?? "");
 
 const pathOf = (resource: string) => resource.split("/").map(encodeURIComponent).join("/");
 

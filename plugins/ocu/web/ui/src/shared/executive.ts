@@ -99,6 +99,7 @@ export const spaceChanges = signal(0);
 export const connect = (): void => client.start();
 export const disconnect = (): void => client.stop();
 export const watch = (run: string | null): void => client.watch(run);
+export const edit = (mission: string | null): void => client.edit(mission);
 
 /**
  * A page that is not signed in is refused before it is connected, which a browser does not tell.

@@ -54,6 +54,7 @@ export class LiveClient {
   private failures = 0;
   private cancelRetry: (() => void) | null = null;
   private watched: string | null = null;
+  private edited: string | null = null;
   private isOpen = false;
   /** From a break until it is open again, however often that is tried. */
   private isBroken = false;
@@ -81,6 +82,7 @@ export class LiveClient {
       this.isOpen = true;
       this.heard();
       this.say({ type: "watch", run: this.watched });
+      if (this.edited !== null) this.say({ type: "edit", mission: this.edited });
       this.listener.connection("open");
     };
     socket.onmessage = (event) => this.take(String(event.data));
@@ -101,6 +103,13 @@ export class LiveClient {
     if (this.watched === run) return;
     this.watched = run;
     if (this.isOpen) this.say({ type: "watch", run });
+  }
+
+  /** Announce which mission this page edits; null: none. */
+  edit(mission: string | null): void {
+    if (this.edited === mission) return;
+    this.edited = mission;
+    if (this.isOpen) this.say({ type: "edit", mission });
   }
 
   private heard(): void {

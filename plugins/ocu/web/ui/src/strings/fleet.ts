@@ -103,6 +103,8 @@ export const fleet = {
     title: "Commands",
     take: "Take over",
     giveBack: "Give back",
+    request: "Ask for it",
+    requestMany: "Ask for them",
     hold: "Hold",
     resume: "Resume",
     other: "Another behavior",
@@ -121,6 +123,7 @@ export const fleet = {
     verbs: {
       take: "Take over {names}",
       "give-back": "Give back {names}",
+      request: "Ask for {names}",
       hold: "Hold {names}",
       resume: "Resume {names}",
       execute: "{behavior}: {names}",
@@ -133,6 +136,7 @@ export const fleet = {
     confirm: {
       take: "Take over",
       "give-back": "Give back",
+      request: "Ask",
       hold: "Hold",
       resume: "Resume",
       execute: "Give the command",
@@ -148,6 +152,7 @@ export const fleet = {
     done: {
       take: "You have {names}.",
       "give-back": "{names}: given back to the missions.",
+      request: "{names}: asked for.",
       hold: "{names}: held.",
       resume: "{names}: goes on.",
       execute: "{names}: {behavior} was commanded.",

@@ -1,5 +1,8 @@
 // What one must know before going on: what the editor cannot keep, what the file had wrong.
 import { fill, strings } from "../../strings";
+import { present } from "../../people/people";
+import { othersEditing } from "../../people/persons";
+import { session as signedIn } from "../../shared/session";
 import type { MissionWork } from "../session/MissionWork";
 
 const words = strings.editor;
@@ -8,8 +11,15 @@ export function Notices({ work }: { work: MissionWork }) {
   const { notes, session, putBack } = work;
   const warnings = session.warnings.value;
   const undo = putBack.value;
+  const others = othersEditing(present.value, work.mission, signedIn.value?.user ?? "");
+  const { alsoEdits, alsoEditMany } = strings.people;
   return (
     <>
+      {others.length > 0 && (
+        <p class="m2-notice" role="status">
+          {fill(others.length === 1 ? alsoEdits : alsoEditMany, { names: others.join(", ") })}
+        </p>
+      )}
       {undo && (
         <Notice
           text={words.file.laidOut}

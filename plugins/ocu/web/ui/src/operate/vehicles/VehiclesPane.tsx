@@ -3,10 +3,11 @@ import { Component } from "preact";
 import { useRef } from "preact/hooks";
 import { usePaced } from "../layout/pace";
 import { age, fixed, heading_deg, speed_m_s, STALE_S } from "../../shared/format";
-import { askFor, requests } from "../../people/people";
+import { askFor, isSelf, requests } from "../../people/people";
 import { unknownSince } from "../../shared/executive";
 import { timeOfDay } from "../../shared/moments";
-import { may, session } from "../../shared/session";
+import { may } from "../../shared/session";
+import { ForceGiveBack } from "../../people/ForceGiveBack";
 import { command } from "../../shared/command";
 import { toast } from "../../shared/Toasts";
 import { fill, strings } from "../../strings";
@@ -252,8 +253,9 @@ function HandOver({ resource, name }: { resource: string; name?: string }) {
   const kind = name ? "card-hand-over" : "secondary";
   const label = (act: string) => (name ? `${act} ${name}` : undefined);
   if (isOperator(holder)) {
-    const own = holder === session.value?.user;
-    if (!own) return <AskFor resource={resource} holder={holder} kind={kind} name={name} />;
+    if (!isSelf(holder)) {
+      return <AskFor resource={resource} holder={holder} kind={kind} name={name} />;
+    }
     return (
       <button
         type="button"
@@ -289,15 +291,18 @@ interface AskForProps {
 function AskFor({ resource, holder, kind, name }: AskForProps) {
   const asked = requests.value.some((request) => request.resource === resource);
   return (
-    <button
-      type="button"
-      class={kind}
-      aria-label={name && `${strings.people.ask} ${name}`}
-      title={fill(strings.people.askHint, { holder })}
-      disabled={asked}
-      onClick={() => void askFor(resource)}
-    >
-      {strings.people.ask}
-    </button>
+    <>
+      <button
+        type="button"
+        class={kind}
+        aria-label={name && `${strings.people.ask} ${name}`}
+        title={fill(strings.people.askHint, { holder })}
+        disabled={asked}
+        onClick={() => void askFor(resource)}
+      >
+        {strings.people.ask}
+      </button>
+      <ForceGiveBack kind={kind} held={[{ resource, holder }]} />
+    </>
   );
 }
