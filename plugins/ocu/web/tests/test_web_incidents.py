@@ -43,3 +43,24 @@ async def test_an_operator_decides_about_an_error_that_stops_a_task(desk: Desk) 
     assert {each["key"]: each["value"] for each in records if each["record"] == "DataWritten"} == {
         "gate": "open"
     }
+
+
+async def test_incidents_of_the_run_that_is_shown_come_first(desk: Desk) -> None:
+    page = desk.page
+    (desk.executive.missions / "stopping.bpmn").write_bytes(STOPPING)
+    first, second = [
+        str((await desk.ask("POST", "/api/runs", {"mission": "stopping"}))["run"]) for _ in range(2)
+    ]
+    await desk.until("/api/incidents", lambda said: len(said) == 2)
+    await page.goto(f"{desk.executive.origin}/runs/{second}")
+    panel = page.get_by_role("alertdialog")
+    await expect(panel).to_have_accessible_name(f"Look at the gate is stopped (run {second})")
+    await panel.get_by_label("What is to be done").select_option("skip")
+    await panel.get_by_role("button", name="Next incident (1 of 2)").click()
+    await expect(panel).to_have_accessible_name(f"Look at the gate is stopped (run {first})")
+    # What was chosen for the other one is not chosen for this one.
+    await expect(panel.get_by_label("What is to be done")).to_have_value("retry")
+    await panel.get_by_label("What is to be done").select_option("end")
+    await panel.get_by_role("button", name="Decide", exact=True).click()
+    await desk.until(f"/api/runs/{first}", lambda said: said["status"] == "failed")
+    await expect(panel).to_have_accessible_name(f"Look at the gate is stopped (run {second})")

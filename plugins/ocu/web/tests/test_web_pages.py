@@ -1,11 +1,13 @@
 """The page of an executive of this process, in a real browser: how people come in, and what they
 are told of vehicles that are not heard."""
 
+import asyncio
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from playwright.async_api import Browser, expect
+from playwright.async_api import Browser, Route, expect
 from web_browsing import page_at
 from web_desk import IN_ONE_LOOP
 from web_map_seen import LOST, colours, middle_drawn, vehicles_on
@@ -74,3 +76,53 @@ async def test_a_vehicle_whose_link_is_lost_is_gray_and_comes_back(
         await expect(listed).to_contain_text(f"{VEHICLE}: Well")
         assert LOST not in await colours(page)
         it.assert_well()
+
+
+FLEET_PAGE = re.compile(r"/assets/Fleet-[\w-]+\.js$")
+
+
+async def test_who_leaves_a_page_before_it_is_loaded_sees_the_next_one(
+    chromium: Browser, world: MakeWorld
+) -> None:
+    async with world() as here, page_at(chromium, here.ocu.url) as it:
+        comes = asyncio.Event()
+
+        async def late(route: Route) -> None:
+            await comes.wait()
+            await route.continue_()
+
+        await it.page.route(FLEET_PAGE, late)
+        pages = it.page.get_by_role("navigation", name="Pages")
+        missions = it.page.get_by_role("heading", name="Missions")
+        await expect(missions).to_be_visible()
+        await pages.get_by_role("link", name="Fleet").click()
+        await expect(it.page.get_by_text("Loading…")).to_be_visible()
+        await pages.get_by_role("link", name="Missions").click()
+        await expect(missions).to_be_visible()
+        async with it.page.expect_event(
+            "requestfinished", lambda request: FLEET_PAGE.search(request.url) is not None
+        ):
+            comes.set()
+        await expect(missions).to_be_visible()
+        await pages.get_by_role("link", name="Fleet").click()
+        await expect(it.page.get_by_role("grid", name="Vehicles")).to_be_visible()
+        await pages.get_by_role("link", name="Missions").click()
+        await expect(missions).to_be_visible()
+        it.assert_well()
+
+
+async def test_a_page_that_cannot_be_loaded_is_loaded_later(
+    chromium: Browser, world: MakeWorld
+) -> None:
+    async with world() as here, page_at(chromium, here.ocu.url) as it:
+        await it.page.route(FLEET_PAGE, lambda route: route.abort())
+        pages = it.page.get_by_role("navigation", name="Pages")
+        await pages.get_by_role("link", name="Fleet").click()
+        await expect(
+            it.page.get_by_role("alert").filter(has_text="could not be loaded")
+        ).to_have_count(1)
+        await it.page.unroute(FLEET_PAGE)
+        await pages.get_by_role("link", name="Missions").click()
+        await expect(it.page.get_by_role("heading", name="Missions")).to_be_visible()
+        await pages.get_by_role("link", name="Fleet").click()
+        await expect(it.page.get_by_role("grid", name="Vehicles")).to_be_visible()

@@ -1,10 +1,10 @@
 // The frame around every page: where one is, who one is, what moves, and how to stop it.
 import { render } from "preact";
-import { lazy, Suspense } from "preact/compat";
 import { useEffect } from "preact/hooks";
 import { followAlerts } from "./alerts/alerts";
 import { connect } from "./shared/executive";
 import { Header } from "./shared/Header";
+import { loaded } from "./shared/loaded";
 import { route } from "./shared/router";
 import { loadSession, redeem, session, takeToken, toSignIn } from "./shared/session";
 import { followStandbys } from "./shared/standbys";
@@ -12,12 +12,12 @@ import { Toasts } from "./shared/Toasts";
 import { strings } from "./strings";
 import "./theme.css";
 
-const Home = lazy(() => import("./home/Home"));
-const Alerts = lazy(() => import("./alerts/AlertPage"));
-const Fleet = lazy(() => import("./fleet/Fleet"));
-const Editor = lazy(() => import("./editor/Editor"));
-const Operate = lazy(() => import("./operate/Operate"));
-const SignIn = lazy(() => import("./signin/SignIn"));
+const Home = loaded(() => import("./home/Home"));
+const Alerts = loaded(() => import("./alerts/AlertPage"));
+const Fleet = loaded(() => import("./fleet/Fleet"));
+const Editor = loaded(() => import("./editor/Editor"));
+const Operate = loaded(() => import("./operate/Operate"));
+const SignIn = loaded(() => import("./signin/SignIn"));
 
 function Page() {
   const at = route.value;
@@ -56,7 +56,7 @@ function App() {
     <>
       <Header />
       <main id="main" tabIndex={-1}>
-        <Suspense fallback={null}>{known && mayLook && <Page />}</Suspense>
+        {known && mayLook && <Page />}
       </main>
       <div id="dialogs" />
       <Toasts />

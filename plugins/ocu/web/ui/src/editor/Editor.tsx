@@ -1,8 +1,8 @@
 // The page on which a mission is drawn.
-import { lazy, Suspense } from "preact/compat";
 import { useEffect, useRef, useState } from "preact/hooks";
 import { ApiError } from "../shared/api";
 import { edit } from "../shared/executive";
+import { loaded } from "../shared/loaded";
 import { remember, remembered } from "../shared/memory";
 import { guardLeaving } from "../shared/router";
 import { Split } from "../shared/Split";
@@ -28,7 +28,7 @@ import "./forms.css";
 const words = strings.editor;
 
 /** Leaflet, and what plays rehearsals: for those who look at the map. */
-const MapPanel = lazy(() => import("./map/MapPanel"));
+const MapPanel = loaded(() => import("./map/MapPanel"));
 
 /** Of a tablet held upright: blocks are then in the menus alone, until the user asks for more. */
 const NARROW = 1000;
@@ -152,11 +152,7 @@ function Workplace({ work, fail }: WorkplaceProps) {
                 aria-label={words.canvas}
                 onKeyDown={(event) => stepThrough(session, event)}
               />
-              {showsMap && (
-                <Suspense fallback={<p class="nothing">{words.loading}</p>}>
-                  <MapPanel editor={session} />
-                </Suspense>
-              )}
+              {showsMap && <MapPanel editor={session} />}
             </Split>
           </div>
         </div>

@@ -23,7 +23,6 @@ import {
   keepKnown,
   picking,
   search,
-  selected,
   sorting,
   status,
   targets,
@@ -168,7 +167,7 @@ function Narrow({ tab, table, map, commands }: NarrowProps) {
     if (isPicking) tab.value = "map";
     else if (tab.value === "map" && targets().length > 0) tab.value = "commands";
   }, [isPicking]);
-  const count = selected.value.size;
+  const count = targets().length;
   const tabs = [
     { id: "table", title: text.panes.table, content: table },
     { id: "map", title: text.panes.map, content: map },

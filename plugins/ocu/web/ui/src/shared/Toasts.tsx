@@ -1,4 +1,4 @@
-// Short messages that come and go by themselves; those that are bad stay until they are dismissed.
+// Short messages that come and go by themselves; refusals stay until they are dismissed.
 import { signal } from "@preact/signals";
 import { strings } from "../strings";
 import { ApiError } from "./api";
@@ -12,6 +12,8 @@ interface Toast {
 }
 
 const SHOWN_MS = 6000;
+/** Of faults, which the alerts and the log of their run keep: what is below is needed then. */
+const FAULT_SHOWN_MS = 20_000;
 /** A phone has less room: what is below, such as a question, stays in view. */
 const SMALL = "(width < 600px)";
 const LOW = "(height < 480px)";
@@ -24,6 +26,13 @@ export function toast(text: string, tone: Tone = "plain"): void {
   const id = ++count;
   toasts.value = newest([...toasts.value, { id, text, tone }], most());
   if (tone !== "bad") setTimeout(() => dismiss(id), SHOWN_MS);
+}
+
+/** Something went wrong that is no answer to what was done here. */
+export function toastFault(text: string): void {
+  toast(`${strings.shell.fault}: ${text}`, "bad");
+  const id = count;
+  setTimeout(() => dismiss(id), FAULT_SHOWN_MS);
 }
 
 /** Do what may be refused, and say so if it was. */

@@ -5,8 +5,7 @@ import { browser } from "./browser";
 import { LiveClient, type Connection } from "./live";
 import { ServerClock } from "./serverClock";
 import { loadSession, session, toSignIn } from "./session";
-import { toast } from "./Toasts";
-import { strings } from "../strings";
+import { toast, toastFault } from "./Toasts";
 import type {
   PayloadState,
   Prompt,
@@ -156,7 +155,7 @@ function take(message: ServerMessage): void {
       takeRun(message.run);
       break;
     case "fault":
-      toast(`${strings.shell.fault}: ${message.text}`, "bad");
+      toastFault(message.text);
       break;
     case "notice":
       toast(message.text);

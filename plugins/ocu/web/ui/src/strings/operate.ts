@@ -186,6 +186,7 @@ export const operate = {
     preview: "What follows?",
     decide: "Decide",
     anyway: "Decide all the same",
+    next: "Next incident ({number} of {count})",
   },
   signals: {
     title: "Send a signal",

@@ -44,6 +44,9 @@ export const shell = {
   noStandby: "No standby.",
   questions: "questions open",
   question: "question open",
+  loading: "Loading…",
+  notLoaded:
+    "This part of the page could not be loaded. It is loaded when the executive answers again.",
   dismiss: "Dismiss",
   close: "Close",
   fault: "Fault",

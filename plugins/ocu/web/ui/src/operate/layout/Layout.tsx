@@ -1,5 +1,5 @@
 // Where the parts of the page are: beside each other where there is room, behind tabs on a tablet.
-import { lazy, Suspense } from "preact/compat";
+import { loaded } from "../../shared/loaded";
 import { Split } from "../../shared/Split";
 import { Tabs, type Tab } from "../../shared/Tabs";
 import { useMedia } from "../../shared/useMedia";
@@ -19,8 +19,8 @@ const text = strings.operate.panes;
 const kinds = strings.operate.map.kinds;
 
 /** With what draws and plays them: only those who look at them load that. */
-const Cameras = lazy(() => import("../cameras/CamerasPane"));
-const Plots = lazy(() => import("../plots/PlotsPane"));
+const Cameras = loaded(() => import("../cameras/CamerasPane"));
+const Plots = loaded(() => import("../plots/PlotsPane"));
 
 const WIDE = "(width >= 1180px)";
 
@@ -77,7 +77,7 @@ function TimesPane({ onSeek }: Parts) {
   return (
     <Split name="plots" direction="column" initial={38} label={`${text.resize}: ${text.plots}`}>
       <TimelinePane onSeek={onSeek} plots={plotsShown} />
-      <PlotsPane onSeek={onSeek} />
+      <Plots onSeek={onSeek} />
     </Split>
   );
 }
@@ -85,25 +85,13 @@ function TimesPane({ onSeek }: Parts) {
 const CAMERAS: Tab = {
   id: "cameras",
   title: text.cameras,
-  render: () => (
-    <Suspense fallback={<p class="nothing">{strings.operate.run.loading}</p>}>
-      <Cameras />
-    </Suspense>
-  ),
+  render: () => <Cameras />,
 };
 
 /** Whether there are cameras to look through: they show what is now, not what was. */
 function useCameras(): boolean {
   const { scene, fleet } = useOperating();
   return scene.mode === "live" && fleet.payloads.some(({ video }) => video);
-}
-
-function PlotsPane({ onSeek }: Parts) {
-  return (
-    <Suspense fallback={<p class="nothing">{strings.operate.run.loading}</p>}>
-      <Plots onSeek={onSeek} />
-    </Suspense>
-  );
 }
 
 function Narrow({ onSeek }: Parts) {
@@ -124,7 +112,7 @@ function Narrow({ onSeek }: Parts) {
           { id: "vehicles", title: text.vehicles, render: () => <VehiclesPane /> },
           ...(cameras ? [CAMERAS] : []),
           { id: "timeline", title: text.timeline, render: () => <TimelinePane onSeek={onSeek} /> },
-          { id: "plots", title: text.plots, render: () => <PlotsPane onSeek={onSeek} /> },
+          { id: "plots", title: text.plots, render: () => <Plots onSeek={onSeek} /> },
           { id: "log", title: text.log, render: () => <LogPane /> },
         ]}
       />

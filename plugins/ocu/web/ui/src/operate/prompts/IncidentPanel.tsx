@@ -7,6 +7,7 @@ import { listen } from "../../shared/executive";
 import { may } from "../../shared/session";
 import { toast } from "../../shared/Toasts";
 import { fill, strings } from "../../strings";
+import { useOperating } from "../context";
 import { dataOf } from "../runbar/data";
 
 const text = strings.operate.incidents;
@@ -37,8 +38,12 @@ interface Wanted {
   even_if_stuck?: boolean;
 }
 
+const idOf = ({ run, incident }: Incident): string => `${run}/${incident}`;
+
 export function IncidentPanel() {
+  const { scene } = useOperating();
   const incidents = useSignal<Incident[]>([]);
+  const chosen = useSignal("");
   const choice = useSignal("");
   const typed = useSignal("");
   const role = useSignal("");
@@ -68,8 +73,15 @@ export function IncidentPanel() {
     };
   }, []);
 
-  const incident = incidents.value[0];
-  const id = incident?.incident ?? "";
+  // Those of the run that is shown come first.
+  const own = ({ run }: Incident) => Number(run !== scene.run);
+  const queue = [...incidents.value].sort((one, other) => own(one) - own(other));
+  const at = Math.max(
+    0,
+    queue.findIndex((each) => idOf(each) === chosen.value),
+  );
+  const incident = queue[at];
+  const id = incident ? idOf(incident) : "";
   useEffect(() => {
     choice.value = incident?.choices[0] ?? "";
     role.value = Object.keys(incident?.roles ?? {})[0] ?? "";
@@ -92,7 +104,7 @@ export function IncidentPanel() {
       made.roles = { [role.value]: typed.value.split(",").map((name) => name.trim()) };
     return made;
   };
-  const path = `/runs/${encodeURIComponent(incident.run)}/incidents/${encodeURIComponent(id)}`;
+  const path = `/runs/${encodeURIComponent(incident.run)}/incidents/${encodeURIComponent(incident.incident)}`;
   const send = async (where: string, more: Partial<Wanted>) => {
     const made = wanted();
     if (!made || busy.value) return;
@@ -201,6 +213,15 @@ export function IncidentPanel() {
             onClick={() => void send(path, { even_if_stuck: true })}
           >
             {text.anyway}
+          </button>
+        )}
+        {queue.length > 1 && (
+          <button
+            type="button"
+            class="prompt-next"
+            onClick={() => (chosen.value = idOf(queue[(at + 1) % queue.length]!))}
+          >
+            {fill(text.next, { number: at + 1, count: queue.length })}
           </button>
         )}
       </form>
