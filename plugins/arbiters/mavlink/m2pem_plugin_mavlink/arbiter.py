@@ -32,6 +32,7 @@ from m2pem_plugin_mavlink.settings import Settings, read_settings
 
 if TYPE_CHECKING:
     from m2pem_plugin_mavlink.behaviors.behavior import Behavior
+    from m2pem_plugin_mavlink.vehicle.failsafe import FailsafeMonitor
     from m2pem_plugin_mavlink.vehicle.takeover_monitor import TakeoverMonitor
     from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
     from m2pem_plugin_mavlink.vehicle_controller import VehicleController
@@ -62,8 +63,8 @@ class VehicleConnections(Protocol):
         """Return a monitor that detects takeovers of the vehicle; it is not open yet."""
         ...
 
-    async def findings(self, vehicle: "Vehicle") -> Sequence[str]:
-        """Return the differences between the vehicle's failsafes and the fleet file."""
+    def failsafes(self, vehicle: "Vehicle") -> "FailsafeMonitor":
+        """Return what compares the vehicle's failsafes with the fleet file."""
         ...
 
     async def close(self) -> None:
@@ -391,17 +392,29 @@ class MavlinkArbiter:
 
     async def _check(self, vehicle: "Vehicle") -> None:
         """Log and publish the differences between the fleet file and the vehicle's failsafes, once
-        it is identified."""
+        it is identified, and whenever they have changed."""
         await vehicle.until(lambda: vehicle.identity is not None)
         resource = vehicle.resource
-        if self._vehicle_connections is not None and self._connections[resource].failsafe:
-            found = await self._vehicle_connections.findings(vehicle)
-            for finding in found:
-                self._context.logger.warning("%s", finding)
-            self._failsafe_problems[resource] = tuple(
-                each.removeprefix(f"{resource}: ") for each in found
-            )
-            self._publish(self._controllers[resource])
+        if self._vehicle_connections is None or not self._connections[resource].failsafe:
+            return
+        monitor = self._vehicle_connections.failsafes(vehicle)
+        while True:
+            # What cannot be read while the link is lost is no difference.
+            if vehicle.link_state is not LinkState.LOST:
+                self._note_failsafes(resource, [each.text for each in await monitor.findings()])
+            await monitor.wait_for_change()
+
+    def _note_failsafes(self, resource: ResourceId, found: Sequence[str]) -> None:
+        before = self._failsafe_problems.get(resource)
+        if before == tuple(found):
+            return
+        self._failsafe_problems[resource] = tuple(found)
+        for text in found:
+            if text not in (before or ()):
+                self._context.logger.warning("%s: %s", resource, text)
+        if before and not found:
+            self._context.logger.info("%s: its failsafes are as the fleet says now", resource)
+        self._publish(self._controllers[resource])
 
     def _publish(self, controller: "VehicleController") -> None:
         vehicle = controller.vehicle

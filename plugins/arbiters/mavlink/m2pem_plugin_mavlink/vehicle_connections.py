@@ -1,7 +1,7 @@
 """Opens the links to the vehicles of a fleet."""
 
 import asyncio
-from collections.abc import Awaitable, Callable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Mapping
 
 from m2pem.api import ArbiterContext, Connection, ResourceId
 from m2pem.errors import PluginError
@@ -11,7 +11,7 @@ from m2pem_plugin_mavlink.mavsdk_driver.link import MavsdkLink
 from m2pem_plugin_mavlink.protocol.messages import Address
 from m2pem_plugin_mavlink.settings import Settings
 from m2pem_plugin_mavlink.signing.key_file import SigningError
-from m2pem_plugin_mavlink.vehicle.failsafe import check
+from m2pem_plugin_mavlink.vehicle.failsafe import FailsafeMonitor
 from m2pem_plugin_mavlink.vehicle.takeover_monitor import TakeoverMonitor
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 
@@ -85,10 +85,10 @@ class MavlinkVehicleConnections:
     def watch(self, vehicle: Vehicle) -> TakeoverMonitor:
         return TakeoverMonitor(vehicle, self._settings[vehicle.resource].gcs_system_id)
 
-    async def findings(self, vehicle: Vehicle) -> Sequence[str]:
+    def failsafes(self, vehicle: Vehicle) -> FailsafeMonitor:
         word = self._connections[vehicle.resource].failsafe
         own = self._settings[vehicle.resource].gcs_system_id
-        return [str(finding) for finding in await check(vehicle, word, own)]
+        return FailsafeMonitor(vehicle, word, own)
 
     async def close(self) -> None:
         for vehicle in self._vehicles.values():

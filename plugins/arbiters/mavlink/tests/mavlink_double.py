@@ -12,6 +12,7 @@ from m2pem_plugin_mavlink.behaviors.behavior import BehaviorContext
 from m2pem_plugin_mavlink.protocol.messages import Address
 from m2pem_plugin_mavlink.protocol.transaction import NoAnswerError, RefusedError
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Readiness, TargetPosition
+from m2pem_plugin_mavlink.vehicle.failsafe import FailsafeFinding
 from m2pem_plugin_mavlink.vehicle.identity import Firmware, Identity, Kind
 from m2pem_plugin_mavlink.vehicle.state import AutopilotState, CommandedState
 from m2pem_plugin_mavlink.vehicle.takeover_monitor import TakeoverMonitor
@@ -272,6 +273,21 @@ class DoubleVehicle:
         return tuple(text for at_s, text in self.body.texts if now_s - at_s <= within_s)
 
 
+class DoubleFailsafes:
+    """The failsafes of a body: its `findings`, which a test changes."""
+
+    def __init__(self, vehicle: DoubleVehicle) -> None:
+        self._vehicle, self._found = vehicle, ()
+
+    async def findings(self):
+        await self._vehicle.sleep(1.0)
+        vehicle, self._found = self._vehicle, tuple(self._vehicle.body.findings)
+        return [FailsafeFinding(vehicle.resource, "", text) for text in self._found]
+
+    async def wait_for_change(self):
+        await self._vehicle.until(lambda: tuple(self._vehicle.body.findings) != self._found)
+
+
 class DoubleStation:
     """The station of an arbiter, over bodies that stay when it is closed."""
 
@@ -291,9 +307,8 @@ class DoubleStation:
     def watch(self, vehicle):
         return TakeoverMonitor(vehicle)
 
-    async def findings(self, vehicle):
-        await vehicle.sleep(1.0)
-        return vehicle.body.findings
+    def failsafes(self, vehicle):
+        return DoubleFailsafes(vehicle)
 
     async def _move(self) -> None:
         while True:

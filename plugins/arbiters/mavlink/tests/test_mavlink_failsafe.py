@@ -1,8 +1,20 @@
-import pytest
-from m2pem_plugin_mavlink.vehicle.failsafe import findings, parameters_of_interest
-from m2pem_plugin_mavlink.vehicle.identity import Firmware, Identity, Kind
+import asyncio
+from collections.abc import Callable
+from typing import Any
 
-from m2pem.api import ResourceId
+import pytest
+from m2pem_plugin_mavlink.vehicle.failsafe import (
+    FailsafeMonitor,
+    findings,
+    parameters_of_interest,
+)
+from m2pem_plugin_mavlink.vehicle.identity import Firmware, Identity, Kind
+from mavlink_vehicle_world import Playing, ScriptedLink, copter, make
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from m2pem.api import Clock, ResourceId
+
+Run = Callable[[Callable[[Clock], Any]], Any]
 
 UAV1 = ResourceId("uav1")
 COPTER = Identity(Firmware.ARDUPILOT, Kind.COPTER)
@@ -114,3 +126,74 @@ def test_what_goes_with_a_return_is_looked_at(change: dict[str, float], paramete
 @pytest.mark.parametrize("kind", Kind)
 def test_every_vehicle_has_parameters_to_look_at(firmware: Firmware, kind: Kind) -> None:
     assert len(parameters_of_interest(Identity(firmware, kind))) >= 2
+
+
+def answers(link: ScriptedLink, values: dict[str, float]) -> list[str]:
+    """The vehicle has these parameters; returns the names that are requested, as they come."""
+    requested: list[str] = []
+    send = link.send
+
+    def take(message: Any) -> None:
+        send(message)
+        if message.TYPE.name != "PARAM_REQUEST_READ":
+            return
+        name = bytes(message.param_id).rstrip(b"\0").decode()
+        requested.append(name)
+        if name in values:
+            asyncio.get_running_loop().call_soon(reports, link, name, values[name])
+
+    link.send = take  # type: ignore[method-assign]
+    return requested
+
+
+def reports(link: ScriptedLink, name: str, value: float) -> None:
+    kind = dialect.MAV_PARAM_TYPE_REAL32
+    fields = {"param_id": name.encode(), "param_value": value, "param_type": kind}
+    link.hear(make("PARAM_VALUE", **fields))
+
+
+def test_a_parameter_that_is_set_later_is_compared_at_once(virtual: Run) -> None:
+    async def main(clock: Clock) -> None:
+        async with Playing(copter(clock)) as (link, vehicle):
+            values = dict(GOOD)
+            answers(link, values)
+            monitor = FailsafeMonitor(vehicle, "return_to_launch", None)
+            assert await monitor.findings() == ()
+            began_s = link.now_s()
+            waits = asyncio.ensure_future(monitor.wait_for_change())
+            await clock.sleep(5.0)
+            reports(link, "FS_GCS_ENABLE", 1.0)  # as it was
+            reports(link, "WP_RADIUS", 3.0)  # none of those
+            await clock.sleep(5.0)
+            assert not waits.done()
+            values["FS_GCS_ENABLE"] = 0.0
+            reports(link, "FS_GCS_ENABLE", 0.0)
+            await waits
+            assert link.now_s() - began_s < 15.0
+            (found,) = await monitor.findings()
+            assert found.parameter == "FS_GCS_ENABLE"
+
+    virtual(main)
+
+
+def test_parameters_are_read_again_each_minute_and_missing_ones_once(virtual: Run) -> None:
+    async def main(clock: Clock) -> None:
+        async with Playing(copter(clock)) as (link, vehicle):
+            values = dict(GOOD)
+            requested = answers(link, values)
+            monitor = FailsafeMonitor(vehicle, "return_to_launch", None)
+            await monitor.findings()
+            assert {"FS_OPTIONS", "RTL_ALT_M"} <= set(requested)
+            requested.clear()
+            values["BATT_FS_LOW_ACT"] = 0.0  # the vehicle does not say so
+            began_s = link.now_s()
+            await monitor.wait_for_change()
+            assert 60.0 <= link.now_s() - began_s < 65.0
+            (found,) = await monitor.findings()
+            assert found.parameter == "BATT_FS_LOW_ACT"
+            assert sorted(requested) == sorted(GOOD)
+            # A vehicle that does not answer any more has not changed.
+            values.clear()
+            assert await monitor.findings() == (found,)
+
+    virtual(main)

@@ -453,6 +453,25 @@ def test_a_failsafe_that_is_not_the_fleets_is_told_at_connect(failsafe, caplog) 
         assert bench.states[-1].failsafe_problems == (("FS_GCS_ENABLE is 0",) if failsafe else None)
 
     caplog.set_level("WARNING")
-    body = Body(findings=["v: FS_GCS_ENABLE is 0"])
+    body = Body(findings=["FS_GCS_ENABLE is 0"])
     play(body, main, failsafe=failsafe)
     assert ("FS_GCS_ENABLE is 0" in caplog.text) is bool(failsafe)
+
+
+def test_a_failsafe_that_changes_is_said_and_published(caplog) -> None:
+    body = Body(findings=["FS_GCS_ENABLE is 0"])
+
+    async def main(bench) -> None:
+        await bench.clock.sleep(2)
+        body.findings = ["FS_GCS_ENABLE is 0", "RTL_ALT is 0"]
+        await bench.clock.sleep(2)
+        assert bench.states[-1].failsafe_problems == ("FS_GCS_ENABLE is 0", "RTL_ALT is 0")
+        body.findings = []
+        await bench.clock.sleep(2)
+        assert bench.states[-1].failsafe_problems == ()
+
+    caplog.set_level("INFO")
+    play(body, main, failsafe="return_to_launch")
+    assert caplog.text.count("FS_GCS_ENABLE is 0") == 1
+    assert caplog.text.count("RTL_ALT is 0") == 1
+    assert "its failsafes are as the fleet says now" in caplog.text

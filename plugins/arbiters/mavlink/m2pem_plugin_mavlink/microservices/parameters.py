@@ -62,6 +62,7 @@ _BY_NAME = -1
 
 _READ = message_type("PARAM_REQUEST_READ")
 _VALUE = message_type("PARAM_VALUE")
+PARAM_VALUE = _VALUE.id
 _ERROR = message_type("PARAM_ERROR")
 _ERRORS: dict[int, str] = {
     dialect.MAV_PARAM_ERROR_DOES_NOT_EXIST: "it has no such parameter",

@@ -21,7 +21,7 @@ from m2pem_plugin_mavlink.protocol.messages import Message
 from m2pem_plugin_mavlink.protocol.transaction import RetryPolicy
 from m2pem_plugin_mavlink.vehicle.identity import Firmware
 
-_ENCODINGS = {
+ENCODINGS = {
     Firmware.ARDUPILOT: ParameterEncoding.C_CAST,
     Firmware.PX4: ParameterEncoding.BYTEWISE,
 }
@@ -100,4 +100,4 @@ async def mission_item(link: VehicleLink, sequence: int) -> MissionItem:
 
 async def parameter(link: VehicleLink, firmware: Firmware, name: str) -> float:
     """Return the value of a parameter."""
-    return await link.perform(ReadParameter(link.address, name, _ENCODINGS[firmware]))
+    return await link.perform(ReadParameter(link.address, name, ENCODINGS[firmware]))

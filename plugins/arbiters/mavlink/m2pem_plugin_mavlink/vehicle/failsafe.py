@@ -1,19 +1,26 @@
-"""Compares the failsafe in the fleet file with the parameters of the vehicle.
+"""Compares the failsafe in the fleet file with the parameters of the vehicle, again and again.
 
 Sources: the parameter references of ArduPilot (FS_*, BATT_FS_*, RTL_ALT, MAV_GCS_SYSID) and PX4
 (NAV_DLL_ACT, COM_LOW_BAT_ACT, RTL_RETURN_ALT). Nothing is changed: findings say what to set.
 """
 
 import asyncio
-import contextlib
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from m2pem.api import ResourceId
+from m2pem_plugin_mavlink.microservices.parameters import PARAM_VALUE, encoded_name, value_of
+from m2pem_plugin_mavlink.protocol.messages import Address, Message
 from m2pem_plugin_mavlink.protocol.transaction import ExchangeError
 from m2pem_plugin_mavlink.vehicle import exchanges
 from m2pem_plugin_mavlink.vehicle.identity import ON_THE_GROUND, Firmware, Identity, Kind
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
+
+AGAIN_S = 60.0
+"""Some autopilots report no parameter that is set elsewhere: they are read again."""
+
+SETTLES_S = 2.0
 
 RETURN, LAND, HOLD, CONTINUE = "return_to_launch", "land", "hold", "continue"
 WORDS = (RETURN, LAND, HOLD, CONTINUE)
@@ -267,18 +274,64 @@ def _copter_findings(word: str, values: Values) -> _Found:
             yield name, f"{name} is 0: it returns at the height that it has; set a height"
 
 
-async def check(vehicle: Vehicle, word: str, own_system: int | None) -> tuple[FailsafeFinding, ...]:
-    """Read the parameters of an identified vehicle, and compare; an unanswered one is among the
-    findings."""
-    identity = vehicle.identity
-    if not word or identity is None:
-        return ()
-    values: dict[str, float] = {}
+class FailsafeMonitor:
+    """Compares the failsafes of an identified vehicle, and again when they may have changed.
 
-    async def read(name: str) -> None:
-        # A parameter that a vehicle does not have is answered by silence.
-        with contextlib.suppress(ExchangeError):
-            values[name] = await exchanges.parameter(vehicle.link, identity.firmware, name)
+    Parameters that the vehicle does not have are requested only once: it answers each request with
+    silence, after which the request is repeated.
+    """
 
-    await asyncio.gather(*map(read, parameters_of_interest(identity)))
-    return findings(vehicle.resource, word, identity, values, own_system)
+    def __init__(self, vehicle: Vehicle, word: str, own_system: int | None) -> None:
+        self._vehicle = vehicle
+        self._word = word
+        self._own_system = own_system
+        self._values: dict[str, float] = {}
+        self._missing: set[str] = set()
+
+    async def findings(self) -> tuple[FailsafeFinding, ...]:
+        """Read the parameters of an identified vehicle, and compare; an unanswered one is among the
+        findings. A value that was read before stands in for an answer that does not come."""
+        vehicle, identity = self._vehicle, self._vehicle.identity
+        if not self._word or identity is None:
+            return ()
+
+        async def read(name: str) -> None:
+            try:
+                value = await exchanges.parameter(vehicle.link, identity.firmware, name)
+            except ExchangeError:
+                if name not in self._values:
+                    self._missing.add(name)
+            else:
+                self._values[name] = value
+
+        names = parameters_of_interest(identity)
+        await asyncio.gather(*(read(name) for name in names if name not in self._missing))
+        return findings(vehicle.resource, self._word, identity, self._values, self._own_system)
+
+    async def wait_for_change(self, within_s: float = AGAIN_S) -> None:
+        """Wait until the vehicle reports another value of one of the parameters, as it does when
+        somebody sets one, or `within_s`, by the arbiter's clock."""
+        vehicle, identity = self._vehicle, self._vehicle.identity
+        if identity is None:
+            return
+        names = {encoded_name(name): name for name in parameters_of_interest(identity)}
+        encoding = exchanges.ENCODINGS[identity.firmware]
+        changed = False
+
+        def receive(message: Message, sender: Address) -> None:
+            nonlocal changed
+            name = names.get(message.param_id)
+            if name is None or sender != vehicle.link.address:
+                return
+            value, known = value_of(message, encoding), self._values.get(name)
+            if value != known and not math.isnan(value):
+                self._missing.discard(name)
+                changed = True
+
+        stop_listening = vehicle.link.listen((PARAM_VALUE,), receive)
+        try:
+            await vehicle.until(lambda: changed, within_s)
+            # A station that sends parameters sets several: they are read together.
+            await vehicle.sleep(SETTLES_S)
+        finally:
+            stop_listening()
