@@ -123,10 +123,13 @@ class Bell:
         return self.on
 
 
-def time_left(alerts: Iterable[OperatorAlert], run: RunId, prompt: str, now_us: int) -> str:
-    """Return how long a question is open yet: ", 0:42 left"; "": without a limit."""
+def time_left(alerts: Iterable[OperatorAlert], run: RunId, prompt: str, passed_s: float) -> str:
+    """Return how long a question is open yet: ", 0:42 left"; "": without a limit.
+
+    `passed_s`: seconds by the executive's clock since the alerts were read.
+    """
     for each in alerts:
         asks = each.code == QUESTION and each.run == run and each.subject == prompt
-        if asks and each.open and each.deadline_us is not None:
-            return f", {clock_time(max(0, each.deadline_us - now_us) / 1_000_000)} left"
+        if asks and each.open and each.left_s is not None:
+            return f", {clock_time(max(0, each.left_s - passed_s))} left"
     return ""

@@ -150,7 +150,7 @@ class Display(App[None], Listener, inherit_bindings=False):
         self.map_pane = MapPane(control.fleet(), ascii=bool(self._ascii))
         self.map_active = False
         self.alerts: Sequence[OperatorAlert] = ()
-        self._alerts_read = False
+        self._alerts_read_s: float | None = None
         self.alarm_bell = Bell(on=os.environ.get(BELL, "1") != "0")
         self._notice = NoticeLine(now, lambda: hint(self.alerts))
         self.prompt_pane = PromptPane(now)
@@ -317,7 +317,10 @@ class Display(App[None], Listener, inherit_bindings=False):
         return view.behaviors.get(id_) if view is not None else None
 
     def _time_left(self, prompt: OpenPrompt) -> str:
-        return time_left(self.alerts, prompt.run, prompt.prompt, self.clock_us())
+        # The executive says what is left: its clock may be another one than that of this computer.
+        since_s = self.now() - (self._alerts_read_s or 0.0)
+        passed_s = since_s * self.control.speed()
+        return time_left(self.alerts, prompt.run, prompt.prompt, passed_s)
 
     def _label(self, prompt: OpenPrompt) -> str:
         view = self.follower.views.get(prompt.run)
@@ -388,11 +391,11 @@ class Display(App[None], Listener, inherit_bindings=False):
     async def _read_alerts(self) -> None:
         with suppress(M2pemError):  # the last answer stays
             self.alerts = await self.control.alerts()
-            self._alerts_read = True
+            self._alerts_read_s = self.now()
             self._ring()
 
     def _ring(self) -> None:
-        if self._alerts_read and self.alarm_bell.rings(self.alerts, self.now()):
+        if self._alerts_read_s is not None and self.alarm_bell.rings(self.alerts, self.now()):
             self.bell()
 
     def alerted(self, alert: Alert) -> None:

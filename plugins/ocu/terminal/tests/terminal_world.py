@@ -114,6 +114,10 @@ class Terminal:
         self.pilot = pilot
         self._operator = operator
 
+    def pass_time(self, seconds: float) -> None:
+        """Let so much time pass for the operator."""
+        self._operator.now_s += seconds
+
     async def press(self, *keys: str) -> None:
         """Press keys, a while after whatever was pressed or shown before."""
         self._operator.now_s += 1.0
