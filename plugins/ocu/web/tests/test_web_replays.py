@@ -18,7 +18,7 @@ from m2pem_plugin_web.replay.source import JournalSource, ListSource
 from m2pem_plugin_web.replay.spans import Span, SpanFolder, SpanWindow
 from m2pem_plugin_web.rest.record_pages import new_view, page_of
 from test_web_telemetry import begun
-from web_replayed import RUNS, looping, rehearsed, run_of
+from web_replayed import FIXTURE, RUNS, fixture, looping, rehearsed, run_of
 from web_world import MakeWorld
 
 from m2pem.api import MissionControl, RunSummary, RunView, SimulationResult, StampedRecord
@@ -307,3 +307,8 @@ async def test_the_index_of_a_run_with_records_after_its_end_is_gone_on_with(
         (tmp_path / "journal.db-replays" / f"{run}.index").unlink(missing_ok=True)
         again = await opened(replays, summary)
         assert await contents(again) == await contents(whole)
+
+
+async def test_the_pages_own_tests_have_what_the_server_sends() -> None:
+    """`python tests/web_replayed.py` writes it."""
+    assert await asyncio.to_thread(FIXTURE.read_text, encoding="utf-8") == await fixture()

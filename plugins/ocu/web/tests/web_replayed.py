@@ -1,7 +1,19 @@
-"""Runs that replays are tried with: rehearsed missions, and a loop that never waits."""
+"""Runs that replays are tried with: rehearsed missions, and a loop that never waits.
 
+Run as a program, it writes `FIXTURE`.
+"""
+
+import asyncio
+import json
 from functools import cache
 from pathlib import Path
+from typing import Any
+
+import msgspec
+from m2pem_plugin_web.replay.index import IndexBuilder, with_overview
+from m2pem_plugin_web.replay.replay import Replay
+from m2pem_plugin_web.replay.source import ListSource
+from m2pem_plugin_web.rest.record_pages import new_view
 
 import m2pem
 from m2pem.api import MissionControl, SimulationResult
@@ -56,3 +68,33 @@ async def run_of(control: MissionControl, mission: bytes) -> str:
     run = await control.start(mission, by="test")
     await control.wait(run)
     return run
+
+
+FIXTURE = Path(__file__).parents[1] / "ui" / "src" / "records" / "replayed.json"
+"""What the server sends of short runs in short pages: the page's own tests compare theirs to it."""
+
+FIXTURE_PAGE = 7
+
+
+async def fixture() -> str:
+    """Return what `FIXTURE` has to be."""
+    runs: dict[str, Any] = {}
+    for name in ("detection", "errors"):
+        result = rehearsed(name)
+        view, builder = new_view(result.summary), IndexBuilder(result.summary.run, FIXTURE_PAGE)
+        for stamped in result.records:
+            view.apply(stamped)
+            builder.add(view, stamped)
+        index = with_overview(builder.index(view))
+        source = ListSource(result.summary, result.records)
+        replay = await Replay.open(source, index, lambda _: None)
+        numbers = range(-(-index.seq // FIXTURE_PAGE))
+        runs[name] = {
+            "head": json.loads(msgspec.json.encode(replay.head())),
+            "pages": [json.loads(await replay.page(number)) for number in numbers],
+        }
+    return json.dumps(runs, indent=1, ensure_ascii=False) + "\n"
+
+
+if __name__ == "__main__":
+    FIXTURE.write_text(asyncio.run(fixture()), encoding="utf-8")

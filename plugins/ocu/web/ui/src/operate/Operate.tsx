@@ -7,7 +7,7 @@ import { fill, strings } from "../strings";
 import type { RunSummary } from "../shared/types";
 import { operateContext, OperatingProvider, type OperateContext } from "./context";
 import { Layout } from "./layout/Layout";
-import { loadReplay, loadStage, pathOf, type Source, type Stage } from "./loading";
+import { loadReplay, loadStage, pathOf, type Progress, type Source, type Stage } from "./loading";
 import { Player } from "./player/Player";
 import { positionInAddress } from "./player/address";
 import { IncidentPanel } from "./prompts/IncidentPanel";
@@ -26,7 +26,7 @@ const text = strings.operate;
 export default function Operate({ source }: { source: Source }) {
   const context = useSignal<OperateContext | null>(null);
   const problem = useSignal("");
-  const progress = useSignal(0);
+  const opened = useSignal<Opened | null>(null);
   const ended = useSignal(false);
   const opening = useRef<Opening>();
 
@@ -34,7 +34,7 @@ export default function Operate({ source }: { source: Source }) {
     opening.current?.close();
     context.value = null;
     ended.value = false;
-    opening.current = new Opening(source, (count) => (progress.value = count), known);
+    opening.current = new Opening(source, (found) => (opened.value = found), known);
     opening.current
       .open((parts, hasEnded) => {
         context.value = operateContext({ ...parts, replay: () => open(parts) });
@@ -65,13 +65,7 @@ export default function Operate({ source }: { source: Source }) {
   }
   const shown = context.value;
   if (!shown) {
-    return (
-      <p class="nothing" role="status">
-        {progress.value > 0
-          ? fill(text.replay.loading, { count: grouped(progress.value) })
-          : text.run.loading}
-      </p>
-    );
+    return <Loading {...opened.value} />;
   }
   const { scene } = shown;
   const isReplay = scene instanceof ReplayScene;
@@ -91,6 +85,43 @@ export default function Operate({ source }: { source: Source }) {
   );
 }
 
+/** What is known of a run before it can be shown. */
+interface Opened {
+  summary?: RunSummary;
+  made?: Progress;
+}
+
+/** How a long run ended is said before its replay can be shown. */
+function Loading({ summary, made }: Opened) {
+  if (!summary || !made) {
+    return (
+      <p class="nothing" role="status">
+        {text.run.loading}
+      </p>
+    );
+  }
+  const { done, records } = made;
+  return (
+    <section class="opening" aria-label={text.replay.label}>
+      <p>
+        <strong class={`status status-${summary.status}`}>{text.run.status[summary.status]}</strong>{" "}
+        {summary.run} {summary.mission}
+      </p>
+      {summary.detail && <p>{summary.detail}</p>}
+      <label>
+        {text.replay.making}
+        <progress max={records} value={done} />
+      </label>
+      <p role="status">
+        {fill(text.replay.made, {
+          done: done.toLocaleString(),
+          records: records.toLocaleString(),
+        })}
+      </p>
+    </section>
+  );
+}
+
 /** Reads what there is to show, unless the page is left meanwhile. */
 class Opening {
   private left = false;
@@ -98,21 +129,26 @@ class Opening {
 
   constructor(
     private readonly source: Source,
-    private readonly progress: (count: number) => void,
+    private readonly opened: (found: Opened) => void,
     private readonly known?: Stage,
   ) {}
 
   /** `show` is also told whether the end of a run is to be said that was over before. */
   async open(show: (parts: Stage & { scene: Scene }, hasEnded: boolean) => void): Promise<void> {
     const summary = await summaryOf(this.source);
-    const stage = this.known ?? (await loadStage(this.source));
+    this.opened({ summary });
     const live = this.source.kind === "run" && !isOver(summary);
-    const replayed = live ? null : await loadReplay(this.source, summary, this.progress);
-    if (this.left) return;
     // A run that is over is shown as it ended, unless its replay was asked for here.
     const position = positionInAddress();
     const hasEnded = !live && this.source.kind === "run" && !this.known && position === null;
-    replayed?.seek(position ?? (hasEnded ? Infinity : 0));
+    const at = position ?? (hasEnded ? Infinity : 0);
+    const progress = (made: Progress) => this.opened({ summary, made });
+    const [stage, replayed] = await Promise.all([
+      this.known ?? loadStage(this.source),
+      live ? null : loadReplay(this.source, summary, progress, at),
+    ]);
+    if (this.left) replayed?.dispose();
+    if (this.left) return;
     this.scene = replayed ?? new LiveScene(summary.run);
     show({ ...stage, scene: this.scene }, hasEnded);
   }

@@ -1,12 +1,13 @@
 // What has to be read before a run or rehearsal can be shown.
 import { signal, type Signal } from "@preact/signals";
+import type { ReelPage } from "../records/reel";
+import type { Span } from "../records/spans";
 import { geometriesInFile, withOwn } from "../map/ownGeometry";
 import { get } from "../shared/api";
-import type { Fleet, Geometry, RunRecord, RunSummary } from "../shared/types";
+import type { Fleet, Geometry, RunSummary } from "../shared/types";
 import { missionModel, type MissionModel } from "./mission/missionModel";
 import { readDefinitions } from "./mission/reading";
-import type { Page } from "./scene/recordFeed";
-import { ReplayScene } from "./scene/replayScene";
+import { ReplayScene, type ReplayHead } from "./scene/replayScene";
 import { loadTrack } from "./scene/telemetryPages";
 import { NO_TELEMETRY, type Telemetry, type TelemetrySample } from "./scene/telemetryTrack";
 
@@ -23,8 +24,6 @@ interface MissionAnswer {
   process: string;
   files: { name: string; qualifier?: string; xml: string }[];
 }
-
-const PAGE = 5000;
 
 export const pathOf = (source: Source): string =>
   source.kind === "run"
@@ -50,41 +49,61 @@ export async function loadStage(source: Source): Promise<Stage> {
   return { mission, fleet, geometries: signal(withOwn(own, geometries)) };
 }
 
-/** All records, page by page; `progress` is called with how many there are so far. */
-export async function loadRecords(
-  source: Source,
-  progress: (count: number) => void,
-): Promise<RunRecord[]> {
-  const records: RunRecord[] = [];
-  let after: number | null = 0;
-  while (after !== null) {
-    const page: Page = await get(`${pathOf(source)}/records?after=${after}&limit=${PAGE}`);
-    for (const record of page.records) records.push(record);
-    progress(records.length);
-    after = page.next;
-  }
-  return records;
+/** Of how many records of a long run the index is made by now. */
+export interface Progress {
+  done: number;
+  records: number;
 }
 
+type ReplayAnswer =
+  | ({ state: "making" } & Progress)
+  | ({ state: "ready" } & ReplayHead);
+
+/** How often it is asked how far an index is. */
+const ASKED_EVERY_MS = 300;
+/** For so long a replay waits for the vehicles' tracks, which then come later. */
+const TELEMETRY_MS = 300;
+
+async function loadHead(source: Source, progress: (made: Progress) => void): Promise<ReplayHead> {
+  for (;;) {
+    const answer = await get<ReplayAnswer>(`${pathOf(source)}/replay`);
+    if (answer.state === "ready") return answer;
+    progress(answer);
+    await new Promise((resolve) => setTimeout(resolve, ASKED_EVERY_MS));
+  }
+}
+
+/** A replay that shows the moment `at`, in seconds. */
 export async function loadReplay(
   source: Source,
   summary: RunSummary,
-  progress: (count: number) => void,
+  progress: (made: Progress) => void,
+  at = 0,
 ): Promise<ReplayScene> {
-  const [records, telemetry] = await Promise.all([
-    loadRecords(source, progress),
-    loadTelemetry(source),
-  ]);
-  return new ReplayScene(source.kind === "run" ? source.run : "", summary, records, telemetry);
+  const telemetry = loadTelemetry(source);
+  const path = `${pathOf(source)}/replay`;
+  const head = await loadHead(source, progress);
+  const run = source.kind === "run" ? source.run : "";
+  const scene = new ReplayScene(run, summary, head, {
+    page: (number) => get<ReelPage>(`${path}/pages/${number}`),
+    spans: async ({ from_s, to_s }) =>
+      (await get<{ spans: Span[] }>(`${path}/spans?from_s=${from_s}&to_s=${to_s}`)).spans,
+  });
+  const added = telemetry.then((found) => scene.addTelemetry(found));
+  scene.seek(at);
+  const waited = new Promise((resolve) => setTimeout(resolve, TELEMETRY_MS));
+  await Promise.all([scene.settled(), Promise.race([added, waited])]);
+  if (scene.problem.value) throw new Error(scene.problem.value);
+  return scene;
 }
 
 /** A run can be looked at without its track: then it is said why there is none. */
 async function loadTelemetry(source: Source): Promise<Telemetry> {
-  if (source.kind === "rehearsal") {
-    const samples = await get<TelemetrySample[]>(`${pathOf(source)}/telemetry`);
-    return { samples, onlyNews: false, problem: null };
-  }
   try {
+    if (source.kind === "rehearsal") {
+      const samples = await get<TelemetrySample[]>(`${pathOf(source)}/telemetry`);
+      return { samples, onlyNews: false, problem: null };
+    }
     return await loadTrack(source.run);
   } catch (error) {
     return { ...NO_TELEMETRY, problem: error instanceof Error ? error.message : String(error) };

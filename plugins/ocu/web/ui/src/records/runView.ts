@@ -21,6 +21,25 @@ export interface RunView {
   holders: Map<string, string>;
 }
 
+/** A view as the server sends it. */
+export interface PageView {
+  seq: number;
+  t: number;
+  status: RunStatus;
+  detail: string;
+  elements: Elements;
+  prompts: Record<string, Prompt>;
+  commands: Record<string, Command>;
+  holders: Record<string, string>;
+}
+
+export const viewOf = ({ prompts, commands, holders, ...view }: PageView): RunView => ({
+  ...view,
+  prompts: new Map(Object.entries(prompts)),
+  commands: new Map(Object.entries(commands)),
+  holders: new Map(Object.entries(holders)),
+});
+
 export function emptyView(): RunView {
   return {
     seq: 0,

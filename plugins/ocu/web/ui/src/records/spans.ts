@@ -17,6 +17,14 @@ export interface Span {
   to: number | null;
   end: SpanEnd;
   reason: string;
+  /** How many bars of the row it stands for, which are too short to be seen each; 1 if missing. */
+  count?: number;
+}
+
+/** The bars that a time line shows. `rows`: those that it has besides the rows of bars. */
+export interface Bars {
+  readonly all: readonly Span[];
+  readonly rows: readonly string[];
 }
 
 export const PROMPTS = "prompts";
@@ -31,7 +39,7 @@ const ENDS: Record<string, SpanEnd> = {
   LOST: "failed",
 };
 
-export class Spans {
+export class Spans implements Bars {
   readonly all: Span[] = [];
   private readonly open = new Map<string, Span[]>();
   private readonly asked = new Map<string, RunRecord>();

@@ -269,6 +269,8 @@ export const operate = {
     none: "Nothing matches",
     skipped: "{count} events are not shown here",
     newest: "Newest",
+    covers: "Filtered: the last {count} events up to here",
+    cut: "For older events, go to an earlier time",
   },
   timeline: {
     label: "Time line",
@@ -281,6 +283,7 @@ export const operate = {
     now: "Now",
     none: "Nothing was commanded yet",
     goesOn: "goes on",
+    merged: "{count} × {what}",
     ends: {
       succeeded: "succeeded",
       failed: "failed",
@@ -299,7 +302,10 @@ export const operate = {
     end: "To the end",
     position: "Position",
     speed: "Speed",
-    loading: "Reading events… {count}",
+    making: "Preparing the replay",
+    made: "{done} of {records} events",
+    reading: "Reading events…",
+    failed: "This moment cannot be shown: {problem}",
     of: "of",
   },
 } as const;

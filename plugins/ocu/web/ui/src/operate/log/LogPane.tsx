@@ -96,6 +96,14 @@ export function LogPane() {
             {loading.value ? text.loading : text.older}
           </button>
         )}
+        {page.cut && <span>{text.cut}</span>}
+        {words.value && (hasOlder || page.cut) && (
+          <span>
+            {fill(text.covers, {
+              count: Math.min(most.value, page.records.length).toLocaleString(),
+            })}
+          </span>
+        )}
         {page.skipped > 0 && <span>{fill(text.skipped, { count: page.skipped })}</span>}
       </div>
       <LineList lines={shown} />

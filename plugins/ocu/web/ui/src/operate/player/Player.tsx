@@ -1,7 +1,7 @@
 // To go to any moment of what was recorded: play at a speed, step, or take a position.
 import { useEffect } from "preact/hooks";
 import { clockTenths } from "../../shared/format";
-import { strings } from "../../strings";
+import { fill, strings } from "../../strings";
 import { Icon } from "../layout/icons";
 import { isTyping } from "../layout/keys";
 import { FASTEST, SLOWEST, type ReplayScene } from "../scene/replayScene";
@@ -54,7 +54,7 @@ export function Player({ scene, embedded = false }: PlayerProps) {
   }, [playing, time]);
 
   return (
-    <section class="player" aria-label={text.label}>
+    <section class="player" aria-label={text.label} aria-busy={scene.loading.value}>
       <button type="button" class="plain" aria-label={text.start} onClick={() => scene.seek(0)}>
         <Icon name="start" />
       </button>
@@ -94,6 +94,16 @@ export function Player({ scene, embedded = false }: PlayerProps) {
       <output class="player-time">
         {clockTenths(time)} {text.of} {clockTenths(end)}
       </output>
+      {scene.loading.value && (
+        <span class="player-reading" role="status">
+          {text.reading}
+        </span>
+      )}
+      {scene.problem.value && (
+        <span class="player-problem" role="alert">
+          {fill(text.failed, { problem: scene.problem.value })}
+        </span>
+      )}
       <input
         class="player-position"
         type="range"

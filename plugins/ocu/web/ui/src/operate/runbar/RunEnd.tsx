@@ -16,7 +16,8 @@ export function RunEnd({ onClose }: { onClose: () => void }) {
   const { scene, replay } = useOperating();
   const summary = scene.summary.value;
   if (!summary) return null;
-  const { records } = scene.log.value;
+  const { records: logged } = scene.log.value;
+  const records = scene.notable();
   const lines = (wanted: (record: RunRecord) => boolean) =>
     records
       .filter(wanted)
@@ -49,7 +50,7 @@ export function RunEnd({ onClose }: { onClose: () => void }) {
         <dt>{text.reason}</dt>
         <dd>{summary.detail || text.none}</dd>
         <dt>{text.duration}</dt>
-        <dd>{clock(records.at(-1)?.t ?? scene.now())}</dd>
+        <dd>{clock(logged.at(-1)?.t ?? scene.now())}</dd>
         <dt>{text.records}</dt>
         <dd>{grouped(scene.events.value)}</dd>
         <dt>{text.decisions}</dt>

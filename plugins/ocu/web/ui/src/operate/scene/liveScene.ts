@@ -5,6 +5,7 @@ import * as executive from "../../shared/executive";
 import type {
   Command,
   GeoPosition,
+  RunRecord,
   RunStatus,
   RunSummary,
   ServerMessage,
@@ -75,6 +76,14 @@ export class LiveScene implements Scene {
 
   get log() {
     return this.feed.log;
+  }
+
+  notable(): readonly RunRecord[] {
+    return this.feed.log.peek().records;
+  }
+
+  lookAt(): void {
+    // All bars are here.
   }
 
   older(): Promise<void> {

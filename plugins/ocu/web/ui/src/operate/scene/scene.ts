@@ -1,7 +1,8 @@
 // What the page shows of one run, wherever it comes from: the executive now, or records of the
 // past.
 import type { ReadonlySignal } from "@preact/signals";
-import type { Spans } from "../../records/spans";
+import type { Bars } from "../../records/spans";
+import type { Range } from "../plots/series";
 import type { TelemetryHistory } from "../plots/history";
 import type {
   Command,
@@ -25,6 +26,8 @@ export interface LogPage {
   more: boolean;
   /** Records between those here that were not read: more came than anybody can follow. */
   skipped: number;
+  /** Whether there are older ones, which are shown at an earlier time alone. */
+  cut?: boolean;
 }
 
 export interface Scene {
@@ -61,8 +64,12 @@ export interface Scene {
   silentFor_s(resource: string): number | null;
   /** Numbers of vehicles and payloads up to now; they grow in place, and the signal tells it. */
   readonly history: ReadonlySignal<{ history: TelemetryHistory }>;
-  /** Its `spans` change in place; the signal tells that they did. */
-  readonly timeline: ReadonlySignal<{ spans: Spans }>;
+  /** Its `spans` may change in place; the signal tells that they did. */
+  readonly timeline: ReadonlySignal<{ spans: Bars }>;
+  /** Have the bars of a part of the time, or null: all of it, as finely as that part allows. */
+  lookAt(range: Range | null): void;
+  /** Records that the summary of an ended run is made of, as far as they are known. */
+  notable(): readonly RunRecord[];
   readonly log: ReadonlySignal<LogPage>;
   /** Read older records for the log. */
   older(): Promise<void>;

@@ -3,7 +3,7 @@ import { useSignal } from "@preact/signals";
 import { useRef } from "preact/hooks";
 import type { Span } from "../../records/spans";
 import { clock } from "../../shared/format";
-import { strings } from "../../strings";
+import { fill, strings } from "../../strings";
 import { useOperating } from "../context";
 import type { Window } from "./scale";
 import type { Row } from "./TimelinePane";
@@ -61,7 +61,7 @@ export function Bars({ rows, window, width, now, lane_px, onSeek }: BarsProps) {
         const to = Math.min(width, ((span.to ?? now) - window.from_s) * window.px_per_s);
         const wide = Math.max(LEAST_PX, to - from);
         const label = mission.label(span.process, span.element);
-        const shown = span.kind === "behavior" ? `${label} · ${span.label}` : label;
+        const shown = shownOf(span, label);
         return (
           <g
             key={span.id + span.from}
@@ -90,6 +90,13 @@ export function Bars({ rows, window, width, now, lane_px, onSeek }: BarsProps) {
       })}
     </g>
   );
+}
+
+/** `label`: of its element. A bar that stands for many says how many, of what they share. */
+function shownOf(span: Span, label: string): string {
+  const both = span.kind === "behavior" ? [label, span.label] : [label];
+  const said = both.filter(Boolean).join(" · ");
+  return (span.count ?? 1) > 1 ? fill(text.merged, { count: span.count!, what: said }) : said;
 }
 
 type Seen = { row: Row; span: Span };

@@ -1,7 +1,7 @@
 // Who did what when: a row for each vehicle and payload, questions and services above.
 import type { Signal } from "@preact/signals";
-import { useMemo, useRef } from "preact/hooks";
-import { PROMPTS, SERVICES, WAITS, type Span } from "../../records/spans";
+import { useEffect, useMemo, useRef } from "preact/hooks";
+import { PROMPTS, SERVICES, WAITS, type Bars as Shown, type Span } from "../../records/spans";
 import { clock } from "../../shared/format";
 import { strings } from "../../strings";
 import type { Fleet } from "../../shared/types";
@@ -42,15 +42,31 @@ export interface TimelineProps {
 }
 
 export function TimelinePane({ onSeek, plots }: TimelineProps) {
-  const { scene, fleet, pointed } = useOperating();
+  const { scene, fleet, pointed, range } = useOperating();
   const { spans } = usePaced(scene.timeline, 300);
   usePaced(scene.time, EVERY_MS[scene.mode]);
   const time = scene.now();
   const plot = useRef<HTMLDivElement>(null);
-  const rows = useMemo(() => rowsOf(spans.all, fleet), [spans, spans.all.length, fleet]);
+  const rows = useMemo(() => rowsOf(spans, fleet), [spans, spans.all.length, fleet]);
+  const goesOn = useMemo(() => spans.all.some(({ to }) => to === null), [spans, time]);
   const height = (rows.at(-1)?.top ?? 0) + (rows.at(-1)?.height ?? 0);
   const shown = useTimeWindow(plot);
   const { window, width } = shown;
+  useEffect(() => scene.lookAt(range.value), [scene, range.value]);
+  // Of a long run there are many: they are drawn again only where one changes.
+  const bars = useMemo(
+    () => (
+      <Bars
+        rows={rows}
+        window={window}
+        width={width}
+        now={time}
+        lane_px={LANE_PX}
+        onSeek={onSeek}
+      />
+    ),
+    [rows, window.from_s, window.px_per_s, width, goesOn ? time : 0, scene],
+  );
   const x = (t: number) => (t - window.from_s) * window.px_per_s;
   return (
     <Pane
@@ -116,14 +132,7 @@ export function TimelinePane({ onSeek, plots }: TimelineProps) {
                     x={Math.max(0, x(lastOf(row))) + HELD_PX}
                   />
                 ))}
-              <Bars
-                rows={rows}
-                window={window}
-                width={width}
-                now={time}
-                lane_px={LANE_PX}
-                onSeek={onSeek}
-              />
+              {bars}
             </g>
             <line class="now" x1={x(time)} x2={x(time)} y1={AXIS_PX - 6} y2="100%" />
           </svg>
@@ -156,9 +165,9 @@ function Held({ row, held, x }: { row: Row; held: string; x: number }) {
 
 const lastOf = (row: Row): number => Math.max(0, ...row.bars.map(({ span }) => span.to ?? 0));
 
-function rowsOf(spans: readonly Span[], fleet: Fleet): Row[] {
+function rowsOf(spans: Shown, fleet: Fleet): Row[] {
   const inRow = new Map<string, Span[]>();
-  for (const span of spans) {
+  for (const span of spans.all) {
     const row = inRow.get(span.row);
     if (row) row.push(span);
     else inRow.set(span.row, [span]);
@@ -167,11 +176,11 @@ function rowsOf(spans: readonly Span[], fleet: Fleet): Row[] {
     id,
     ...fleet.payloads.filter(({ vehicle }) => vehicle === id).map((payload) => payload.id),
   ]);
-  const vehicles = new Set(fleet.vehicles.map(({ id }) => id));
-  const order = [...new Set([PROMPTS, WAITS, SERVICES, ...resources, ...inRow.keys()])];
+  const named = new Set([...fleet.vehicles.map(({ id }) => id), ...spans.rows]);
+  const order = [...new Set([PROMPTS, WAITS, SERVICES, ...resources, ...spans.rows, ...inRow.keys()])];
   let top = 0;
   return order
-    .filter((id) => inRow.has(id) || vehicles.has(id))
+    .filter((id) => inRow.has(id) || named.has(id))
     .map((id) => {
       const bars = lanes(inRow.get(id) ?? []);
       const height = Math.max(1, ...bars.map(({ lane }) => lane + 1)) * LANE_PX + 4;
