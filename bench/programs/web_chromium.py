@@ -49,35 +49,33 @@ async def blank_page() -> AsyncIterator[Page]:
             await chromium.close()
 
 
-async def count_pictures(
-    page: Page, address: str, warm_s: float, seconds: float, picture: str | None = None
-) -> dict[str, Any]:
-    """Open a run's page by an address that signs in, and count what it draws and receives.
+class Pictures:
+    """Counts what a page draws and receives of a run."""
 
-    `warm_s`: from the diagram's first element on. `picture`: the file of a picture of the end.
-    `cpu_percent`: of a core, in the page's process.
-    """
-    received = 0
+    def __init__(self, page: Page) -> None:
+        self._page = page
+        self._received = 0
+        page.on("websocket", lambda socket: socket.on("framereceived", self._count))
 
-    def count(text: str | bytes) -> None:
-        nonlocal received
-        received += str(text).startswith('{"type":"frame"')
+    def _count(self, text: str | bytes) -> None:
+        self._received += str(text).startswith('{"type":"frame"')
 
-    page.on("websocket", lambda socket: socket.on("framereceived", count))
-    await page.goto(address)
-    await page.locator(".drawing .djs-shape").first.wait_for()
-    await asyncio.sleep(warm_s)
-    tools = await page.context.new_cdp_session(page)
-    await tools.send("Performance.enable")
-    before, before_s = received, await _cpu_s(tools)
-    answer: dict[str, Any] = await page.evaluate(_COUNT_PICTURES, seconds)
-    answer |= {
-        "told_per_s": (received - before) / seconds,
-        "cpu_percent": (await _cpu_s(tools) - before_s) / seconds * 100,
-    }
-    if picture is not None:
-        await page.screenshot(path=picture)
-    return answer
+    async def open(self, address: str, warm_s: float) -> None:
+        """Open the run's page by an address that signs in. `warm_s`: once it shows the diagram."""
+        await self._page.goto(address)
+        await self._page.locator(".drawing .djs-shape").first.wait_for()
+        await asyncio.sleep(warm_s)
+
+    async def count(self, seconds: float) -> dict[str, Any]:
+        """Count for some seconds. `cpu_percent`: of a core, in the page's process."""
+        tools = await self._page.context.new_cdp_session(self._page)
+        await tools.send("Performance.enable")
+        before, before_s = self._received, await _cpu_s(tools)
+        answer: dict[str, Any] = await self._page.evaluate(_COUNT_PICTURES, seconds)
+        return answer | {
+            "told_per_s": (self._received - before) / seconds,
+            "cpu_percent": (await _cpu_s(tools) - before_s) / seconds * 100,
+        }
 
 
 async def counted_all(page: Page, records: int) -> None:

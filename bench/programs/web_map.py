@@ -20,7 +20,7 @@ from m2pem_plugin_web.ocu import WebOcu
 
 from bench.graphs import file
 from bench.programs.stage import asking, executive, flows
-from bench.programs.web_chromium import blank_page, count_pictures
+from bench.programs.web_chromium import Pictures, blank_page
 from m2pem.api.arbiter import ArbiterContext, Connection
 from m2pem.api.telemetry import GeoPosition, VehicleState
 from m2pem.fleet.fleet import Domain, Fleet, Vehicle
@@ -123,7 +123,11 @@ async def measure(
         address = ocu.url.replace("/?", f"/runs/{run}?")
         serving = asyncio.create_task(ocu.serve())
         try:
-            answer = await count_pictures(page, address, GROW_S, seconds, picture)
+            pictures = Pictures(page)
+            await pictures.open(address, GROW_S)
+            answer = await pictures.count(seconds)
+            if picture is not None:
+                await page.screenshot(path=picture)
         finally:
             serving.cancel()
             await asyncio.gather(serving, return_exceptions=True)

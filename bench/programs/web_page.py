@@ -15,7 +15,7 @@ from typing import Any
 
 from bench.programs.stage import executive
 from bench.programs.web import MISSION, WARM_S, counted, watched
-from bench.programs.web_chromium import blank_page, count_pictures, counted_all
+from bench.programs.web_chromium import Pictures, blank_page, counted_all
 from m2pem.journal.sqlite import SqliteJournal
 
 
@@ -25,10 +25,12 @@ async def measure(seconds: float, folder: Path) -> dict[str, Any]:
     async with executive(journal) as running, blank_page() as page:
         run = await running.control.start(MISSION)
         async with watched(running, run, folder) as (said, url):
+            address = url().replace("/?", f"/runs/{run}?")
+            pictures = Pictures(page)
+            await pictures.open(address, WARM_S)
             state = running.runners[run].run.state
             before, began = state.seq, asyncio.get_running_loop().time()
-            address = url().replace("/?", f"/runs/{run}?")
-            answer = await count_pictures(page, address, WARM_S, seconds)
+            answer = await pictures.count(seconds)
             records = state.seq - before
             took_s = asyncio.get_running_loop().time() - began
             await running.control.stop(run)

@@ -2,7 +2,8 @@
 
 python -m bench.programs.web_tab <address with its token> <run> <seconds>
 
-It reads from its input how many records the run had in the end, and waits until it shows so many.
+It prints a line when the run is shown, and reads a line before it counts; then it reads how many
+records the run had in the end, and waits until the page shows so many.
 """
 
 import asyncio
@@ -10,7 +11,7 @@ import json
 import sys
 from typing import Any
 
-from bench.programs.web_chromium import blank_page, count_pictures, counted_all
+from bench.programs.web_chromium import Pictures, blank_page, counted_all
 
 WARM_S = 1.0
 
@@ -18,7 +19,11 @@ WARM_S = 1.0
 async def look(url: str, run: str, seconds: float) -> dict[str, Any]:
     """Count pictures for some seconds, and wait for the end of the run."""
     async with blank_page() as page:
-        answer = await count_pictures(page, url.replace("/?", f"/runs/{run}?"), WARM_S, seconds)
+        pictures = Pictures(page)
+        await pictures.open(url.replace("/?", f"/runs/{run}?"), WARM_S)
+        print("shown", flush=True)
+        await asyncio.to_thread(sys.stdin.readline)
+        answer = await pictures.count(seconds)
         await counted_all(page, int(await asyncio.to_thread(sys.stdin.readline)))
         return answer
 
