@@ -19,7 +19,8 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
 from m2pem.errors import PluginError
-from m2pem_plugin_web.live.socket import ABORT, LONGEST_MESSAGE
+from m2pem_plugin_web.live.socket import LONGEST_MESSAGE
+from m2pem_plugin_web.live.wire import WIRE, frame_of_text
 from m2pem_plugin_web.settings import HOST, PORT, Settings
 
 MOST_STRANGERS = 128
@@ -150,10 +151,42 @@ class _Http(H11Protocol):
 
 
 class _WebSocket(WebSocketsSansIOProtocol):
+    """Is the `Wire` of the app: what comes is passed on at once, what goes is written at once."""
+
+    _received: Callable[[bytes], None] | None = None
+    _drained: Callable[[], None] | None = None
+
     async def run_asgi(self) -> None:
-        """Let the app abort a connection whose browser receives nothing."""
-        self.scope[ABORT] = self.transport.abort  # type: ignore[literal-required]
+        self.scope[WIRE] = self  # type: ignore[literal-required]
         await super().run_asgi()
+
+    def listen(self, received: Callable[[bytes], None], drained: Callable[[], None]) -> None:
+        self._received = received
+        self._drained = drained
+
+    @property
+    def is_writable(self) -> bool:
+        return self.writable.is_set()
+
+    def write_text(self, head: bytes, rest: bytes) -> None:
+        if not (self.close_sent or self.disconnected or self.transport.is_closing()):
+            self.transport.write(frame_of_text(head, rest))
+
+    def abort(self) -> None:
+        self.transport.abort()
+
+    def send_receive_event_to_app(self) -> None:
+        # What came before the app listens, and has not been fetched, goes before.
+        if self._received is None or self.close_sent or not self.queue.empty():
+            super().send_receive_event_to_app()
+            return
+        data, self.frames = b"".join(self.frames), []
+        self._received(data)
+
+    def resume_writing(self) -> None:
+        super().resume_writing()
+        if self._drained is not None:
+            self._drained()
 
 
 class _Uvicorn(uvicorn.Server):

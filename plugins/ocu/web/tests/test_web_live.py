@@ -1,14 +1,16 @@
 """What browsers are told over their WebSockets, and at what pace."""
 
 import asyncio
+import logging
+from collections.abc import Callable, Iterable
+from itertools import pairwise
 from typing import Any
 
 import pytest
+from m2pem_plugin_web.live import messages
 from m2pem_plugin_web.live.hub import FRAME_S, MOST_VIEWERS
-from m2pem_plugin_web.live.socket import FULL, SILENT, converse
+from m2pem_plugin_web.live.socket import FULL, SILENT
 from m2pem_plugin_web.live.viewer import URGENT, WINDOW, Viewer
-from starlette.types import Message
-from starlette.websockets import WebSocket
 from web_world import VEHICLE, Live, MakeWorld, World, serving
 
 from m2pem.api import RunId, RunStatus, StampedRecord, follower
@@ -35,16 +37,26 @@ LAPS = b"""<definitions xmlns="http://www.omg.org/spec/BPMN/20100524/MODEL"
 """Laps without end, 100 in a second."""
 
 
+async def every_record(here: World, run: RunId) -> list[StampedRecord]:
+    """All records of a run, by the journal."""
+    records: list[StampedRecord] = []
+    while page := await here.control.records(run, records[-1].seq if records else 0):
+        records += page
+    return records
+
+
+def entered(records: Iterable[StampedRecord]) -> dict[str, int]:
+    """How often each element was entered."""
+    hits: dict[str, int] = {}
+    for stamped in records:
+        if isinstance(stamped.record, TokenEntered):
+            hits[stamped.record.element] = hits.get(stamped.record.element, 0) + 1
+    return hits
+
+
 async def counted(here: World, run: RunId) -> dict[str, int]:
     """How often each element was entered, by the journal."""
-    hits: dict[str, int] = {}
-    after = 0
-    while page := await here.control.records(run, after):
-        after = page[-1].seq
-        for stamped in page:
-            if type(stamped.record).__name__ == "TokenEntered":
-                hits[stamped.record.element] = hits.get(stamped.record.element, 0) + 1  # type: ignore[union-attr]
-    return hits
+    return entered(await every_record(here, run))
 
 
 def hits(live: Live) -> dict[str, int]:
@@ -76,8 +88,9 @@ async def ended(live: Live, run: RunId) -> dict[str, Any]:
 async def test_a_snapshot_has_all_that_is_known(world: MakeWorld) -> None:
     async with world() as here:
         prompt = await here.asked(QUESTION)
-        told = await (await (await here.browser()).live()).watch(prompt.run)
-        assert told["seq"] == 1
+        live = await (await here.browser()).live()
+        told = await live.watch(prompt.run)
+        assert [each["seq"] for each in live.said] == list(range(1, len(live.said) + 1))
         assert (told["run"], told["status"], told["speed"]) == (prompt.run, "running", 20.0)
         (process,) = told["elements"]
         asking = told["elements"][process][prompt.element]
@@ -220,25 +233,27 @@ async def test_every_event_is_counted_and_frames_are_bounded(world: MakeWorld) -
         assert live.said[-1]["seq"] == len(live.said)
 
 
-async def test_a_frame_shows_all_that_it_counts(world: MakeWorld) -> None:
+async def test_each_message_shows_all_that_it_counts(world: MakeWorld) -> None:
+    """Records come all the time, and some of what a frame has was encoded for another browser."""
     async with world() as here:
-        prompt = await here.asked(QUESTION)
-        hub = here.ocu.hub
-        viewer = Viewer()
-        hub.viewers.add(viewer)
-        await hub.watch(viewer, prompt.run)
-        view = hub.runs[prompt.run].view
-        hub.next_messages(viewer, 0.0)
-        viewer.acknowledge(1)
-        # A frame is due, and before it is made, a record comes.
-        viewer.frame_due = True
-        place = next(iter(view.elements))
-        entered = TokenEntered(token=99, process=place[0], element=place[1], scope=1)
-        view.apply(StampedRecord(prompt.run, view.seq + 1, 1.0, entered))
-        told = next(each for each in hub.next_messages(viewer, 0.0) if each["type"] == "frame")
-        hub.viewers.discard(viewer)
-        assert told["events"] == view.seq
-        assert f'"{place[1]}"' in bytes(told["elements"]).decode()
+        run = await here.control.start(LAPS)
+        lives = [await (await here.browser()).live() for _ in range(3)]
+        for live in lives:
+            await live.watch(run)
+            await live.until(lambda message: message["type"] == "frame")
+        await lives[0].until(lambda message: message.get("events", 0) > 1000)
+        await here.control.stop(run)
+        for live in lives:
+            await ended(live, run)
+        records = await every_record(here, run)
+        for live in lives:
+            hits: dict[str, int] = {}
+            frames = [each for each in live.said if each.get("run") == run and "events" in each]
+            assert len(frames) > 3
+            for frame in frames:
+                for elements in frame.get("elements", {}).values():
+                    hits |= {name: state["hits"] for name, state in elements.items()}
+                assert hits == entered(records[: frame["events"]])
 
 
 async def test_a_browser_that_acknowledges_nothing_gets_no_more_than_the_window(
@@ -266,15 +281,58 @@ async def test_a_browser_that_acknowledges_nothing_gets_no_more_than_the_window(
         assert hits(slow) == hits(quick) == await counted(here, run)
 
 
+class Written:
+    """A wire that keeps what is written to it."""
+
+    def __init__(self) -> None:
+        self.is_writable = True
+        self.texts: list[bytes] = []
+
+    def listen(self, received: Callable[[bytes], None], drained: Callable[[], None]) -> None:
+        raise AssertionError("no test needs it")
+
+    def write_text(self, head: bytes, rest: bytes) -> None:
+        self.texts.append(head + rest)
+
+    def abort(self) -> None:
+        raise AssertionError("no test needs it")
+
+
 async def test_what_is_urgent_goes_before_what_is_paced() -> None:
-    viewer = Viewer()
-    viewer.send_soon({"type": "prompt"})
-    assert not viewer.urgent, "it has asked for nothing yet, and will get a snapshot"
+    wire = Written()
+    viewer = Viewer(wire)
+    viewer.send_soon(messages.message("prompt"))
+    assert not wire.texts, "it has asked for nothing yet, and will get a snapshot"
     viewer.watch(None)
-    for number in range(URGENT + 1):
-        viewer.send_soon({"type": "prompt", "number": number})
-    assert len(viewer.urgent) == URGENT
+    assert viewer.may_send
+    wire.is_writable = False
+    for number in range(URGENT):
+        viewer.send_soon(messages.message("prompt", number=number))
+    assert not viewer.may_send
+    assert not viewer.overrun
+    viewer.send_soon(messages.message("prompt", number=URGENT))
     assert viewer.overrun
+    wire.is_writable = True
+    assert not viewer.may_send, "nothing paced overtakes what waits"
+    viewer.flush()
+    assert viewer.may_send
+    assert wire.texts[0] == b'{"type":"prompt","seq":1,"number":0}'
+    assert len(wire.texts) == URGENT
+
+
+async def test_a_browser_that_keeps_no_pace_with_prompts_is_disconnected(
+    world: MakeWorld, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("m2pem_plugin_web.live.viewer.URGENT", 10)
+    async with world() as here:
+        live = await (await here.browser()).live()
+        await live.watch(None)
+        live.socket.transport.pause_reading()
+        hub = here.ocu.hub
+        (viewer,) = hub.viewers
+        while not viewer.overrun:
+            hub.announce("too much " * 10_000)
+        assert await until(lambda: not hub.viewers)
 
 
 async def test_a_browser_that_takes_nothing_in_is_let_go(
@@ -354,24 +412,62 @@ async def test_only_so_many_pages_are_served(
 
 
 async def test_a_browser_that_goes_while_it_speaks_and_is_spoken_to_leaves_no_error(
-    world: MakeWorld,
+    world: MakeWorld, caplog: pytest.LogCaptureFixture
 ) -> None:
     async with world() as here:
-        said: list[Message] = [{"type": "websocket.connect"}]
+        live = await (await here.browser()).live()
+        await live.watch(None)
+        for _ in range(10):
+            await live.send(type="watch", run=None)
+            here.ocu.hub.announce("something")
+        live.socket.transport.abort()
+        here.ocu.hub.announce("something more")
+        assert await until(lambda: not here.ocu.hub.viewers)
+        here.ocu.hub.announce("the last")
+    assert not [each for each in caplog.records if each.levelno >= logging.ERROR]
 
-        async def receive() -> Message:
-            await asyncio.sleep(0)
-            text = '{"type": "watch", "run": null}'
-            return said.pop() if said else {"type": "websocket.receive", "text": text}
 
-        async def send(message: Message) -> None:
-            if message["type"] == "websocket.send":
-                raise OSError("the browser is gone")
+async def test_what_a_browser_sends_in_a_row_is_done_in_order(world: MakeWorld) -> None:
+    async with world() as here:
+        runs = [(await here.asked(QUESTION)).run for _ in range(3)]
+        live = await (await here.browser()).live()
+        for run in [*runs, "r99", None, runs[0]]:
+            await live.send(type="watch", run=run)
+        await live.until(lambda message: message["type"] == "fault" and "r99" in message["text"])
+        await live.until(lambda message: message.get("run") == runs[0])
 
-        socket, viewer = WebSocket({"type": "websocket"}, receive, send), Viewer()
-        await socket.accept()
-        here.ocu.hub.viewers.add(viewer)
-        await converse(socket, here.ocu.hub, viewer, lambda: True)
+
+async def test_many_browsers_get_the_same_at_the_pace_that_the_engine_can_bear(
+    world: MakeWorld, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("m2pem_plugin_web.live.hub.SHARE", 1e-9)
+    monkeypatch.setattr("m2pem_plugin_web.live.hub.SLOWEST_FRAME_S", 0.3)
+    async with world() as here:
+        run = await here.control.start(LAPS)
+        browser = await here.browser()
+        lives = [await browser.live() for _ in range(10)]
+        for live in lives:
+            await live.watch(run)
+        for live in lives:
+            count = 0
+
+            def third(message: dict[str, Any]) -> bool:
+                nonlocal count
+                count += message["type"] == "frame"
+                return count == 3
+
+            await live.until(third)
+            frames = [each["now"] for each in live.said if each["type"] == "frame"]
+            assert all(later - now > 0.2 for now, later in pairwise(frames))
+        prompt = await here.asked(QUESTION)
+        for live in lives:
+            await live.until(lambda message: message["type"] == "prompt")
+        await here.control.stop(prompt.run)
+        await here.control.stop(run)
+        for live in lives:
+            await ended(live, run)
+        truth = await counted(here, run)
+        assert all(hits(live) == truth for live in lives)
 
 
 async def test_two_units_tell_the_same(world: MakeWorld) -> None:

@@ -1,12 +1,15 @@
 """Sends updates to every browser at a pace that the browser can follow; the engine never waits.
 
 Records are applied to views as they come. 25 times a second, the names of what changed are added to
-each viewer that watches; its message is made when the browser is ready for it.
+each viewer that watches, and those that are ready get a frame: all that keep up the same one, which
+is made and encoded once. With many browsers there are fewer frames, so that the engine keeps its
+pace.
 """
 
 import asyncio
 import logging
-from collections.abc import Mapping
+import time
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import asdict
 from typing import Any
@@ -39,11 +42,19 @@ from m2pem_plugin_web.access.roles import Role
 from m2pem_plugin_web.live import messages
 from m2pem_plugin_web.live.latest_states import FleetStates, LatestStates
 from m2pem_plugin_web.live.live_run import LiveRun, command
+from m2pem_plugin_web.live.messages import Message
 from m2pem_plugin_web.live.standbys import Standbys
 from m2pem_plugin_web.live.viewer import Unsent, Viewer
 from m2pem_plugin_web.replay.replays import Recordings
 
 FRAME_S = 0.04
+
+SLOWEST_FRAME_S = 0.2
+
+SHARE = 0.05
+"""Of the time of the event loop that making and sending frames may take."""
+
+LOG_EVERY_S = 0.25
 
 HOLDERS_EVERY_S = 0.5
 
@@ -54,8 +65,6 @@ RETRY_S = 1.0
 FAULT_RECORDS = frozenset((r.BehaviorEnded, r.ErrorThrown, r.RunEnded))
 
 log = logging.getLogger("m2pem.ocu.web")
-
-_encode = msgspec.json.Encoder().encode
 
 
 class Hub(Listener):
@@ -71,11 +80,11 @@ class Hub(Listener):
         self._recordings = recordings
         self._control = control
         self._holders: dict[str, str] = {}
+        self._changed_holders: set[str] = set()
         self._holders_at = 0.0
+        self._logged_at = 0.0
         self._times: dict[RunId, float] = {}
         self._changed_status: set[RunId] = set()
-        self._encoded_for: tuple[RunId, int, set[Place]] = ("", 0, set())
-        self._encoded_elements = msgspec.Raw(b"{}")
 
     async def run(self) -> None:
         """Send updates until cancelled."""
@@ -126,7 +135,6 @@ class Hub(Listener):
             await self.follower.load(run)
             live = self.runs[run]
             live.begin_changes()
-        viewer.unsent = Unsent()
         viewer.watch(live)
         await self._present(viewer)
 
@@ -198,7 +206,7 @@ class Hub(Listener):
     def _lost(self, resource: ResourceId) -> None:
         self._send_to_all(messages.fault(f"{resource}: its link is lost"))
 
-    def _send_to_all(self, message: dict[str, Any]) -> None:
+    def _send_to_all(self, message: Message) -> None:
         for viewer in self.viewers:
             viewer.send_soon(message)
 
@@ -212,28 +220,26 @@ class Hub(Listener):
 
     async def _pace(self) -> None:
         loop = asyncio.get_running_loop()
-        at = loop.time()
+        at, cost_s = loop.time(), 0.0
         while True:
             # After a delay, continue at the usual pace: skip the missed ticks.
-            at = max(at + FRAME_S, loop.time())
+            at = max(at + min(max(FRAME_S, cost_s / SHARE), SLOWEST_FRAME_S), loop.time())
             await asyncio.sleep(at - loop.time())
-            if self.viewers:
-                await self._tick(loop.time())
-            else:
+            if not self.viewers:
                 self._end_changes({})
+                continue
+            await self._prepare(loop.time())
+            began_s = time.thread_time()
+            self._send_frames(loop.time())
+            cost_s += (time.thread_time() - began_s - cost_s) / 4
 
-    async def _tick(self, now: float) -> None:
+    async def _prepare(self, now: float) -> None:
         self._send_statuses()
         await self._update_holders(now)
         watched = self._watched()
         self._end_changes(watched)
         for live in watched.values():
             await self._update_time(live.view)
-        self._distribute_changes()
-        for viewer in self.viewers:
-            if viewer.due(now):
-                viewer.frame_due = True
-                viewer.wake.set()
 
     def _watched(self) -> dict[RunId, LiveRun]:
         return {each.live.view.run: each.live for each in self.viewers if each.live is not None}
@@ -258,10 +264,8 @@ class Hub(Listener):
         except M2pemError:
             return
         changed = {name for name, who in holders.items() if self._holders.get(name) != who}
+        self._changed_holders |= changed
         self._holders = holders
-        if changed:
-            for viewer in self.viewers:
-                viewer.unsent.holders |= changed
 
     async def _update_time(self, view: RunView) -> None:
         t_s = view.t_s
@@ -271,105 +275,106 @@ class Hub(Listener):
         self._times[view.run] = t_s
 
     def _distribute_changes(self) -> None:
-        """Add the names of changed elements to the viewers that watch them."""
-        for viewer in self.viewers:
-            if viewer.live is not None and (changes := viewer.live.view.changes) is not None:
-                viewer.unsent.elements |= changes.elements
-                viewer.unsent.commands |= changes.behaviors
-            viewer.unsent.vehicles |= self.fleet.vehicles.dirty
-            viewer.unsent.payloads |= self.fleet.payloads.dirty
-            viewer.unsent.teams |= self.fleet.teams.dirty
-        for live in self._watched().values():
+        """Add the names of what has changed to the viewers that watch it."""
+        states = self.fleet.vehicles, self.fleet.payloads, self.fleet.teams
+        names = [frozenset(each) for each in (*(s.dirty for s in states), self._changed_holders)]
+        of_fleet = Unsent(frozenset(), frozenset(), *names)
+        of_runs: dict[RunId, Unsent] = {}
+        for run, live in self._watched().items():
             if (changes := live.view.changes) is not None:
-                for behavior in changes.behaviors - live.view.behaviors.keys():
+                elements, behaviors = frozenset(changes.elements), frozenset(changes.behaviors)
+                of_runs[run] = Unsent(elements, behaviors, *names)
+                for behavior in behaviors - live.view.behaviors.keys():
                     self.fleet.teams.forget(behavior)
                 live.clear_changes()
-        for states in (self.fleet.vehicles, self.fleet.payloads, self.fleet.teams):
-            states.dirty.clear()
+        for viewer in self.viewers:
+            run = viewer.live.view.run if viewer.live is not None else ""
+            viewer.unsent = viewer.unsent.merged(of_runs.get(run, of_fleet))
+        for each in states:
+            each.dirty.clear()
+        self._changed_holders.clear()
 
     # --- messages ---------------------------------------------------------------------------
 
-    def next_messages(self, viewer: Viewer, now: float) -> list[dict[str, Any]]:
-        """Return the messages to send to a viewer now, in order; they count as sent."""
-        due = [viewer.numbered(each) for each in viewer.urgent]
-        viewer.urgent.clear()
-        if viewer.may_send and (viewer.wants_snapshot or viewer.frame_due):
-            # Records may have come since the names were added: the frame includes all of them.
-            self._distribute_changes()
-            state = self._snapshot(viewer) if viewer.wants_snapshot else self._frame(viewer)
-            viewer.wants_snapshot = viewer.frame_due = False
-            viewer.unsent = Unsent()
-            viewer.sent_seq = viewer.live.view.seq if viewer.live is not None else 0
-            due.append(viewer.numbered(state))
-            viewer.sent_paced(now)
-            if viewer.live is not None and viewer.log_due(now):
-                due.append(viewer.numbered(self._log(viewer, viewer.live)))
-        return due
+    def _send_frames(self, now: float) -> None:
+        """Send to each viewer that is ready what it has not received: a snapshot, frame or log.
 
-    def _log(self, viewer: Viewer, live: LiveRun) -> dict[str, Any]:
-        records = [each for each in live.view.newest if each.seq > viewer.logged_seq]
-        viewer.logged_seq = live.view.seq
-        return messages.log(records, live.view)
+        No record is applied meanwhile: each message shows all that it counts.
+        """
+        self._distribute_changes()
+        if now - self._logged_at >= LOG_EVERY_S:
+            self._logged_at = now
+            for viewer in self.viewers:
+                viewer.wants_log = True
+        made: dict[tuple[RunId, Unsent | int | None], Message] = {}
+        for viewer in self.viewers:
+            if not (viewer.may_send and viewer.due(now)):
+                continue
+            live = viewer.live
+            run = live.view.run if live is not None else ""
+            unsent = None if viewer.wants_snapshot else viewer.unsent
+            if (frame := made.get((run, unsent))) is None:
+                frame = self._snapshot(live) if unsent is None else self._frame(live, unsent)
+                made[run, unsent] = frame
+            viewer.send_paced(frame, now)
+            if live is not None and viewer.log_due:
+                after = max(viewer.logged_seq, live.view.newest[0].seq - 1)
+                if (log := made.get((run, after))) is None:
+                    log = made[run, after] = messages.log(live.newest_after(after))
+                viewer.send_log(log)
 
-    def _head(self, kind: str, live: LiveRun | None) -> dict[str, Any]:
+    def _head(self, live: LiveRun | None) -> dict[str, Any]:
         if live is None:
-            return {"type": kind, "run": None, "now": now_s(), "t": 0.0, "events": 0}
+            return {"run": None, "now": now_s(), "t": 0.0, "events": 0}
         view = live.view
         t_s = max(self._times.get(view.run, 0.0), view.t_s)
-        return {"type": kind, "run": view.run, "now": now_s(), "t": t_s, "events": view.seq}
+        return {"run": view.run, "now": now_s(), "t": t_s, "events": view.seq}
 
-    def _snapshot(self, viewer: Viewer) -> dict[str, Any]:
-        live = viewer.live
+    def _snapshot(self, live: LiveRun | None) -> Message:
         prompts = self.follower.prompts.values()
-        return {
-            **self._head("snapshot", live),
-            "status": live.view.status if live is not None else None,
-            "speed": self._control.speed(),
-            "elements": messages.nested(
-                (place, live.encoded(place)) for place in live.view.elements
-            )
-            if live is not None
-            else {},
-            "prompts": [messages.prompt_of(each, self.place(each)) for each in prompts],
-            "runs": [asdict(each.view.counted()) for each in self.runs.values()],
-            "vehicles": _encoded(self.fleet.vehicles, self.fleet.vehicles.states),
-            "payloads": _encoded(self.fleet.payloads, self.fleet.payloads.states),
-            "teams": _encoded(self.fleet.teams, self.fleet.teams.states),
-            "holders": self._holders,
-            "commands": {key: command(each) for key, each in live.view.behaviors.items()}
-            if live is not None
-            else {},
-        }
+        places = live.view.elements if live is not None else ()
+        behaviors = live.view.behaviors if live is not None else {}
+        return messages.message(
+            "snapshot",
+            **self._head(live),
+            status=live.view.status if live is not None else None,
+            speed=self._control.speed(),
+            elements=_elements(live, places),
+            prompts=[messages.prompt_of(each, self.place(each)) for each in prompts],
+            runs=[asdict(each.view.counted()) for each in self.runs.values()],
+            vehicles=_encoded(self.fleet.vehicles, self.fleet.vehicles.states),
+            payloads=_encoded(self.fleet.payloads, self.fleet.payloads.states),
+            teams=_encoded(self.fleet.teams, self.fleet.teams.states),
+            holders=self._holders,
+            commands={key: command(each) for key, each in behaviors.items()},
+        )
 
-    def _elements(self, live: LiveRun, places: set[Place]) -> msgspec.Raw:
-        """Return states of elements as JSON, encoded once for browsers that keep up."""
-        wanted = (live.view.run, live.view.seq, places)
-        if wanted != self._encoded_for:
-            states = messages.nested((place, live.encoded(place)) for place in places)
-            self._encoded_for, self._encoded_elements = wanted, msgspec.Raw(_encode(states))
-        return self._encoded_elements
-
-    def _frame(self, viewer: Viewer) -> dict[str, Any]:
-        live, changes = viewer.live, viewer.unsent
-        frame = self._head("frame", live)
-        if live is not None and changes.elements:
-            frame["elements"] = self._elements(live, changes.elements)
-        if live is not None and changes.commands:
+    def _frame(self, live: LiveRun | None, changed: Unsent) -> Message:
+        frame = self._head(live)
+        if live is not None and changed.elements:
+            frame["elements"] = _elements(live, changed.elements)
+        if live is not None and changed.commands:
             behaviors = live.view.behaviors
             frame["commands"] = {
                 key: command(behaviors[key]) if key in behaviors else None
-                for key in changes.commands
+                for key in changed.commands
             }
-        for name, latest, changed in (
-            ("vehicles", self.fleet.vehicles, changes.vehicles),
-            ("payloads", self.fleet.payloads, changes.payloads),
-            ("teams", self.fleet.teams, changes.teams),
+        for name, latest, names in (
+            ("vehicles", self.fleet.vehicles, changed.vehicles),
+            ("payloads", self.fleet.payloads, changed.payloads),
+            ("teams", self.fleet.teams, changed.teams),
         ):
-            if changed:
-                frame[name] = _encoded(latest, changed)
-        if changes.holders:
-            frame["holders"] = {key: self._holders.get(key, "") for key in changes.holders}
-        return frame
+            if names:
+                frame[name] = _encoded(latest, names)
+        if changed.holders:
+            frame["holders"] = {key: self._holders.get(key, "") for key in changed.holders}
+        return messages.message("frame", **frame)
+
+
+def _elements(live: LiveRun | None, places: Iterable[Place]) -> Mapping[str, Any]:
+    if live is None:
+        return {}
+    return messages.nested((place, live.encoded(place)) for place in places)
 
 
 def _encoded(latest: LatestStates, names: Any) -> Mapping[str, msgspec.Raw]:

@@ -1,11 +1,12 @@
-"""The view of a run, with its elements as JSON for browsers."""
+"""The view of a run, with its elements and newest records as JSON for browsers."""
 
 from typing import Any
 
 import msgspec
 
 from m2pem.api import RunView
-from m2pem.api.run_view import Behavior, Changes, Place
+from m2pem.api.run_view import NEWEST, Behavior, Changes, Place
+from m2pem_plugin_web.live.messages import record_of
 
 _encode = msgspec.json.Encoder().encode
 
@@ -16,6 +17,7 @@ class LiveRun:
     def __init__(self, view: RunView) -> None:
         self.view = view
         self._encoded: dict[Place, msgspec.Raw] = {}
+        self._records: dict[int, msgspec.Raw] = {}
 
     def begin_changes(self) -> None:
         """Start to note changes."""
@@ -40,6 +42,17 @@ class LiveRun:
         if known is None:
             known = self._encoded[place] = msgspec.Raw(_encode(self.view.elements[place]))
         return known
+
+    def newest_after(self, seq: int) -> list[msgspec.Raw]:
+        """Return the newest records after one, as JSON, encoded once for all browsers."""
+        kept, newest = self._records, self.view.newest
+        for stamped in newest:
+            if stamped.seq > seq and stamped.seq not in kept:
+                kept[stamped.seq] = msgspec.Raw(record_of(stamped, self.view))
+        found = [kept[each.seq] for each in newest if each.seq > seq]
+        if len(kept) > 2 * NEWEST:
+            self._records = {each.seq: kept[each.seq] for each in newest if each.seq in kept}
+        return found
 
 
 def command(behavior: Behavior) -> dict[str, Any]:

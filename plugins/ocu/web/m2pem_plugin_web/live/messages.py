@@ -1,8 +1,8 @@
-"""Messages over the WebSocket: one function for each, without its number."""
+"""Messages over the WebSocket: one function for each. They are encoded once for all browsers."""
 
 from collections.abc import Iterable
 from dataclasses import asdict
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import msgspec
 
@@ -13,6 +13,19 @@ from m2pem.api.run_view import ElementState, Place
 _encode = msgspec.json.Encoder().encode
 
 State = TypeVar("State", msgspec.Raw, ElementState)
+
+
+class Message(NamedTuple):
+    """The JSON of a message, but for its number on a connection, which comes between the two."""
+
+    head: bytes
+    rest: bytes
+
+
+def message(kind: str, **fields: Any) -> Message:
+    """Return a message of a type with its fields."""
+    rest = b"," + _encode(fields)[1:] if fields else b"}"
+    return Message(b'{"type":"' + kind.encode() + b'","seq":', rest)
 
 
 def record_of(stamped: StampedRecord, view: RunView, **more: Any) -> bytes:
@@ -59,59 +72,59 @@ def prompt_record_of(run: RunId, record: PromptOpened) -> dict[str, Any]:
     }
 
 
-def prompt_opened(prompt: OpenPrompt, place: Place | None) -> dict[str, Any]:
+def prompt_opened(prompt: OpenPrompt, place: Place | None) -> Message:
     """Return the message that a prompt has opened."""
-    return {"type": "prompt", "prompt": prompt_of(prompt, place)}
+    return message("prompt", prompt=prompt_of(prompt, place))
 
 
-def prompt_closed(closed: PromptClosed) -> dict[str, Any]:
+def prompt_closed(closed: PromptClosed) -> Message:
     """Return the message that a prompt was answered or withdrawn."""
-    return {"type": "prompt_closed", **asdict(closed)}
+    return message("prompt_closed", **asdict(closed))
 
 
-def run(summary: RunSummary) -> dict[str, Any]:
+def run(summary: RunSummary) -> Message:
     """Return the message of a run's new status."""
-    return {"type": "run", "run": asdict(summary)}
+    return message("run", run=asdict(summary))
 
 
-def fault(text: str) -> dict[str, Any]:
+def fault(text: str) -> Message:
     """Return the message of a fault."""
-    return {"type": "fault", "text": text}
+    return message("fault", text=text)
 
 
-def notice(text: str) -> dict[str, Any]:
+def notice(text: str) -> Message:
     """Return the message of something that is no fault."""
-    return {"type": "notice", "text": text}
+    return message("notice", text=text)
 
 
-def schedule_changed() -> dict[str, Any]:
+def schedule_changed() -> Message:
     """Return the message that the schedule is to be read again: `GET /api/schedule`."""
-    return {"type": "schedule"}
+    return message("schedule")
 
 
-def alerts_changed() -> dict[str, Any]:
+def alerts_changed() -> Message:
     """Return the message that the alerts are to be read again: `GET /api/alerts`."""
-    return {"type": "alerts"}
+    return message("alerts")
 
 
-def shared_space_changed() -> dict[str, Any]:
+def shared_space_changed() -> Message:
     """Return the message that shared space is to be read again: `GET /api/resources`."""
-    return {"type": "shared_space"}
+    return message("shared_space")
 
 
-def operators_changed() -> dict[str, Any]:
+def operators_changed() -> Message:
     """Return the message that operators are to be read again: `GET /api/operators`."""
-    return {"type": "operators"}
+    return message("operators")
 
 
-def alive() -> dict[str, Any]:
+def alive() -> Message:
     """Return the message that an answer takes longer."""
-    return {"type": "alive"}
+    return message("alive")
 
 
-def log(records: Iterable[StampedRecord], view: RunView) -> dict[str, Any]:
+def log(records: Iterable[msgspec.Raw]) -> Message:
     """Return the message with the newest records of the watched run."""
-    return {"type": "log", "records": [msgspec.Raw(record_of(each, view)) for each in records]}
+    return message("log", records=list(records))
 
 
 def nested(states: Iterable[tuple[Place, State]]) -> dict[str, dict[str, State]]:

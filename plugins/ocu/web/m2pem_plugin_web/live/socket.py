@@ -8,7 +8,7 @@ from typing import Annotated
 
 import msgspec
 from fastapi import APIRouter, WebSocket
-from starlette.websockets import WebSocketDisconnect, WebSocketDisconnected
+from starlette.websockets import WebSocketDisconnect
 
 from m2pem.errors import M2pemError
 from m2pem_plugin_web.access.permissions import person_of
@@ -17,13 +17,10 @@ from m2pem_plugin_web.live import messages
 from m2pem_plugin_web.live.hub import MOST_VIEWERS, Hub
 from m2pem_plugin_web.live.viewer import HEARTBEAT_S, Viewer
 from m2pem_plugin_web.missions.names import LONGEST
+from m2pem_plugin_web.live.wire import WIRE, Wire
 
 LONGEST_MESSAGE = 4096
 """Most bytes of a message from a browser."""
-
-ABORT = "m2pem.abort"
-"""The key in the ASGI scope of a function that ends a connection at once: a browser that receives
-nothing cannot be disconnected by a close message."""
 
 LAST_WORDS_S = 1.0
 
@@ -39,7 +36,6 @@ SIGNED_OUT = 4401
 MALFORMED = 4400
 FULL = 1013
 
-_encode = msgspec.json.Encoder().encode
 log = logging.getLogger("m2pem.ocu.web")
 
 
@@ -86,12 +82,13 @@ def router(hub: Hub, entry: Entry) -> APIRouter:
         if len(hub.viewers) >= MOST_VIEWERS:
             await socket.close(FULL, "too many pages are open")
             return
-        viewer, key = Viewer(person), key_of(socket)
+        wire: Wire = socket.scope[WIRE]
+        viewer, key = Viewer(wire, person), key_of(socket)
         hub.viewers.add(viewer)
         try:
             await converse(socket, hub, viewer, lambda: entry.person(socket.cookies, key) == person)
         except _Leave as leave:
-            await _close(socket, leave)
+            await _close(socket, wire, leave)
         finally:
             hub.viewers.discard(viewer)
             await hub.left(viewer)
@@ -103,57 +100,78 @@ async def converse(
     socket: WebSocket, hub: Hub, viewer: Viewer, may_stay: Callable[[], bool]
 ) -> None:
     """Exchange messages until the browser disconnects or must be disconnected."""
+    listener = _Listener(viewer)
+    viewer.wire.listen(listener.take, viewer.flush)
     tasks = [
-        asyncio.create_task(_speak(socket, hub, viewer)),
-        asyncio.create_task(_listen(socket, hub, viewer)),
+        asyncio.create_task(_until_closed(socket, listener)),
+        asyncio.create_task(listener.serve(hub)),
         asyncio.create_task(_look_after(viewer, may_stay)),
     ]
     try:
-        done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
-        for task in done:
-            task.result()
-    except (WebSocketDisconnect, WebSocketDisconnected):
-        return  # RuntimeError: another task has already found the browser disconnected
+        awaited = [*tasks, listener.leaving]
+        done, _ = await asyncio.wait(awaited, return_when=asyncio.FIRST_COMPLETED)
+        for each in done:
+            each.result()
+    except WebSocketDisconnect:
+        return
     finally:
-        for task in tasks:
-            task.cancel()
+        viewer.wire.listen(_ignore, _ignore)
+        for each in tasks:
+            each.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
 
 
-async def _speak(socket: WebSocket, hub: Hub, viewer: Viewer) -> None:
-    loop = asyncio.get_running_loop()
-    while True:
-        await viewer.wake.wait()
-        viewer.wake.clear()
-        if viewer.overrun:
-            raise _Leave(SILENT, "too slow")
-        for message in hub.next_messages(viewer, loop.time()):
-            await socket.send_text(_encode(message).decode())
+def _ignore(*_: object) -> None:
+    pass
 
 
-async def _listen(socket: WebSocket, hub: Hub, viewer: Viewer) -> None:
-    loop = asyncio.get_running_loop()
-    left, at = float(BURST), loop.time()
+async def _until_closed(socket: WebSocket, listener: "_Listener") -> None:
+    """Take what came before the wire was listened to, and wait for the end of the connection."""
     while True:
-        text = await socket.receive_text()
-        now = loop.time()
-        left, at = min(BURST, left + (now - at) * RATE) - 1, now
-        if left < 0:
-            raise _Leave(FLOOD, "too many messages")
+        listener.take((await socket.receive_text()).encode())
+
+
+class _Listener:
+    """Takes the messages of a browser as they come."""
+
+    def __init__(self, viewer: Viewer) -> None:
+        self.leaving: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        """Ends with `_Leave` when the browser is to be disconnected."""
+        self._viewer = viewer
+        self._requests: asyncio.Queue[_Watch | _Edit] = asyncio.Queue()
+        self._left, self._at = float(BURST), asyncio.get_running_loop().time()
+
+    def take(self, text: bytes) -> None:
+        """Take a message; once the browser is to be disconnected, none."""
+        if self.leaving.done():
+            return
+        now = asyncio.get_running_loop().time()
+        self._left, self._at = min(BURST, self._left + (now - self._at) * RATE) - 1, now
+        if self._left < 0:
+            self.leaving.set_exception(_Leave(FLOOD, "too many messages"))
+            return
         try:
-            said = _decoder.decode(text)
-        except (msgspec.DecodeError, UnicodeError, RecursionError) as error:
-            raise _Leave(MALFORMED, "not a message of this protocol") from error
-        match said:
+            message = _decoder.decode(text)
+        except (msgspec.DecodeError, UnicodeError, RecursionError):
+            self.leaving.set_exception(_Leave(MALFORMED, "not a message of this protocol"))
+            return
+        match message:
             case _Ack(seq=seq):
-                viewer.acknowledge(seq)
-            case _Edit(mission=mission):
-                await hub.edit(viewer, mission or "")
-            case _Watch(run=run):
-                try:
-                    await _watch(hub, viewer, run)
-                except M2pemError as error:
-                    viewer.refuse(messages.fault(str(error)))
+                self._viewer.acknowledge(seq)
+            case _Watch() | _Edit():
+                self._requests.put_nowait(message)
+
+    async def serve(self, hub: Hub) -> None:
+        """Do what the browser asks for, one after the other."""
+        while True:
+            try:
+                match await self._requests.get():
+                    case _Watch(run=run):
+                        await _watch(hub, self._viewer, run)
+                    case _Edit(mission=mission):
+                        await hub.edit(self._viewer, mission or "")
+            except M2pemError as error:
+                self._viewer.send(messages.fault(str(error)))
 
 
 async def _watch(hub: Hub, viewer: Viewer, run: str | None) -> None:
@@ -161,7 +179,7 @@ async def _watch(hub: Hub, viewer: Viewer, run: str | None) -> None:
     watching = asyncio.ensure_future(hub.watch(viewer, run))
     try:
         while not (await asyncio.wait({watching}, timeout=HEARTBEAT_S))[0]:
-            viewer.refuse(messages.alive())
+            viewer.send(messages.alive())
         await watching
     finally:
         watching.cancel()
@@ -171,17 +189,17 @@ async def _look_after(viewer: Viewer, may_stay: Callable[[], bool]) -> None:
     loop = asyncio.get_running_loop()
     while True:
         await asyncio.sleep(LOOK_EVERY_S)
+        if viewer.overrun:
+            raise _Leave(SILENT, "too slow")
         if viewer.is_silent(loop.time()):
             raise _Leave(SILENT, "the browser acknowledges nothing")
         if not may_stay():
             raise _Leave(SIGNED_OUT, "signed out")
 
 
-async def _close(socket: WebSocket, leave: _Leave) -> None:
+async def _close(socket: WebSocket, wire: Wire, leave: _Leave) -> None:
     """Close with a reason, and abort soon after: the browser may not read the reason."""
-    abort = socket.scope.get(ABORT)
-    if abort is not None:
-        asyncio.get_running_loop().call_later(LAST_WORDS_S, abort)
+    asyncio.get_running_loop().call_later(LAST_WORDS_S, wire.abort)
     with suppress(TimeoutError, RuntimeError, WebSocketDisconnect):
         async with asyncio.timeout(LAST_WORDS_S):
             await socket.close(leave.code, leave.reason)
