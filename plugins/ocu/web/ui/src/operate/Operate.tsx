@@ -114,8 +114,8 @@ function Loading({ summary, made }: Opened) {
       </label>
       <p role="status">
         {fill(text.replay.made, {
-          done: done.toLocaleString(),
-          records: records.toLocaleString(),
+          done: grouped(done),
+          records: grouped(records),
         })}
       </p>
     </section>

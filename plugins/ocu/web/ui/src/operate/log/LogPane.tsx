@@ -3,7 +3,7 @@ import { useSignal } from "@preact/signals";
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { NoteForm } from "../../people/NoteForm";
 import { LOG_KINDS, type LogKind, type LogLine } from "../../records/logLine";
-import { clockTenths } from "../../shared/format";
+import { clockTenths, grouped } from "../../shared/format";
 import { remember, remembered } from "../../shared/memory";
 import { may } from "../../shared/session";
 import { fill, strings } from "../../strings";
@@ -100,7 +100,7 @@ export function LogPane() {
         {words.value && (hasOlder || page.cut) && (
           <span>
             {fill(text.covers, {
-              count: Math.min(most.value, page.records.length).toLocaleString(),
+              count: grouped(Math.min(most.value, page.records.length)),
             })}
           </span>
         )}
