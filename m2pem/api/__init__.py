@@ -77,6 +77,7 @@ if TYPE_CHECKING:
     from m2pem.api.hosting import CutOffPolicy, Host, HostedArbiter, HostLink, WhenCutOff
     from m2pem.api.latest_task import LatestTask
     from m2pem.api.log_context import current_run, trace_ids
+    from m2pem.api.map_geometries import shown_geometries
     from m2pem.api.ocu import Ocu, StandbyOcu
     from m2pem.api.operations import (
         MAX_DATA_VALUES,
@@ -240,6 +241,7 @@ _MODULES = {
     "m2pem.api.exporter": "ExportedRecord ExportedRun Exporter ExportOptions",
     "m2pem.api.face": "Face FaceSettings",
     "m2pem.api.log_context": "current_run trace_ids",
+    "m2pem.api.map_geometries": "shown_geometries",
     "m2pem.api.ocu": "Ocu StandbyOcu",
     "m2pem.api.operations": (
         "MAX_DATA_VALUES MAX_NAME_CHARACTERS MAX_REASON_CHARACTERS OPERATIONS Operation"
@@ -523,6 +525,7 @@ __all__ = [
     "raw_parameters",
     "read_declared_behaviors",
     "restored_work",
+    "shown_geometries",
     "simulator_group",
     "strip_width_m",
     "trace_ids",

@@ -46,6 +46,7 @@ from m2pem.mission.values import Value
 
 if TYPE_CHECKING:
     from m2pem.fleet.fleet import Fleet
+    from m2pem.mission.geometry import Area, Point, Route
     from m2pem.mission.mission import Mission
 
 ControlEvent: TypeAlias = Union[
@@ -656,6 +657,14 @@ class MissionControl(Protocol):
 
     def geometries(self) -> Mapping[str, HandedOver]:
         """The routes, areas and points that operators have handed over for all runs."""
+        ...
+
+    def run_geometries(self) -> "Mapping[RunId, Mapping[str, Route | Area | Point]]":
+        """The routes, areas and points that runs under way have alone, by run and name.
+
+        They are those of its mission's files, those that were handed over to this run, and those
+        of all runs that have changed since and that it keeps.
+        """
         ...
 
     def services(self) -> Mapping[str, Sequence[str]]:

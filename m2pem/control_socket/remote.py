@@ -31,6 +31,7 @@ REFUSED = {
     "editable": "missions are edited where the executive runs",
     "outline": "missions are edited where the executive runs",
     "geometries": "geometries are listed where the executive runs",
+    "run_geometries": "geometries are listed where the executive runs",
     "services": "services are listed where the executive runs",
 }
 """The methods of `MissionControl` that the socket does not serve, and where to ask instead."""

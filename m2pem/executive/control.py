@@ -79,6 +79,7 @@ from m2pem.journal.mission import mission_of
 from m2pem.journal.standbys import standbys_of
 from m2pem.mission.catalogue import BehaviorSpec, ResourceId
 from m2pem.mission.events import Signal
+from m2pem.mission.geometry import Area, Point, Route
 from m2pem.mission.mission import Mission
 from m2pem.mission.values import MAX_DEPTH, Value, is_too_deep
 from m2pem.telemetry.bus import Bus
@@ -705,6 +706,10 @@ class Control:
     def geometries(self) -> Mapping[str, HandedOver]:
         """What operators have handed over for all runs."""
         return self._supervisor.drawings.handed_over
+
+    def run_geometries(self) -> Mapping[RunId, Mapping[str, Route | Area | Point]]:
+        """The routes, areas and points that runs under way have alone."""
+        return self._supervisor.run_geometries()
 
     def services(self) -> Mapping[str, Sequence[str]]:
         """The service-task classes that there are, with what each writes."""

@@ -60,6 +60,7 @@ from m2pem.executive.ownership import Ownership
 from m2pem.executive.presence import Presence
 from m2pem.executive.recovery import look_again, replaced_by
 from m2pem.executive.returns import Returns, still_lost
+from m2pem.executive.run_geometries import own_geometries
 from m2pem.executive.runner import OnRecords, RunContext, RunLimit, Runner
 from m2pem.executive.scheduled_start import LeftToOthersError
 from m2pem.executive.separation import separation_for
@@ -74,7 +75,7 @@ from m2pem.geo.geojson import GeometryError, parse_geojson
 from m2pem.geo.positions import NO_ORIGIN, geometry_out_of_reach
 from m2pem.journal.base import Journal
 from m2pem.mission.catalogue import ResourceId
-from m2pem.mission.geometry import Geometry
+from m2pem.mission.geometry import Area, Geometry, Point, Route
 from m2pem.mission.losses import LINK_LOST
 from m2pem.mission.mission import Mission
 from m2pem.mission.values import Value
@@ -549,6 +550,15 @@ class Supervisor:
         for runner in runners:
             if not runner.done.is_set():
                 runner.post(item)
+
+    def run_geometries(self) -> dict[RunId, dict[str, Route | Area | Point]]:
+        """Return the geometries that runs under way have alone, by run and name."""
+        handed_over, of_all = self.drawings.handed_over, self.fleet_now.geometries
+        states = {
+            run: each.run.state for run, each in self.runners.items() if not each.done.is_set()
+        }
+        own = {run: own_geometries(each, handed_over, of_all) for run, each in states.items()}
+        return {run: geometries for run, geometries in own.items() if geometries}
 
     def delete_geometry(self, name: str, by: str) -> None:
         """Delete a geometry that was handed over for all runs; those under way keep it.

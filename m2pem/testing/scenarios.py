@@ -10,9 +10,12 @@ from string import ascii_uppercase
 from typing import Any
 from xml.sax.saxutils import escape, quoteattr
 
+import msgspec
+
 from m2pem.fleet.fleet import Domain, Fleet, Payload, Vehicle
+from m2pem.geo.geojson import as_geojson
 from m2pem.mission.catalogue import ResourceId
-from m2pem.mission.geometry import Geometry
+from m2pem.mission.geometry import Geometry, VehiclePosition
 
 ORIGIN = (38.1075, -77.3192, 60.0)
 
@@ -128,6 +131,19 @@ def service(class_: str, **properties: object) -> bytes:
         f"{inside}</m2pem:service></extensionElements></serviceTask>"
     )
     return _mission(task, "Start Service End")
+
+
+def drawn(mission: bytes, **geometries: Geometry) -> bytes:
+    """The same mission with geometries of its own, by name."""
+    own = "".join(
+        f"<m2pem:geometry name={quoteattr(name)}>"
+        f"{escape(msgspec.json.encode(as_geojson(geometry)).decode())}</m2pem:geometry>"
+        for name, geometry in geometries.items()
+        if not isinstance(geometry, VehiclePosition)
+    )
+    before, start, after = mission.partition(b'<startEvent id="Start"/>')
+    extensions = f"<extensionElements>{own}</extensionElements>".encode()
+    return before + extensions + start + after
 
 
 def _mission(elements: str, *paths: str, roots: str = "") -> bytes:

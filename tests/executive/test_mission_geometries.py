@@ -1,12 +1,13 @@
 """Whose geometry of a name a task gets: the run's, the mission's, an operator's, or the fleet's."""
 
+import asyncio
 from dataclasses import replace
 
 import pytest
 
-from m2pem.api import BehaviorState
+from m2pem.api import BehaviorState, shown_geometries
 from m2pem.mission.geometry import Point
-from tests.executive.conftest import World, behavior, fleet, mission, sequence
+from tests.executive.conftest import World, behavior, fleet, mission, question, sequence
 
 GATE = '{"type": "Point", "coordinates": [7.002, 50]}'
 OWN = f'<extensionElements><m2pem:geometry name="gate">{GATE}</m2pem:geometry></extensionElements>'
@@ -63,3 +64,44 @@ def test_one_that_is_handed_over_to_the_run_itself_replaces_it(play, to_the_run,
         return world.fake.requests[f"{run}.b2"].parameters["target"]
 
     assert play(story, fleet=FLEET).position == (50.0, longitude, None)
+
+
+def test_what_a_run_has_alone_is_shown_with_its_id_until_it_ends(play):
+    async def story(world: World):
+        control = world.executive.control
+        shown = {}
+
+        def look(when: str) -> None:
+            shown[when] = {
+                name: each.position[1] for name, each in shown_geometries(control).items()
+            }
+
+        look("before")
+        asks = mission(sequence(("Ask", question("Ask"))))
+        drawn = await control.start(asks.replace(b"<startEvent", OWN.encode() + b"<startEvent", 1))
+        plain = await control.start(asks)
+        look("both")
+        await control.set_geometry("gate", given(7.003), run=plain, by="anna")
+        await control.stop(drawn)
+        await control.wait(drawn)
+        look("one, which has another one")
+        await control.set_geometry("gate", given(7.004), by="anna")
+        await control.set_geometry("gate", given(7.005), by="ben")
+        await control.delete_geometry("gate", by="ben")
+        runner = world.executive.runner(plain)
+        async with asyncio.timeout(10):
+            while runner.run.state.geometries.get("gate") != given(7.005):  # noqa: ASYNC110
+                await asyncio.sleep(0)
+        look("one, which keeps what was deleted")
+        await control.stop(plain)
+        await control.wait(plain)
+        look("none")
+        return shown
+
+    assert play(story, fleet=FLEET) == {
+        "before": {"gate": 7.001},
+        "both": {"gate": 7.001, "r1/gate": 7.002},
+        "one, which has another one": {"gate": 7.001, "r2/gate": 7.003},
+        "one, which keeps what was deleted": {"gate": 7.001, "r2/gate": 7.005},
+        "none": {"gate": 7.001},
+    }

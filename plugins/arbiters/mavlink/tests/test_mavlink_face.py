@@ -8,7 +8,7 @@ from m2pem_plugin_mavlink.face.face import MavlinkFace
 from mavlink_gcs import HOME, gateway, ground_station
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from m2pem.api import RunStatus, distance_m
+from m2pem.api import Route, RunStatus, as_geojson, distance_m
 from m2pem.plugins import PluginManager
 from m2pem.testing import scenarios
 
@@ -188,6 +188,31 @@ def test_the_plan_is_what_the_mission_does_now_and_uploads_are_denied(tmp_path: 
             assert answer.type == dialect.MAV_MISSION_DENIED
             await station.told("read-only")
             await control.stop(run)
+
+    asyncio.run(main())
+
+
+def test_the_plan_is_of_the_missions_own_route_and_of_one_that_was_handed_over(
+    tmp_path: Path,
+) -> None:
+    async def main() -> None:
+        async with gateway(tmp_path) as (control, port), ground_station(port) as station:
+            await station.hears("HEARTBEAT", lambda each: each.get_srcSystem() == ROVER1)
+            mission = scenarios.one_behavior("single_vehicle_routing", "rover1", route="round")
+            places = [(38.1075 + each / 1000, -77.319, None) for each in range(5)]
+            own = scenarios.drawn(mission, round=Route(tuple(places)))
+            for source, count in ((own, 5), (mission, 2)):
+                if source is mission:
+                    given = as_geojson(Route(tuple(places[:2])))
+                    await control.set_geometry("round", given, by="anna")
+                run = await control.start(source)
+                since = len(station.received)
+                await station.told(f"{run} ", "rover1 begins single_vehicle_routing")
+                station.mav.mission_request_list_send(ROVER1, 1, 0)
+                found = await station.hears("MISSION_COUNT", since=since)
+                assert found.count == count
+                await control.stop(run)
+                await control.wait(run)
 
     asyncio.run(main())
 

@@ -19,6 +19,7 @@ TYPES = {"air": "a-f-A-M-H-Q", "ground": "a-f-G-E-V", "surface": "a-f-S-C-U", "s
 """By the domain of a vehicle, friendly: an unmanned rotary-wing aircraft, a ground vehicle, an
 unmanned surface vehicle, something under water."""
 SPOT, ROUTE, SHAPE, WAYPOINT = "b-m-p-s-m", "b-m-r", "u-d-f", "b-m-p-w"
+DELETION = "t-x-d-d"
 LATEST_US = 4_102_444_800 * US_PER_S
 """A device whose clock is wrong must not end the face: no calendar has all of its times."""
 MACHINE, ENTERED = "m-g", "h-e"
@@ -69,6 +70,15 @@ def geometry_event(
             return _shape(uid, ROUTE, name, waypoints, waypoints[0], now_us, stale_s)
         case Area(rings):
             return _shape(uid, SHAPE, name, rings[0], _middle(rings[0]), now_us, stale_s)
+
+
+def deletion_event(uid: str, now_us: int) -> bytes:
+    """Return the event that deletes one from maps, as TAK's own clients send it; by then it is
+    stale."""
+    event, detail = _event(f"{uid}.deleted", DELETION, MACHINE, now_us, 0.0, (0.0, 0.0, None))
+    _add(detail, "link", uid=_printable(uid), relation="none", type="none")
+    _add(detail, "__forcedelete")
+    return etree.tostring(event)
 
 
 def _shape(

@@ -18,10 +18,16 @@ from m2pem.api import (
     Value,
     VehicleState,
     as_geojson,
-    parse_geojson,
+    shown_geometries,
 )
 from m2pem.errors import M2pemError
-from m2pem_plugin_cot.events import TYPES, detection_event, geometry_event, vehicle_event
+from m2pem_plugin_cot.events import (
+    TYPES,
+    deletion_event,
+    detection_event,
+    geometry_event,
+    vehicle_event,
+)
 from m2pem_plugin_cot.link import Link
 from m2pem_plugin_cot.received import EventError, Received, read_event
 from m2pem_plugin_cot.settings import read_settings
@@ -31,6 +37,8 @@ log = logging.getLogger("m2pem.cot")
 GEOMETRY_STALE_S = 600.0
 GEOMETRIES_EVERY_S = 60.0
 """Geometries are sent again, as a map that was just opened has none."""
+DELETIONS = 3
+"""How many times a map reads that a geometry is gone: a datagram may be lost."""
 MAX_WAITING = 100
 """Received events that wait; more are dropped."""
 RECEIVED_PER_S = 20
@@ -119,10 +127,12 @@ class CotFace:
         return ", ".join(part for part in parts if part)
 
     async def _send_geometries(self) -> None:
+        """Send what is new or has changed, all of it again now and then, and what is gone."""
         sent: dict[str, Point | Route | Area] = {}
+        gone: dict[str, int] = {}
         left_s = 0.0
         while True:
-            geometries = self._geometries()
+            geometries = shown_geometries(self._control)
             again = left_s <= 0
             now_us = max((state.time_us for state in self._states.values()), default=0)
             if now_us:  # the clock of the executive, which may be faster than that of the wall
@@ -131,20 +141,14 @@ class CotFace:
                         uid = self._uid("geometry", name)
                         event = geometry_event(uid, name, geometry, now_us, GEOMETRY_STALE_S)
                         self._link.send(event)
+                gone |= dict.fromkeys(sent.keys() - geometries.keys(), DELETIONS)
+                gone = {name: left for name, left in gone.items() if name not in geometries}
+                for name in gone:
+                    self._link.send(deletion_event(self._uid("geometry", name), now_us))
+                gone = {name: left - 1 for name, left in gone.items() if left > 1}
                 sent, left_s = geometries, GEOMETRIES_EVERY_S if again else left_s
             await asyncio.sleep(self._settings.period_s)
             left_s -= self._settings.period_s
-
-    def _geometries(self) -> dict[str, Point | Route | Area]:
-        """The geometries of the fleet file, and those that operators have handed over."""
-        known = {
-            name: geometry
-            for name, geometry in self._fleet.geometries.items()
-            if isinstance(geometry, Point | Route | Area)
-        }
-        for name, given in self._control.geometries().items():
-            known[name] = parse_geojson(given.geometry)
-        return known
 
     # --- in -------------------------------------------------------------------------------------
 

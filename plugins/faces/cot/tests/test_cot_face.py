@@ -18,7 +18,7 @@ import pytest
 from lxml import etree
 from m2pem_plugin_cot.face import CotFace
 
-from m2pem.api import FaceSettings, GeoPosition, MissionControl, Point, VehicleState, records
+from m2pem.api import FaceSettings, GeoPosition, MissionControl, Point, Route, VehicleState, records
 from m2pem.errors import PluginError
 from m2pem.testing import run_executive, scenarios, serve_face
 
@@ -102,6 +102,24 @@ async def test_pytak_reads_every_vehicle_where_it_is() -> None:
             assert event.find("detail/contact").get("callsign") == name
         gate = await received(reader, lambda each: each.get("type") == "b-m-p-s-m")
         assert gate.find("detail/contact").get("callsign") == "gate"
+    reader.close()
+
+
+async def test_what_a_mission_has_drawn_is_sent_with_its_run_and_deleted_when_that_ends() -> None:
+    where = f"127.0.0.1:{free_port()}"
+    reader, _ = await pytak.create_udp_client(urlparse(f"udp+ro://{where}"), None)
+    lane = Route(((38.108, -77.319, None), (38.109, -77.318, None)))
+    async with fleet(url=f"udp://{where}", rate="10 Hz") as control:
+        run = await control.start(scenarios.drawn(scenarios.question(), lane=lane))
+        uid = f"m2pem.scenario.geometry.{run}/lane"
+        shown = await received(reader, lambda each: each.get("uid") == uid)
+        assert shown.get("type") == "b-m-r"
+        assert shown.find("detail/contact").get("callsign") == f"{run}/lane"
+        await control.stop(run)
+        deleted = await received(reader, lambda each: each.get("type") == "t-x-d-d")
+        assert deleted.find("detail/link").get("uid") == uid
+        assert deleted.find("detail/__forcedelete") is not None
+        assert deleted.get("stale") == deleted.get("time")
     reader.close()
 
 

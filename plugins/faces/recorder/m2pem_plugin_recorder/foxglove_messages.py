@@ -5,7 +5,7 @@ that of a vehicle (REP-103: x forward, y left, z up).
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 from typing import Any
 
@@ -127,6 +127,19 @@ def scene_messages(
         if entity is not None:
             yield entity
     yield geojson_message(geometries, time_us)
+
+
+def removal_messages(names: Iterable[str], time_us: int) -> Iterator[ChannelMessage]:
+    """Yield what removes geometries from the scene."""
+    deletions = [
+        fg.SceneEntityDeletion(
+            timestamp=timestamp(time_us), type=fg.SceneEntityDeletionType.MatchingId, id=name
+        )
+        for name in names
+    ]
+    if deletions:
+        update = fg.SceneUpdate(deletions=deletions, entities=[])
+        yield ChannelMessage(scene_channels()[0], time_us, update.encode())
 
 
 def scene_message(

@@ -22,11 +22,11 @@ from m2pem.api import (
     RunView,
     StampedRecord,
     follow,
-    parse_geojson,
+    shown_geometries,
 )
 from m2pem.api import records as r
 from m2pem.api.follower import Listener
-from m2pem.errors import M2pemError, PluginError
+from m2pem.errors import PluginError
 from m2pem_plugin_recorder.channels import (
     Channel,
     ChannelMessage,
@@ -38,6 +38,7 @@ from m2pem_plugin_recorder.channels import (
 from m2pem_plugin_recorder.foxglove_messages import (
     log_channel,
     log_message,
+    removal_messages,
     scene_channels,
     scene_messages,
 )
@@ -65,7 +66,6 @@ class LiveServer(Listener):
         self._control = control
         self._frame = LocalFrame(fleet.origin)
         self._fence = fleet.fence
-        self._geometries: dict[str, object] = dict(fleet.geometries)
         self._context = foxglove.Context()
         self._channels: dict[Channel, foxglove.Channel] = {}
         self._encoders: dict[RunId, RecordEncoder] = {}
@@ -85,6 +85,7 @@ class LiveServer(Listener):
             self._channels[each]
             for each in (records_channel(), prompts_channel(), pictures_channel())
         ]
+        self._scene_changed = asyncio.Event()
         self._follower = follow(control, self)
 
     async def run(self) -> None:
@@ -136,11 +137,8 @@ class LiveServer(Listener):
             encoder.take(stamped)
         if isinstance(stamped.record, r.RunEnded):
             self._forget()
-        if isinstance(stamped.record, r.GeometryReceived):
-            try:
-                self._geometries[stamped.record.name] = parse_geojson(stamped.record.geometry)
-            except M2pemError as error:
-                log.warning("geometry %s is not shown: %s", stamped.record.name, error)
+        if isinstance(stamped.record, r.RunStarted | r.GeometryReceived):
+            self._scene_changed.set()
 
     def alerted(self, alert: Alert) -> None:
         """Send an alert."""
@@ -157,17 +155,20 @@ class LiveServer(Listener):
                     self._send(message)
 
     async def _show_scene(self) -> None:
+        shown: set[str] = set()
         while True:
             now_us = round(time.time() * US_PER_S)
-            geometries = dict(self._geometries)
-            for name, each in self._control.geometries().items():
-                try:
-                    geometries[name] = parse_geojson(each.geometry)
-                except M2pemError:
-                    continue
-            for message in scene_messages(geometries, self._frame, self._fence, now_us):
+            geometries = shown_geometries(self._control)
+            gone, shown = shown - geometries.keys(), set(geometries)
+            for message in (
+                *removal_messages(gone, now_us),
+                *scene_messages(geometries, self._frame, self._fence, now_us),
+            ):
                 self._send(message)
-            await asyncio.sleep(SCENE_AGAIN_S)
+            with suppress(TimeoutError):
+                async with asyncio.timeout(SCENE_AGAIN_S):
+                    await self._scene_changed.wait()
+            self._scene_changed.clear()
 
     def _send(self, message: ChannelMessage) -> None:
         channel = self._channels.get(message.channel)

@@ -8,14 +8,17 @@ from dataclasses import dataclass
 from m2pem.api import (
     US_PER_S,
     Alert,
+    Area,
     LocalFrame,
     MissionControl,
+    Point,
+    Route,
     RunId,
     RunStatus,
     RunView,
     StampedRecord,
     follow,
-    parse_geojson,
+    shown_geometries,
 )
 from m2pem.api import records as r
 from m2pem.api.follower import Listener
@@ -58,9 +61,7 @@ class Recorder(Listener):
         self._runs: dict[RunId, _Run] = {}
         self._wake = asyncio.Event()
         self._limit = RateLimit(settings.rate_hz)
-        self._geometries: dict[str, object] = dict(fleet.geometries)
-        for name, each in control.geometries().items():
-            self._hand_over(name, each.geometry)
+        self._geometries: dict[str, Point | Route | Area] = {}
         self._now_us = 0
         self._thread = WritingThread(
             settings,
@@ -80,7 +81,7 @@ class Recorder(Listener):
         """
         self._loop = asyncio.get_running_loop()
         self._thread.start()
-        self._thread.put(Geometries(dict(self._geometries), self._time_us()))
+        self._put_geometries()
         try:
             async with asyncio.TaskGroup() as tasks:
                 self._tasks = tasks
@@ -120,9 +121,8 @@ class Recorder(Listener):
             found.seq = stamped.seq
         elif stamped.seq > found.seq:
             self._wake.set()
-        if isinstance(stamped.record, r.GeometryReceived):
-            self._hand_over(stamped.record.name, stamped.record.geometry)
-            self._thread.put(Geometries(dict(self._geometries), self._time_us()))
+        if isinstance(stamped.record, r.RunStarted | r.GeometryReceived):
+            self._put_geometries()
 
     def alerted(self, alert: Alert) -> None:
         """Hand an alert on."""
@@ -162,13 +162,14 @@ class Recorder(Listener):
         except M2pemError as error:
             log.warning("%s: %s", found.view.run, error)
         found.done = True
+        self._put_geometries()
         self._wake.set()
 
-    def _hand_over(self, name: str, geometry: object) -> None:
-        try:
-            self._geometries[name] = parse_geojson(geometry)  # type: ignore[arg-type]
-        except M2pemError as error:
-            log.warning("geometry %s is not recorded: %s", name, error)
+    def _put_geometries(self) -> None:
+        """Hand on the routes, areas and points that are used now, if others were before."""
+        found = shown_geometries(self._control)
+        if found != self._geometries and self._thread.put(Geometries(found, self._time_us())):
+            self._geometries = found
 
     def _time_us(self) -> int:
         """Return the time of the executive's clock; that of simulated vehicles may run ahead."""
@@ -188,6 +189,7 @@ class Recorder(Listener):
             self._wake.clear()
             if self._thread.failure:
                 raise PluginError(self._thread.failure)
+            self._put_geometries()
             for run, found in list(self._runs.items()):
                 try:
                     whole = await self._read_run(found)

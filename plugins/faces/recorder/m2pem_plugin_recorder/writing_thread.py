@@ -5,14 +5,24 @@ import os
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from m2pem.api import Alert, LocalFrame, Mission, RunId, StampedRecord, Telemetry
+from m2pem.api import (
+    Alert,
+    Area,
+    LocalFrame,
+    Mission,
+    Point,
+    Route,
+    RunId,
+    StampedRecord,
+    Telemetry,
+)
 from m2pem_plugin_recorder.channels import ChannelMessage
 from m2pem_plugin_recorder.diagrams import diagram_of
-from m2pem_plugin_recorder.foxglove_messages import log_message, scene_messages
+from m2pem_plugin_recorder.foxglove_messages import log_message, removal_messages, scene_messages
 from m2pem_plugin_recorder.reading import last_record
 from m2pem_plugin_recorder.record_messages import RecordEncoder
 from m2pem_plugin_recorder.recording import (
@@ -58,7 +68,7 @@ class End:
 class Geometries:
     """The routes, areas and points by name, as they are from `time_us` on."""
 
-    found: dict[str, object]
+    found: Mapping[str, Point | Route | Area]
     time_us: int
 
 
@@ -192,8 +202,10 @@ class WritingThread:
                 if (ended := self._runs.pop(run, None)) is not None:
                     ended.recording.close()
             case Geometries():
+                before = self._geometries.found if self._geometries is not None else {}
+                gone = removal_messages(before.keys() - item.found.keys(), item.time_us)
                 self._geometries = item
-                scene = self._scene(item.time_us)
+                scene = [*gone, *self._scene(item.time_us)]
                 for each in self._runs.values():
                     each.recording.write(scene)
             case Warned(alert=alert, time_us=time_us):

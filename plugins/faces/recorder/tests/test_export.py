@@ -15,19 +15,20 @@ import shapely
 import shapely.geometry
 from m2pem_plugin_recorder.export.xes import XesExporter
 from mcap.reader import make_reader
-from recording_world import DRIVE, GATE, HOME, finished, write_fleet
+from recording_world import DRIVE, GATE, HOME, ROAD, finished, write_fleet
 
 from m2pem import load_mission
 from m2pem.api import (
     ExportedRecord,
     ExportedRun,
     ExportOptions,
+    Point,
     RunStatus,
     RunSummary,
     parse_mission,
 )
 from m2pem.api import records as r
-from m2pem.testing.scenarios import interrupted, question
+from m2pem.testing.scenarios import drawn, interrupted, question
 
 JOURNAL = ("--journal", "journal.db")
 ABORTED = interrupted("goto", "ugv1", after="PT2S", target="gate")
@@ -39,7 +40,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     path = tmp_path_factory.mktemp("export")
     write_fleet(path)
     (path / "aborted.bpmn").write_bytes(ABORTED)
-    (path / "question.bpmn").write_bytes(question())
+    (path / "question.bpmn").write_bytes(drawn(question(), lane=ROAD, gate=Point(HOME)))
     (path / "answers.yaml").write_text("answers: {Question: [continue]}\n")
     for mission in ("drive", "drive", "aborted"):
         finished(path, *run(mission), "--face", "recorder")
@@ -217,6 +218,22 @@ def test_geojson_has_tracks_and_places(folder: Path) -> None:
     assert track.distance(gate) < 1e-4
     assert len(shapes["ugv1"]["properties"]["coordTimes"]) == len(track.coords)
     assert track.coords[-1][:2] == pytest.approx((HOME[1], HOME[0]), abs=1e-4)
+
+
+def test_what_the_mission_has_drawn_is_on_the_map(folder: Path) -> None:
+    """In place of what the fleet has under the same name, as for the run's tasks."""
+    export(folder, "r4", "--to", "geojson", "-o", "r4.geojson")
+    features = json.loads((folder / "r4.geojson").read_text())["features"]
+    shapes = {each["properties"]["name"]: each["geometry"] for each in features}
+    assert shapes["lane"]["coordinates"] == [[each[1], each[0]] for each in ROAD.waypoints]
+    assert shapes["gate"]["coordinates"] == [HOME[1], HOME[0]]
+    export(folder, "r4", "--to", "kml", "-o", "r4.kml")
+    (runs,) = fastkml.KML.parse(folder / "r4.kml").features[0].features
+    assert "lane" in [each.name for each in runs.features]
+    export(folder, "r4", "--to", "mcap", "-o", "r4_drawn.mcap")
+    with (folder / "r4_drawn.mcap").open("rb") as file:
+        (scene, *_) = [m.data for _, _, m in make_reader(file).iter_messages("/m2pem/geometries")]
+    assert b'"lane"' in scene
 
 
 def test_kml_has_tracks_and_places(folder: Path) -> None:

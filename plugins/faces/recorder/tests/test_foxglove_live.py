@@ -3,7 +3,7 @@
 import asyncio
 import socket
 import struct
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from typing import Any
 
@@ -11,13 +11,15 @@ import msgspec
 import pytest
 import websockets
 from foxglove_schemas_protobuf.LocationFix_pb2 import LocationFix
+from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from m2pem_plugin_recorder.faces import FoxgloveFace
-from recording_world import DRIVE, simulated_fleet
+from recording_world import DRIVE, ROAD, simulated_fleet
 
 from m2pem.api import FaceSettings, MissionControl
 from m2pem.errors import PluginError
 from m2pem.testing import run_executive
 from m2pem.testing.harness import run_mission_on
+from m2pem.testing.scenarios import drawn, question
 
 PROTOCOL = websockets.Subprotocol("foxglove.sdk.v1")
 MESSAGE_DATA = 1
@@ -44,6 +46,15 @@ async def served(control: MissionControl, port: int, **settings: Any) -> AsyncIt
     finally:
         task.cancel()
         await asyncio.gather(task, return_exceptions=True)
+
+
+def entities(updates: Sequence[bytes]) -> set[str]:
+    """The ids of the entities of the scene after these updates."""
+    shown: set[str] = set()
+    for each in map(SceneUpdate.FromString, updates):
+        shown -= {deleted.id for deleted in each.deletions}
+        shown |= {entity.id for entity in each.entities}
+    return shown
 
 
 class Viewer:
@@ -125,7 +136,11 @@ async def test_a_viewer_gets_records_positions_and_the_scene() -> None:
         records = viewer.data["/m2pem/records"]
         await viewer.until(lambda: len(records) == result.summary.records)
         await viewer.until(lambda: "/m2pem/scene" in viewer.data)
-    seen = [msgspec.json.decode(each) for each in records]
+        run = await control.start(drawn(question(), lane=ROAD))
+        await viewer.until(lambda: "r2/lane" in entities(viewer.data["/m2pem/scene"]))
+        await control.stop(run)
+        await viewer.until(lambda: "r2/lane" not in entities(viewer.data["/m2pem/scene"]))
+    seen = [msgspec.json.decode(each) for each in records[: result.summary.records]]
     assert [each["seq"] for each in seen] == [each.seq for each in result.stamped]
     assert [each["record"] for each in seen] == [type(each).__name__ for each in result.records]
     fix = LocationFix.FromString(viewer.data["/ugv1/location"][-1])

@@ -26,7 +26,7 @@ from m2pem.api import GeoPosition, LocalFrame, StampedRecord, VehicleState
 from m2pem.fleet.hosts import Host
 from m2pem.testing import MissionResult, run_executive, scenarios
 from m2pem.testing.harness import run_mission_on
-from m2pem.testing.scenarios import ORIGIN, question
+from m2pem.testing.scenarios import ORIGIN, drawn, question
 
 FOXGLOVE = ("LocationFix", "PoseInFrame", "FrameTransform", "SceneUpdate", "GeoJSON")
 VEHICLE = [
@@ -191,6 +191,32 @@ def test_routes_and_areas_are_a_scene_and_geojson(tmp_path: Path) -> None:
     text = next(each.geojson for topic, each in decoded if topic == "/m2pem/geometries")
     names = {each["properties"]["name"] for each in msgspec.json.decode(text)["features"]}
     assert names == {"road", "field", "gate", "home"}
+
+
+def test_what_the_mission_has_drawn_is_in_the_scene_until_the_run_has_ended(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with run_executive(simulated_fleet()) as control, recorded(control, tmp_path):
+            other = await control.start(question())
+            run = await control.start(drawn(question(), lane=ROAD))
+            for each in (run, other):
+                await control.stop(each)
+                await control.wait(each)
+
+    asyncio.run(main())
+    (path,) = tmp_path.glob("r1-*.mcap")
+    shown: set[str] = set()
+    seen: set[str] = set()
+    gone: set[str] = set()
+    with path.open("rb") as file:
+        reader = make_reader(file, decoder_factories=[ProtobufDecoder()])
+        for _, _, _, update in reader.iter_decoded_messages(["/m2pem/scene"]):
+            gone |= {each.id for each in update.deletions}
+            shown -= {each.id for each in update.deletions}
+            shown |= {each.id for each in update.entities}
+            seen |= shown
+    assert seen == {"road", "field", "gate", "home", "r2/lane"}
+    assert gone == {"r2/lane"}
+    assert "r2/lane" not in shown
 
 
 def test_mission_diagram_and_fleet_are_attached(tmp_path: Path) -> None:

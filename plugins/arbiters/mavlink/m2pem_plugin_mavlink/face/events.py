@@ -3,18 +3,20 @@
 import asyncio
 import re
 from collections.abc import Callable, Collection, Mapping
+from functools import partial
 
 from m2pem.api import (
     Alert,
     BehaviorState,
-    Fleet,
     Importance,
     Listener,
     MissionControl,
     ResourceId,
+    RunId,
     RunView,
     StampedRecord,
     describe,
+    shown_geometries,
 )
 from m2pem.api.records import (
     BehaviorEnded,
@@ -45,12 +47,12 @@ class Events(Listener):
     def __init__(
         self,
         vehicles: Mapping[ResourceId, ShownVehicle],
-        fleet: Fleet,
+        control: MissionControl,
         orders: Orders,
         say: Say,
     ) -> None:
         self._vehicles = vehicles
-        self._fleet = fleet
+        self._control = control
         self._orders = orders
         self._say = say
         self._words = {
@@ -67,8 +69,8 @@ class Events(Listener):
                 for vehicle in concerned:
                     if vehicle.resource in record.resources:
                         vehicle.behavior, vehicle.behavior_id = record.name, record.behavior
-                        items = plan_of(record.name, record.parameters, self._fleet)
-                        vehicle.plan.replace(items)
+                        find = partial(self._geometry, stamped.run)
+                        vehicle.plan.replace(plan_of(record.name, record.parameters, find))
             case BehaviorProgressed() if is_new:
                 self._orders.progressed(stamped.run, record.state)
             case BehaviorUnsettled():
@@ -96,6 +98,11 @@ class Events(Listener):
                 severity = TextSeverity.WARNING
             for vehicle in concerned:
                 self._say(vehicle, severity, f"{stamped.run} {sentence.text}")
+
+    def _geometry(self, run: RunId, name: str) -> object:
+        """Return what a task of a run gets by the name of a geometry; None: there is none."""
+        own = self._control.run_geometries().get(run, {})
+        return own.get(name) or shown_geometries(self._control).get(name)
 
     def alerted(self, alert: Alert) -> None:
         """See `Listener`. An alert is for the vehicles that it names."""

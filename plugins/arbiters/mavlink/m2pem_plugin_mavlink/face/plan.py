@@ -1,14 +1,13 @@
 """What a vehicle carries out now, as a read-only plan of the mission protocol."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 from m2pem.api import (
     Area,
     Dimension,
-    Fleet,
     LatLon,
     LocalFrame,
     Point,
@@ -27,6 +26,9 @@ MOST_ITEMS = 1_000
 REACHED_M = 5.0
 SPACING_M = 20.0
 """Of a survey's tracks, where its parameters say none; the vehicle may have another default."""
+
+Geometries: TypeAlias = Callable[[str], object]
+"""Returns the geometry of a name; None: there is none."""
 
 _FRAMES = {"relative": 6, "amsl": 5, "terrain": 11}
 """MAV_FRAME with integer coordinates."""
@@ -63,16 +65,16 @@ class Plan:
             self.current += 1
 
 
-def plan_of(behavior: str, parameters: Mapping[str, Value], fleet: Fleet) -> list[Item]:
+def plan_of(behavior: str, parameters: Mapping[str, Value], geometries: Geometries) -> list[Item]:
     """Return the waypoints of a behavior, given its parameters as the mission has them; none if it
-    has none, or if they cannot be read."""
+    has none, or if they cannot be read. `geometries`: those of its run by name."""
     try:
-        return _items(behavior, parameters, fleet)
+        return _items(behavior, parameters, geometries)
     except (M2pemError, UnitError, ValueError, TypeError, KeyError):
         return []
 
 
-def _items(behavior: str, parameters: Mapping[str, Value], fleet: Fleet) -> list[Item]:
+def _items(behavior: str, parameters: Mapping[str, Value], geometries: Geometries) -> list[Item]:
     altitude_m = _number(parameters.get("altitude"))
     own_frame = parameters.get("altitude_frame")
 
@@ -83,24 +85,24 @@ def _items(behavior: str, parameters: Mapping[str, Value], fleet: Fleet) -> list
         return Item(latitude, longitude, height_m, _FRAMES.get(frame, 6))
 
     if behavior == "single_vehicle_routing":
-        route = _geometry(parameters["route"], fleet)
+        route = _geometry(parameters["route"], geometries)
         if isinstance(route, Route):
             return [item(*each, route.altitude_frame) for each in route.waypoints]
     elif behavior == "area_survey":
-        area = _geometry(parameters["area"], fleet)
+        area = _geometry(parameters["area"], geometries)
         if isinstance(area, Area):
             tracks = _tracks(area, parameters)
             return [item(*each, None, area.altitude_frame) for each in tracks]
     elif "target" in parameters:
-        target = _geometry(parameters["target"], fleet)
+        target = _geometry(parameters["target"], geometries)
         if isinstance(target, Point):
             return [item(*target.position, target.altitude_frame)]
     return []
 
 
-def _geometry(value: Value, fleet: Fleet) -> object:
+def _geometry(value: Value, geometries: Geometries) -> object:
     if isinstance(value, str):
-        return fleet.geometries.get(value)
+        return geometries(value)
     if isinstance(value, dict):
         return parse_geojson(value)
     if isinstance(value, list) and len(value) in (2, 3):

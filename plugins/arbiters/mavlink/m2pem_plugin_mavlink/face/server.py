@@ -110,7 +110,7 @@ class FaceServer:
         )
         self._requests = Requests(self._streams, fleet, self._tell)
         self._orders = Orders(control, self._settings.commands, self._tell, self._stations.now_s)
-        self._events = Events(self._vehicles, fleet, self._orders, self._say)
+        self._events = Events(self._vehicles, control, self._orders, self._say)
 
     async def serve(self) -> None:
         """Serve ground stations until cancelled.

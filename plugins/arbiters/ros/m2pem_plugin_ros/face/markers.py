@@ -17,16 +17,13 @@ from m2pem.api import (
     Area,
     Fleet,
     GeoPosition,
-    HandedOver,
     LinkState,
     LocalFrame,
     PayloadState,
     Point,
     ResourceId,
     Route,
-    parse_geojson,
 )
-from m2pem.errors import M2pemError
 from m2pem_plugin_ros.face.geometry import Vector
 from m2pem_plugin_ros.face.names import BASE, Names
 from m2pem_plugin_ros.face.telemetry_messages import written
@@ -49,6 +46,7 @@ FOOTPRINT_COLOR = (0.3, 1.0, 0.5, 0.8)
 TEXT_COLOR = (1.0, 1.0, 1.0, 1.0)
 
 Coordinate = tuple[float, float, float | None]
+Geometry = Point | Route | Area
 
 
 class MarkersPublisher:
@@ -60,7 +58,7 @@ class MarkersPublisher:
         self._names = names
         self._markers = node.create_publisher(MarkerArray, "~/markers", qos.STATUS)
         self._footprints = node.create_publisher(MarkerArray, "~/footprints", qos.STATUS)
-        self._handed_over: Mapping[str, HandedOver] | None = None
+        self._geometries: Mapping[str, Geometry] | None = None
         self._seen: dict[ResourceId, tuple[GeoPosition, ...]] = {}
         self._shown: dict[ResourceId, tuple[GeoPosition, ...]] | None = None
 
@@ -68,22 +66,16 @@ class MarkersPublisher:
         """Note what a payload sees; of one that is lost, nothing is shown."""
         self._seen[state.resource] = () if state.link is LinkState.LOST else state.footprint
 
-    def look(self, handed_over: Mapping[str, HandedOver]) -> None:
-        """Publish what has changed. `handed_over`: the geometries of operators."""
-        if handed_over != self._handed_over:
-            self._handed_over = dict(handed_over)
-            self._markers.publish(_whole(self._lasting(handed_over)))
+    def look(self, geometries: Mapping[str, Geometry]) -> None:
+        """Publish what has changed. `geometries`: those that are shown now, by name."""
+        if geometries != self._geometries:
+            self._geometries = dict(geometries)
+            self._markers.publish(_whole(self._lasting(geometries)))
         if self._seen != self._shown:
             self._shown = dict(self._seen)
             self._footprints.publish(_whole(self._outlines()))
 
-    def _lasting(self, handed_over: Mapping[str, HandedOver]) -> list[Any]:
-        geometries: dict[str, Any] = dict(self._fleet.geometries)
-        for name, each in handed_over.items():
-            try:
-                geometries[name] = parse_geojson(each.geometry)
-            except M2pemError:  # it was checked when it was handed over
-                continue
+    def _lasting(self, geometries: Mapping[str, Geometry]) -> list[Any]:
         markers: list[Any] = []
         for name, geometry in geometries.items():
             markers += self._of_geometry(name, geometry)

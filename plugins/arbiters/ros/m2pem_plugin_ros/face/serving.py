@@ -15,6 +15,7 @@ from m2pem.api import (
     ResourceId,
     Telemetry,
     VehicleState,
+    shown_geometries,
 )
 from m2pem.errors import M2pemError
 from m2pem_plugin_ros.face.behavior_actions import BehaviorActions
@@ -155,7 +156,7 @@ class Serving:
                 await self._fleet_state.publish(self._states, self._now_us())
                 if rounds % SLOW_EVERY == 0:
                     self._diagnostics.publish(self._states, self._now_us())
-                    self._markers.look(self._control.geometries())
+                    self._markers.look(shown_geometries(self._control))
             except M2pemError:
                 raise
             except Exception:  # what cannot be published now may be published later

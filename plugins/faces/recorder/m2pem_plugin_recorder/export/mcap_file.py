@@ -7,6 +7,7 @@ from m2pem.api import ExportedRun, ExportOptions, LocalFrame, StampedRecord
 from m2pem.errors import PluginError
 from m2pem_plugin_recorder.channels import PICTURES, PROMPTS, RECORDS, ChannelMessage
 from m2pem_plugin_recorder.diagrams import diagram_of
+from m2pem_plugin_recorder.export.places import geometries_of
 from m2pem_plugin_recorder.export.states import files_of
 from m2pem_plugin_recorder.fleets import fleet_json
 from m2pem_plugin_recorder.foxglove_messages import scene_messages
@@ -59,7 +60,7 @@ class McapExporter:
             if fleet is not None:
                 frame = LocalFrame(fleet.origin)
                 for found in scene_messages(
-                    fleet.geometries, frame, fleet.fence, summary.started_us
+                    geometries_of(run), frame, fleet.fence, summary.started_us
                 ):
                     file.write(found)
 

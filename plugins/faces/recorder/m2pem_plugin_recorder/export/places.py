@@ -37,18 +37,30 @@ class Places:
     detections: list[Detection] = field(default_factory=list)
 
 
-def places_of(run: ExportedRun, states: States) -> Places:
-    """Return what a run has on a map."""
-    places = Places()
-    for name, geometry in run.fleet.geometries.items() if run.fleet is not None else ():
-        if isinstance(geometry, Point | Route | Area):
-            places.geometries[name] = geometry
+def geometries_of(run: ExportedRun) -> dict[str, Point | Route | Area]:
+    """Return the geometries of a run by name: those of the fleet file, in place of them those of
+    the mission's files, and in place of both those that were handed over."""
+    known = {
+        **(run.fleet.geometries if run.fleet is not None else {}),
+        **(run.mission.geometries if run.mission is not None else {}),
+    }
+    found = {
+        name: geometry
+        for name, geometry in known.items()
+        if isinstance(geometry, Point | Route | Area)
+    }
     for each in run.records:
         if isinstance(each.record, r.GeometryReceived):
             try:
-                places.geometries[each.record.name] = parse_geojson(each.record.geometry)
+                found[each.record.name] = parse_geojson(each.record.geometry)
             except M2pemError:  # one of an older release that this one does not read
                 continue
+    return found
+
+
+def places_of(run: ExportedRun, states: States) -> Places:
+    """Return what a run has on a map."""
+    places = Places(geometries_of(run))
     for state in states.of(run):
         if isinstance(state, VehicleState):
             place = finite(state.position)
