@@ -1,7 +1,8 @@
 """A fleet made up from a mission (`--fleet sim`), so that any mission can be rehearsed at once.
 
-Everything has its place near one fixed origin, by the order in which the mission names it; the same
-mission always gives the same fleet.
+Everything has its place near one origin, by the order in which the mission names it; the same
+mission always gives the same fleet. The origin is a fixed one, or where the mission itself has
+drawn.
 """
 
 import math
@@ -12,8 +13,8 @@ from dataclasses import dataclass, field
 from m2pem.fleet.behaviors import SHARED
 from m2pem.fleet.check import DETECTOR_SERVICE
 from m2pem.fleet.fleet import SIMULATED, Domain, Fleet, Payload, Team, Vehicle
-from m2pem.geo.local_frame import offset
-from m2pem.geo.positions import is_local
+from m2pem.geo.local_frame import Origin, distance_m, offset
+from m2pem.geo.positions import is_local, positions
 from m2pem.mission.behavior import Behavior, BehaviorType, Need, Role, RoleKind, ServiceCall
 from m2pem.mission.catalogue import ParameterKind, ResourceId
 from m2pem.mission.concurrency import instances_at_once
@@ -26,6 +27,8 @@ from m2pem.mission.mission import Mission
 ORIGIN = (38.1075, -77.3192, 60.0)
 TEAM_SIZE = 3
 SPACING_M = 10.0
+NEAR_M = 10_000.0
+"""Vehicles reach geometries at this distance from the fixed origin."""
 MOST_INSTANCES = 100
 """Instances of a task that get vehicles of their own."""
 
@@ -46,7 +49,7 @@ def fleet_for(mission: Mission) -> Fleet:
     of its own for each task and parallel instance, with the domain, tags and payloads that its
     condition names. A name that the mission reads from its data while it runs cannot be known here.
     """
-    draft = _Draft()
+    draft = _Draft(_origin(mission))
     tasks = list(_tasks(mission))
     for task in tasks:
         for role in task.roles:
@@ -64,6 +67,15 @@ def fleet_for(mission: Mission) -> Fleet:
         elif task.service == DETECTOR_SERVICE and not task.roles:
             draft.add_any_detector()
     return draft.fleet()
+
+
+def _origin(mission: Mission) -> Origin:
+    """Return the fixed origin, or the first place that the mission's own geometries have, if all
+    of them are out of reach of it."""
+    places = [place for each in mission.geometries.values() for place in positions(each)]
+    if not places or any(distance_m(ORIGIN[:2], each[:2]) <= NEAR_M for each in places):
+        return ORIGIN
+    return (*places[0][:2], ORIGIN[2])
 
 
 def _tasks(mission: Mission) -> Iterator[Behavior | ServiceCall]:
@@ -85,6 +97,7 @@ def _at_once(activity: Activity) -> int:
 
 @dataclass(slots=True)
 class _Draft:
+    origin: Origin
     domains: dict[str, Domain] = field(default_factory=dict)
     payloads: dict[str, bool] = field(default_factory=dict)  # id -> whether it is a detector
     tags: dict[str, list[str]] = field(default_factory=dict)
@@ -165,15 +178,15 @@ class _Draft:
                 self.geometries[name] = Point(self._far(150.0))
 
     def _route(self) -> tuple[Coordinate, ...]:
-        return (_at(0.0, 20.0), self._far(100.0), self._far(200.0), self._far(300.0))
+        return (self._at(0.0, 20.0), self._far(100.0), self._far(200.0), self._far(300.0))
 
     def _square(self) -> tuple[Coordinate, ...]:
         east, north = self._far_m(200.0)
         corners = ((-50.0, -50.0), (50.0, -50.0), (50.0, 50.0), (-50.0, 50.0), (-50.0, -50.0))
-        return tuple(_at(east + x, north + y) for x, y in corners)
+        return tuple(self._at(east + x, north + y) for x, y in corners)
 
     def _far(self, distance_m: float) -> Coordinate:
-        return _at(*self._far_m(distance_m))
+        return self._at(*self._far_m(distance_m))
 
     def _far_m(self, distance_m: float) -> tuple[float, float]:
         """(east, north) of a place in the next geometry's own direction, 40 degrees further on."""
@@ -193,7 +206,7 @@ class _Draft:
         }
         vehicles: dict[ResourceId, Vehicle] = {}
         for number, (name, domain) in enumerate(self.domains.items()):
-            latitude_deg, longitude_deg, _ = _at(SPACING_M * number, 0.0)
+            latitude_deg, longitude_deg, _ = self._at(SPACING_M * number, 0.0)
             vehicle = ResourceId(name)
             vehicles[vehicle] = Vehicle(
                 vehicle,
@@ -207,7 +220,11 @@ class _Draft:
             name: Team(name, tuple(map(ResourceId, members)), ResourceId(members[0]))
             for name, members in self.teams.items()
         }
-        return Fleet("sim", "sim", vehicles, payloads, teams, self.geometries, ORIGIN)
+        return Fleet("sim", "sim", vehicles, payloads, teams, self.geometries, self.origin)
+
+    def _at(self, east_m: float, north_m: float) -> Coordinate:
+        latitude_deg, longitude_deg = offset(self.origin[:2], east_m, north_m)
+        return (round(latitude_deg, 7), round(longitude_deg, 7), None)
 
 
 def _literals(condition: Expression | None) -> dict[str, list[str]]:
@@ -245,8 +262,3 @@ def _names(behavior: Behavior) -> Iterator[tuple[str, ParameterKind | None]]:
             yield value, _KIND_BY_NAME.get(parameter.name)
         elif parameter.name in spec.by_name:
             yield value, spec.by_name[parameter.name].kind
-
-
-def _at(east_m: float, north_m: float) -> Coordinate:
-    latitude_deg, longitude_deg = offset(ORIGIN[:2], east_m, north_m)
-    return (round(latitude_deg, 7), round(longitude_deg, 7), None)

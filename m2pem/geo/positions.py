@@ -56,6 +56,12 @@ def geometry_out_of_reach(geometry: Geometry, origin: Origin) -> tuple[str, str]
     return None
 
 
+def positions(geometry: Geometry) -> Iterator[Coordinate]:
+    """Yield the positions of a geometry in order; the present one of a vehicle is not known."""
+    for _, place in _places(geometry):
+        yield place
+
+
 def _places(geometry: Geometry) -> Iterator[tuple[str, Coordinate]]:
     if isinstance(geometry, Point):
         yield "", geometry.position

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 from m2pem.findings import Finding
 from m2pem.fleet.check import check_mission
 from m2pem.fleet.default_fleet import ORIGIN, fleet_for
@@ -74,6 +76,22 @@ def test_routes_are_a_few_hundred_metres_long_and_apart() -> None:
 
 def test_the_same_mission_gives_the_same_fleet() -> None:
     assert fleet_for(mission(*TASKS)) == fleet_for(mission(*TASKS))
+
+
+def test_vehicles_start_where_the_mission_has_drawn_unless_that_is_near() -> None:
+    bare = mission(*TASKS[:-2])  # the one before the last has coordinates near the fixed origin
+    for north, expected in ((47.3, (47.3, 8.5)), (ORIGIN[0] + 0.05, ORIGIN[:2])):
+        east = 8.5 if north == 47.3 else ORIGIN[1]
+        lane = Route(((north, east, None), (north + 0.001, east, 20.0)))
+        fleet = fleet_for(replace(bare, geometries={"alpha": lane}))
+        assert fleet.origin[:2] == expected
+        homes = [vehicle.settings["home"] for vehicle in fleet.vehicles.values()]
+        assert all(distance_m(expected, home[:2]) < 100 for home in homes)
+        assert "alpha" not in fleet.geometries
+        gate = fleet.geometries["gate"]
+        assert isinstance(gate, Point)
+        assert distance_m(expected, gate.position[:2]) < 200
+        assert check_mission(replace(bare, geometries={"alpha": lane}), fleet, everything) == []
 
 
 def test_a_detector_service_without_roles_gets_a_detector() -> None:
