@@ -61,6 +61,7 @@ COMMANDS = {
     "attach": "Serve an operator of an executive that is running on this host.",
     "plugins": "List the plugins and what they provide.",
     "fleet": "Show a fleet: who is there and can do what.",
+    "geometries": "List routes, areas and points; show, export, import, delete and restore them.",
     "doctor": "Check this host: what is right, and what to do about the rest.",
     "templates": "Make forms of a fleet's behaviors for BPMN editors.",
     "completion": "Print what makes a shell complete m2pem's words.",

@@ -69,6 +69,11 @@ class Drawings:
         return tuple(self._versions.get(name, ()))
 
     @property
+    def names(self) -> Sequence[str]:
+        """The names that have versions, also of those that were deleted."""
+        return tuple(self._versions)
+
+    @property
     def geometries(self) -> Mapping[str, Geometry]:
         """Those that missions may name now."""
         return {name: parse_geojson(each.geometry) for name, each in self._handed_over.items()}
