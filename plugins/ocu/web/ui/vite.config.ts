@@ -1,6 +1,7 @@
 import preact from "@preact/preset-vite";
 import type { Plugin } from "vite";
 import { defineConfig } from "vitest/config";
+import { scaledSheets } from "./scaledSheets.ts";
 
 const NOTHING = "/src/editor/stubs/nothing.ts";
 const NEVER_SHOWN = /^@bpmn-io\/(feel-editor|feelers-editor)$|^@codemirror\//;
@@ -25,6 +26,7 @@ function leanPropertiesPanel(): Plugin {
 // The page is served by m2pem_plugin_web, from the folder that is built here.
 export default defineConfig({
   plugins: [leanPropertiesPanel(), preact()],
+  css: { postcss: { plugins: [scaledSheets()] } },
   build: {
     outDir: "../m2pem_plugin_web/static",
     emptyOutDir: true,

@@ -11,6 +11,8 @@ import { followStandbys } from "./shared/standbys";
 import { Toasts } from "./shared/Toasts";
 import { strings } from "./strings";
 import "./theme.css";
+import "./contrast.css";
+import "./controls.css";
 
 const Home = loaded(() => import("./home/Home"));
 const Alerts = loaded(() => import("./alerts/AlertPage"));

@@ -24,6 +24,7 @@ import "diagram-js-minimap/assets/diagram-js-minimap.css";
 import "./editor.css";
 import "./canvas.css";
 import "./forms.css";
+import { textScale } from "../shared/textScale";
 
 const words = strings.editor;
 
@@ -72,7 +73,7 @@ interface WorkplaceProps {
 function Workplace({ work, fail }: WorkplaceProps) {
   const { session } = work;
   const canvas = useRef<HTMLDivElement>(null);
-  const [showsBlocks, setBlocks] = useRemembered("editor-blocks", innerWidth > NARROW);
+  const [showsBlocks, setBlocks] = useRemembered("editor-blocks", innerWidth > NARROW * textScale.value);
   const [showsPanel, setPanel] = useRemembered("editor-panel", true);
   useEffect(() => {
     if (!canvas.current) return undefined;

@@ -9,6 +9,8 @@ import type { Column, Grouping, Line, Row } from "./rows";
 import { centred, focused, select, selected, sorting } from "./state";
 import { cellOf } from "./text";
 import { scrolledTo, windowOf } from "./virtualRows";
+import { controls } from "../shared/settings";
+import { textScale } from "../shared/textScale";
 
 const text = strings.fleet;
 
@@ -25,9 +27,13 @@ const COLUMNS: readonly Column[] = [
   "failsafe",
   "position",
 ];
-/** As in the style sheet: every line is as high as the others. */
+/** As in the style sheet: every line is as high as the others. At the usual text size. */
 const LINE_PX = matchMedia("(pointer: coarse)").matches ? 44 : 34;
+const LARGE_LINE_PX = 48;
 const HEAD_PX = 36;
+
+const linePx = (): number =>
+  (controls.value === "large" ? LARGE_LINE_PX : LINE_PX) * textScale.value;
 
 export interface FleetTableProps {
   lines: readonly Line[];
@@ -54,7 +60,7 @@ export function FleetTable({ lines, grouping, onCommands }: FleetTableProps) {
   const { from, to } = windowOf(lines.length, {
     scrolled_px: scrolled.value,
     seen_px,
-    line_px: LINE_PX,
+    line_px: linePx(),
   });
   const goTo = (index: number) => {
     const line = lines[index];
@@ -65,8 +71,8 @@ export function FleetTable({ lines, grouping, onCommands }: FleetTableProps) {
     element.scrollTop = scrolledTo(index, {
       scrolled_px: element.scrollTop,
       seen_px: element.clientHeight,
-      line_px: LINE_PX,
-      head_px: HEAD_PX,
+      line_px: linePx(),
+      head_px: HEAD_PX * textScale.value,
     });
     scrolled.value = element.scrollTop;
   };
@@ -84,7 +90,7 @@ export function FleetTable({ lines, grouping, onCommands }: FleetTableProps) {
     if (event.target instanceof HTMLButtonElement || event.target instanceof HTMLAnchorElement) {
       return;
     }
-    const page = Math.max(1, Math.floor(seen_px / LINE_PX) - 2);
+    const page = Math.max(1, Math.floor(seen_px / linePx()) - 2);
     const step = { ArrowDown: 1, ArrowUp: -1, PageDown: page, PageUp: -page }[event.key];
     if (step !== undefined) goTo(stepped(lines, at, step));
     else if (event.key === "Home") goTo(stepped(lines, -1, 1));
@@ -180,7 +186,7 @@ function stepped(lines: readonly Line[], at: number, step: number): number {
 const Space = ({ lines }: { lines: number }) =>
   lines > 0 ? (
     <tr aria-hidden="true">
-      <td style={{ height: `${lines * LINE_PX}px`, padding: 0 }} />
+      <td style={{ height: `${lines * linePx()}px`, padding: 0 }} />
     </tr>
   ) : null;
 

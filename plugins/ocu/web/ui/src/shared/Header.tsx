@@ -1,5 +1,7 @@
 // On every page: which fleet, who looks, whether what moves is real, and how to stop it.
-import { effect } from "@preact/signals";
+import { effect, signal } from "@preact/signals";
+import { lazy, Suspense } from "preact/compat";
+import { useEffect, useRef } from "preact/hooks";
 import { ControlRequests } from "../people/ControlRequests";
 import { Present } from "../people/Present";
 import { fill, strings } from "../strings";
@@ -12,11 +14,16 @@ import { standbys } from "./standbys";
 import { StopAlert } from "./StopAlert";
 import { StopButton } from "./StopButton";
 import { ALL, stop } from "./stopping";
-import { switchTheme, theme } from "./theme";
+import "./settings";
+import "./theme";
 import { attempt } from "./Toasts";
 import "./header.css";
 
+const SettingsDialog = lazy(() => import("../settings/SettingsDialog"));
+
 const text = strings.shell;
+
+const isSetting = signal(false);
 
 // Questions and other alerts are seen from another tab of the browser as well.
 effect(() => {
@@ -35,8 +42,10 @@ effect(() => {
 
 export function Header() {
   const who = session.value;
+  const top = useRef<HTMLDivElement>(null);
+  useEffect(() => followHeight(top.current!), []);
   return (
-    <>
+    <div id="top" ref={top}>
       <a class="skip" href="#main">
         {text.skip}
       </a>
@@ -70,31 +79,34 @@ export function Header() {
               {who.user} <small>{text.roles[who.role]}</small>
             </span>
           )}
-          <button
-            type="button"
-            class="plain"
-            aria-label={theme.value === "dark" ? text.light : text.dark}
-            title={theme.value === "dark" ? text.light : text.dark}
-            onClick={switchTheme}
-          >
-            <svg viewBox="0 0 24 24" width="20" height="20" aria-hidden="true">
-              <circle cx="12" cy="12" r="8" fill="none" stroke="currentColor" stroke-width="2" />
-              <path d="M12 4a8 8 0 0 1 0 16z" fill="currentColor" />
-            </svg>
-          </button>
           {who && (
             <button type="button" class="plain" onClick={() => void attempt(signOut)}>
               {text.signOut}
             </button>
           )}
         </div>
-        {who && (
-          <div class="header-calls">
-            <Questions />
-            <Present />
-            <AlertBell />
-          </div>
-        )}
+        <div class="header-calls">
+          {who && <Questions />}
+          {who && <AlertBell />}
+          {who && <Present />}
+          <button
+            type="button"
+            class="plain"
+            aria-haspopup="dialog"
+            aria-label={text.settings}
+            title={text.settings}
+            onClick={() => (isSetting.value = true)}
+          >
+            <svg viewBox="0 0 24 24" width="20" height="20" aria-hidden="true">
+              <circle cx="12" cy="12" r="6" fill="none" stroke="currentColor" stroke-width="3" />
+              <path
+                d="M12 2v4m0 12v4M2 12h4m12 0h4M5 5l2.8 2.8m8.4 8.4L19 19M19 5l-2.8 2.8m-8.4 8.4L5 19"
+                stroke="currentColor"
+                stroke-width="2.6"
+              />
+            </svg>
+          </button>
+        </div>
         {may("operator") && (
           <StopButton
             class="stop-all"
@@ -106,6 +118,11 @@ export function Header() {
           />
         )}
       </header>
+      {isSetting.value && (
+        <Suspense fallback={null}>
+          <SettingsDialog onClose={() => (isSetting.value = false)} />
+        </Suspense>
+      )}
       {who && <StopAlert />}
       {who && <ControlRequests />}
       {who && connection.value === "lost" && (
@@ -122,8 +139,17 @@ export function Header() {
           </button>
         </div>
       )}
-    </>
+    </div>
   );
+}
+
+/** Dialogs and panels begin below all that is said above the page: `--top` is where. */
+function followHeight(top: HTMLElement): () => void {
+  const observer = new ResizeObserver(() => {
+    document.documentElement.style.setProperty("--top", `${top.offsetHeight}px`);
+  });
+  observer.observe(top);
+  return () => observer.disconnect();
 }
 
 function PageLink({ to, label, isHere }: { to: string; label: string; isHere: boolean }) {

@@ -4,6 +4,8 @@ import { strings } from "../strings";
 import { ApiError } from "./api";
 import { newest, type Tone } from "./newestToasts";
 import "./toasts.css";
+import { textScale } from "./textScale";
+import { atScale } from "./useMedia";
 
 interface Toast {
   id: number;
@@ -17,7 +19,8 @@ const FAULT_SHOWN_MS = 20_000;
 /** A phone has less room: what is below, such as a question, stays in view. */
 const SMALL = "(width < 600px)";
 const LOW = "(height < 480px)";
-const most = (): number => (matchMedia(LOW).matches ? 1 : matchMedia(SMALL).matches ? 3 : 5);
+const isSo = (query: string): boolean => matchMedia(atScale(query, textScale.value)).matches;
+const most = (): number => (isSo(LOW) ? 1 : isSo(SMALL) ? 3 : 5);
 
 const toasts = signal<Toast[]>([]);
 let count = 0;

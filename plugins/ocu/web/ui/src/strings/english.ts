@@ -13,10 +13,12 @@ import { plan } from "./plan";
 import { plots } from "./plots";
 import { begin, run } from "./run";
 import { runs } from "./runs";
+import { settings } from "./settings";
 import { shell, signIn } from "./shell";
 
 export const english = {
   shell,
+  settings,
   signIn,
   home,
   busy,

@@ -5,8 +5,10 @@ import { strings } from "../../strings";
 import type { EditorContext, Panel } from "./panel";
 import { panels } from "./panels";
 import { FIRST_PANEL, showPanel, shownPanel } from "./shown";
+import { textScale } from "../../shared/textScale";
 
 const words = strings.editor.panel;
+/** In px at the usual text size. */
 const LEAST = 240;
 const MOST = 720;
 const USUAL = 380;
@@ -28,7 +30,7 @@ export function SidePanel({ editor }: { editor: EditorContext }) {
     document.getElementById(`m2-panel-tab-${next.id}`)?.focus();
   };
   return (
-    <aside class="m2-side" style={{ width: `${width}px` }} aria-label={strings.editor.panels.label}>
+    <aside class="m2-side" style={{ width: `${width / 16}rem` }} aria-label={strings.editor.panels.label}>
       <Grip width={width} resize={resize} />
       <div role="tablist" aria-label={strings.editor.panels.label} class="m2-tablist">
         {panels.map((panel, index) => (
@@ -115,7 +117,9 @@ function Grip({ width, resize }: { width: number; resize(width: number): void })
         from.current = { x: event.clientX, width };
       }}
       onPointerMove={(event) => {
-        if (from.current) resize(from.current.width + from.current.x - event.clientX);
+        if (from.current) {
+          resize(from.current.width + (from.current.x - event.clientX) / textScale.value);
+        };
       }}
       onPointerUp={() => (from.current = null)}
     />

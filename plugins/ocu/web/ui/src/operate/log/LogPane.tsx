@@ -12,10 +12,13 @@ import { Pane } from "../layout/Pane";
 import { usePaced } from "../layout/pace";
 import { Lines, type Wanted } from "./filter";
 import "./log.css";
+import { controls } from "../../shared/settings";
+import { textScale } from "../../shared/textScale";
 
 const text = strings.operate.log;
 
-const LINE_PX = 24;
+/** At the usual text size, as in the style sheet; with large controls, a finger finds each. */
+const LINE_PX = { usual: 24, large: 48 };
 const MARGIN_LINES = 10;
 const PAGE = 2000;
 
@@ -127,8 +130,9 @@ function LineList({ lines }: { lines: LogLine[] }) {
     if (atEnd && box.current) box.current.scrollTop = box.current.scrollHeight;
   }, [lines, atEnd, height]);
 
-  const from = Math.max(0, Math.floor(top / LINE_PX) - MARGIN_LINES);
-  const to = Math.min(lines.length, Math.ceil((top + height) / LINE_PX) + MARGIN_LINES);
+  const line_px = LINE_PX[controls.value] * textScale.value;
+  const from = Math.max(0, Math.floor(top / line_px) - MARGIN_LINES);
+  const to = Math.min(lines.length, Math.ceil((top + height) / line_px) + MARGIN_LINES);
   return (
     <div class="log-box">
       <div
@@ -141,12 +145,12 @@ function LineList({ lines }: { lines: LogLine[] }) {
         onScroll={(event) => {
           const { scrollTop, scrollHeight, clientHeight } = event.currentTarget;
           setTop(scrollTop);
-          setAtEnd(scrollHeight - scrollTop - clientHeight < LINE_PX);
+          setAtEnd(scrollHeight - scrollTop - clientHeight < line_px);
         }}
       >
         {lines.length === 0 && <p class="nothing">{text.none}</p>}
-        <div style={`height: ${lines.length * LINE_PX}px`}>
-          <div style={`transform: translateY(${from * LINE_PX}px)`}>
+        <div style={`height: ${lines.length * line_px}px`}>
+          <div style={`transform: translateY(${from * line_px}px)`}>
             {lines.slice(from, to).map((line) => (
               <Line key={line.seq} line={line} />
             ))}

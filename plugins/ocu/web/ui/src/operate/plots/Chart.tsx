@@ -8,6 +8,7 @@ import type { TelemetryHistory } from "./history";
 import { drawn, grid, type Range } from "./series";
 import { forced, lineOf } from "./style";
 import "uplot/dist/uPlot.min.css";
+import { textScale } from "../../shared/textScale";
 
 /** Pixels of a column, of which the least and the greatest value are drawn. */
 const COLUMN_PX = 2;
@@ -61,8 +62,8 @@ export function Chart(props: ChartProps) {
         {
           size: axis_px,
           stroke: style.color,
-          font: "11px system-ui, sans-serif",
-          space: 26,
+          font: `${11 * textScale.value}px system-ui, sans-serif`,
+          space: 26 * textScale.value,
           grid: { stroke: rule, width: 1 },
           ticks: { stroke: rule, width: 1, size: 4 },
           ...(isLink && {

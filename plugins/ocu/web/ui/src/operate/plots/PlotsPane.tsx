@@ -19,11 +19,12 @@ import { PlotTip } from "./PlotTip";
 import { useCursor } from "./useCursor";
 import { ValuesTable } from "./ValuesTable";
 import "./plots.css";
+import { textScale } from "../../shared/textScale";
 
 const text = strings.plots;
 
 const EVERY_MS = { live: 1000, replay: 200 } as const;
-/** The values' axis is as wide as the names of the rows of the time line, but on a phone. */
+/** All at the usual text size. The values' axis is as wide as the names of the rows of the time line, but on a phone. */
 const AXIS_PX = 96;
 const NARROW_AXIS_PX = 52;
 const NARROW = "(width < 600px)";
@@ -39,7 +40,10 @@ export default function PlotsPane({ onSeek }: { onSeek?: ((t: number) => void) |
   const { history } = grown;
   const now = scene.now();
   const plot = useRef<HTMLDivElement>(null);
-  const axis_px = useMedia(NARROW) ? NARROW_AXIS_PX : AXIS_PX;
+  const scale = textScale.value;
+  const axis_px = (useMedia(NARROW) ? NARROW_AXIS_PX : AXIS_PX) * scale;
+  const marks_px = MARKS_PX * scale;
+  const chart_px = CHART_PX * scale;
   const shown = useTimeWindow(plot);
   const { window, width } = shown;
   const range = rangeOf(window, width);
@@ -53,7 +57,7 @@ export default function PlotsPane({ onSeek }: { onSeek?: ((t: number) => void) |
   const plotted = resources.filter((id) => wanted.has(id));
   const fields = chosen.value.fields.filter((field) => known.includes(field));
   const at = pointed.value ?? now;
-  const times = marks(window, width, 70);
+  const times = marks(window, width, 70 * scale);
   const label = (field: string) =>
     fill(text.chart, { field: titleOf(field), resources: plotted.join(", ") });
 
@@ -104,9 +108,9 @@ export default function PlotsPane({ onSeek }: { onSeek?: ((t: number) => void) |
           <p class="nothing">{text.choose}</p>
         )}
         <div class="plots-charts">
-          <svg class="plots-marks" height={MARKS_PX} aria-hidden="true">
+          <svg class="plots-marks" height={marks_px} aria-hidden="true">
             {times.map((t) => (
-              <text key={t} x={axis_px + Math.max(16, (t - window.from_s) * window.px_per_s)} y="14">
+              <text key={t} x={axis_px + Math.max(16 * scale, (t - window.from_s) * window.px_per_s)} y={14 * scale}>
                 {clock(t)}
               </text>
             ))}
@@ -122,7 +126,7 @@ export default function PlotsPane({ onSeek }: { onSeek?: ((t: number) => void) |
               range={range}
               width={width + axis_px}
               axis_px={axis_px}
-              height={CHART_PX - TITLE_PX}
+              height={chart_px - TITLE_PX * scale}
               marks={times}
             />
           ))}
@@ -150,8 +154,8 @@ export default function PlotsPane({ onSeek }: { onSeek?: ((t: number) => void) |
               resources={plotted}
               window={window}
               width={width}
-              top_px={MARKS_PX}
-              chart_px={CHART_PX}
+              top_px={marks_px}
+              chart_px={chart_px}
             />
           </div>
         </div>

@@ -80,7 +80,7 @@ export function Bars({ rows, window, width, now, lane_px, onSeek }: BarsProps) {
             <rect width={wide} height={lane_px - 4} rx={3} />
             {wide > 40 && (
               <svg width={wide - 4} height={lane_px - 4} aria-hidden="true">
-                <text x={6} y={13}>
+                <text x={6} y={(lane_px - 4) * 0.72}>
                   {shown}
                 </text>
               </svg>

@@ -17,9 +17,11 @@ import { TimeCursor } from "./TimeCursor";
 import { TimeTools } from "./TimeTools";
 import { useTimeWindow } from "./useTimeWindow";
 import "./timeline.css";
+import { textScale } from "../../shared/textScale";
 
 const text = strings.operate.timeline;
 
+/** At the usual text size. */
 const LANE_PX = 22;
 const AXIS_PX = 22;
 /** Bars that go on grow slowly; who replays looks closer. What begins or ends is drawn at once. */
@@ -47,7 +49,12 @@ export function TimelinePane({ onSeek, plots }: TimelineProps) {
   usePaced(scene.time, EVERY_MS[scene.mode]);
   const time = scene.now();
   const plot = useRef<HTMLDivElement>(null);
-  const rows = useMemo(() => rowsOf(spans, fleet), [spans, spans.all.length, fleet]);
+  const scale = textScale.value;
+  const [lane_px, axis_px] = [LANE_PX * scale, AXIS_PX * scale];
+  const rows = useMemo(
+    () => rowsOf(spans, fleet, lane_px),
+    [spans, spans.all.length, fleet, lane_px],
+  );
   const goesOn = useMemo(() => spans.all.some(({ to }) => to === null), [spans, time]);
   const height = (rows.at(-1)?.top ?? 0) + (rows.at(-1)?.height ?? 0);
   const shown = useTimeWindow(plot);
@@ -61,7 +68,7 @@ export function TimelinePane({ onSeek, plots }: TimelineProps) {
         window={window}
         width={width}
         now={time}
-        lane_px={LANE_PX}
+        lane_px={lane_px}
         onSeek={onSeek}
       />
     ),
@@ -89,7 +96,7 @@ export function TimelinePane({ onSeek, plots }: TimelineProps) {
       }
     >
       <div class="timeline" title={text.hint}>
-        <ul class="timeline-rows" style={`padding-top: ${AXIS_PX}px`} aria-hidden="true">
+        <ul class="timeline-rows" style={`padding-top: ${axis_px}px`} aria-hidden="true">
           {rows.map((row) => (
             <li key={row.id} style={`height: ${row.height}px`}>
               {row.title}
@@ -104,22 +111,22 @@ export function TimelinePane({ onSeek, plots }: TimelineProps) {
         >
           <svg
             width={width}
-            height={Math.max(height + AXIS_PX, 60)}
+            height={Math.max(height + axis_px, 60)}
             role="group"
             aria-label={text.label}
             onClick={(event) => onSeek?.(shown.timeAt(event.clientX))}
           >
-            {marks(window, width, 70).map((t) => (
+            {marks(window, width, 70 * scale).map((t) => (
               <g
                 key={t}
-                class={x(t) < 20 ? "mark mark-first" : "mark"}
+                class={x(t) < 20 * scale ? "mark mark-first" : "mark"}
                 transform={`translate(${x(t)} 0)`}
               >
-                <line y1={AXIS_PX} y2="100%" />
-                <text y="14">{clock(t)}</text>
+                <line y1={axis_px} y2="100%" />
+                <text y={14 * scale}>{clock(t)}</text>
               </g>
             ))}
-            <g transform={`translate(0 ${AXIS_PX})`}>
+            <g transform={`translate(0 ${axis_px})`}>
               {rows.map((row) => (
                 <line key={row.id} class="row-line" x2="100%" y1={row.top} y2={row.top} />
               ))}
@@ -134,7 +141,7 @@ export function TimelinePane({ onSeek, plots }: TimelineProps) {
                 ))}
               {bars}
             </g>
-            <line class="now" x1={x(time)} x2={x(time)} y1={AXIS_PX - 6} y2="100%" />
+            <line class="now" x1={x(time)} x2={x(time)} y1={axis_px - 6} y2="100%" />
           </svg>
           <TimeCursor window={window} />
           {spans.all.length === 0 && <p class="nothing">{text.none}</p>}
@@ -156,7 +163,7 @@ function Held({ row, held, x }: { row: Row; held: string; x: number }) {
   if (!held || row.bars.some(({ span }) => span.to === null)) return null;
   return (
     <g class="held" role="img" aria-label={`${row.title}: ${held}`}>
-      <text x={x} y={row.top + 17}>
+      <text x={x} y={row.top + 17 * textScale.value}>
         {held}
       </text>
     </g>
@@ -165,7 +172,7 @@ function Held({ row, held, x }: { row: Row; held: string; x: number }) {
 
 const lastOf = (row: Row): number => Math.max(0, ...row.bars.map(({ span }) => span.to ?? 0));
 
-function rowsOf(spans: Shown, fleet: Fleet): Row[] {
+function rowsOf(spans: Shown, fleet: Fleet, lane_px: number): Row[] {
   const inRow = new Map<string, Span[]>();
   for (const span of spans.all) {
     const row = inRow.get(span.row);
@@ -183,7 +190,7 @@ function rowsOf(spans: Shown, fleet: Fleet): Row[] {
     .filter((id) => inRow.has(id) || named.has(id))
     .map((id) => {
       const bars = lanes(inRow.get(id) ?? []);
-      const height = Math.max(1, ...bars.map(({ lane }) => lane + 1)) * LANE_PX + 4;
+      const height = Math.max(1, ...bars.map(({ lane }) => lane + 1)) * lane_px + 4;
       const row = { id, title: titleOf(id), top, height, bars };
       top += height;
       return row;

@@ -29,10 +29,12 @@ import { plan } from "./plan";
 import { plots } from "./plots";
 import { begin, run } from "./run";
 import { runs } from "./runs";
+import { settings } from "./settings";
 import { shell, signIn } from "./shell";
 
 export const german: Translation<English> = {
   shell,
+  settings,
   signIn,
   home,
   busy,

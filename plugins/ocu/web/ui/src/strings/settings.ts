@@ -1,0 +1,25 @@
+// Texts of the settings of a browser, and of what the page says while it cannot reach the executive.
+export const settings = {
+  title: "Settings",
+  hint: "For this browser. They are kept until its data are deleted.",
+  done: "Done",
+  theme: "Colours",
+  themes: {
+    system: "As the system has them",
+    light: "Light",
+    dark: "Dark",
+    contrast: "High contrast",
+  },
+  textSize: "Text size",
+  textSizeHint: "No larger than leaves room for STOP in this window.",
+  percent: "{percent} %",
+  controls: "Buttons and fields",
+  controlsHint: "Large ones can be hit with gloves.",
+  controlSizes: { usual: "Usual", large: "Large" },
+  language: "Language",
+  languageHint: "What the executive says, such as findings and reasons, stays English.",
+  browserLanguage: "As the browser has it",
+  reload: "Load the page again",
+  reloadHint: "The page takes it when it is loaded again.",
+  reloadWaits: "A STOP has not been confirmed yet: the page must stay as it is until then.",
+} as const;
