@@ -21,11 +21,13 @@ class GivenApproval:
 @dataclass(frozen=True, slots=True)
 class EarlierApproval:
     """A person has approved an earlier content of a mission. `changed`: its files and drawings that
-    are other now, or are in one of both contents."""
+    are other now, or are in one of both contents. `file`: the SHA-256 of the mission's file
+    then."""
 
     by: str
     at_us: int
     changed: tuple[str, ...]
+    file: str = ""
 
     def __str__(self) -> str:
         given = GivenApproval(self.by, self.at_us)

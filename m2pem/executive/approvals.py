@@ -8,7 +8,7 @@ from pathlib import PurePath
 
 from m2pem.api.approval import EarlierApproval, GivenApproval, MissionApproval
 from m2pem.errors import NotApprovedError, OperatorError
-from m2pem.fleet.approval import Approval, Content, Edit, content_of, person_of
+from m2pem.fleet.approval import MISSION_PART, Approval, Content, Edit, content_of, person_of
 from m2pem.fleet.fleet import Fleet
 from m2pem.fleet.operator_roles import why_not_allowed
 from m2pem.journal.base import Journal
@@ -80,7 +80,12 @@ class Approvals:
             tuple(GivenApproval(e.by, e.at_us) for e in allowed if e.person not in persons),
             tuple(GivenApproval(e.by, e.at_us) for e in allowed if e.person in persons),
             tuple(
-                EarlierApproval(each.by, each.at_us, content.changed_since(each.parts))
+                EarlierApproval(
+                    each.by,
+                    each.at_us,
+                    content.changed_since(each.parts),
+                    each.parts.get(MISSION_PART, ""),
+                )
                 for each in earlier[-SHOWN_EARLIER:]
             ),
         )

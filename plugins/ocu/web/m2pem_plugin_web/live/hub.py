@@ -199,6 +199,10 @@ class Hub(Listener):
         """Send at once that operators are to be read again."""
         self._send_to_all(messages.operators_changed())
 
+    def comments_changed(self, mission: str) -> None:
+        """Send at once that the comments on a mission are to be read again."""
+        self._send_to_all(messages.comments_changed(mission))
+
     def announce(self, text: str) -> None:
         """Send a text to all operators."""
         self._send_to_all(messages.fault(text))

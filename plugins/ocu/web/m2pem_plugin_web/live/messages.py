@@ -112,6 +112,11 @@ def shared_space_changed() -> Message:
     return message("shared_space")
 
 
+def comments_changed(mission: str) -> Message:
+    """Return the message that the comments on a mission are to be read again."""
+    return message("comments", mission=mission)
+
+
 def operators_changed() -> Message:
     """Return the message that operators are to be read again: `GET /api/operators`."""
     return message("operators")

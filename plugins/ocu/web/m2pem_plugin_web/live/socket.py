@@ -53,9 +53,7 @@ class _Edit(msgspec.Struct, tag="edit", frozen=True):
     mission: Annotated[str, msgspec.Meta(max_length=LONGEST)] | None = None
 
 
-_decoder: msgspec.json.Decoder[_Watch | _Ack | _Edit] = msgspec.json.Decoder(
-    _Watch | _Ack | _Edit
-)
+_decoder: msgspec.json.Decoder[_Watch | _Ack | _Edit] = msgspec.json.Decoder(_Watch | _Ack | _Edit)
 
 
 class _Leave(Exception):  # noqa: N818  # nothing went wrong here

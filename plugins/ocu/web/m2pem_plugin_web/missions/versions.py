@@ -63,9 +63,12 @@ FOLDER = ".versions"
 _FILE = re.compile(r"(\d{6,})\.json")
 
 
+VERSION_LENGTH = 16
+
+
 def version_of(source: bytes) -> str:
-    """Return a hash of the content."""
-    return sha256(source).hexdigest()[:16]
+    """Return a hash of the content: the beginning of its SHA-256."""
+    return sha256(source).hexdigest()[:VERSION_LENGTH]
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,11 +1,14 @@
 """/api/missions/{name}/approval: who has approved a mission of the folder, and who must."""
 
+from collections.abc import Mapping
+
 from fastapi import APIRouter
 from pydantic import BaseModel
 
 from m2pem.api import Draft, MissionApproval, MissionControl
 from m2pem_plugin_web.access.permissions import Operator, Viewer
 from m2pem_plugin_web.missions.folder import MissionFolder
+from m2pem_plugin_web.missions.versions import VERSION_LENGTH
 from m2pem_plugin_web.problems import RESPONSES
 from m2pem_plugin_web.rest.drafts import MissionName, of_folder
 from m2pem_plugin_web.rest.models import Body, Name
@@ -19,9 +22,11 @@ class GivenApprovalModel(BaseModel):
 
 
 class EarlierApprovalModel(GivenApprovalModel):
-    """A person has approved an earlier content. `changed`: what is other now."""
+    """A person has approved an earlier content. `changed`: what is other now. `version`: the number
+    of the version that the mission's file was then; null: none of that content is kept."""
 
     changed: list[str]
+    version: int | None
 
 
 class ApprovalModel(BaseModel):
@@ -57,26 +62,32 @@ def router(control: MissionControl, folder: MissionFolder) -> APIRouter:
         saved = await of_folder(folder.read, name)
         return Draft(saved.path, saved.source)
 
+    async def model(name: str, state: MissionApproval) -> ApprovalModel:
+        versions = await of_folder(folder.versions, name) if state.earlier else ()
+        return _model(state, {each.version: each.number for each in versions})
+
     @routes.get("/{name}/approval")
     async def approval(_: Viewer, name: MissionName) -> ApprovalModel:
         """Who has approved a mission, and who must before it may start."""
-        return _model(await control.approval(await draft(name)))
+        return await model(name, await control.approval(await draft(name)))
 
     @routes.post("/{name}/approval")
     async def approve(person: Operator, name: MissionName, wanted: ApproveModel) -> ApprovalModel:
         """Approve it."""
         found = await draft(name)
-        return _model(await control.approve(found, digest=wanted.digest, by=person.name))
+        state = await control.approve(found, digest=wanted.digest, by=person.name)
+        return await model(name, state)
 
     @routes.post("/{name}/approval/withdraw")
     async def withdraw(person: Operator, name: MissionName) -> ApprovalModel:
         """Withdraw one's approval. What runs goes on."""
-        return _model(await control.withdraw_approval(await draft(name), by=person.name))
+        state = await control.withdraw_approval(await draft(name), by=person.name)
+        return await model(name, state)
 
     return routes
 
 
-def _model(state: MissionApproval) -> ApprovalModel:
+def _model(state: MissionApproval, versions: Mapping[str, int]) -> ApprovalModel:
     return ApprovalModel(
         mission=state.mission,
         digest=state.digest,
@@ -92,7 +103,12 @@ def _model(state: MissionApproval) -> ApprovalModel:
             GivenApprovalModel(by=each.by, at_us=each.at_us) for each in state.not_counted
         ],
         earlier=[
-            EarlierApprovalModel(by=each.by, at_us=each.at_us, changed=list(each.changed))
+            EarlierApprovalModel(
+                by=each.by,
+                at_us=each.at_us,
+                changed=list(each.changed),
+                version=versions.get(each.file[:VERSION_LENGTH]) if each.file else None,
+            )
             for each in state.earlier
         ],
     )
