@@ -8,7 +8,8 @@ import pytest
 from m2pem_plugin_web.rest import run_pages
 from rest_world import As, app_of
 
-from m2pem.api import MissionControl, RunStatus, RunSummary
+from m2pem.api import MissionControl, RunStatus, RunSummary, StampedRecord
+from m2pem.api import records as r
 
 MANY = 10_000
 ENDS = (RunStatus.COMPLETED, RunStatus.FAILED, RunStatus.STOPPED)
@@ -27,6 +28,17 @@ def run_of(number: int) -> RunSummary:
     return RunSummary(f"r{number}", mission, "P", status, began_us, ended_us, 9, detail)
 
 
+async def records_of(run: str, after: int, limit: int) -> list[StampedRecord]:
+    """Every thousandth run had uav1, its detector's payload, or a vehicle whose name begins so."""
+    number = int(run[1:])
+    if number % 1000 or after:
+        return []
+    had = ("uav1", "uav1/radar", "uav10")[number // 1000 % 3]
+    roles = {"vehicle": (had,)}
+    task = r.BehaviorRequested(1, "P", "E", 0, f"{run}.b1", "goto", "vehicle", (had,), roles, {})
+    return [StampedRecord(run, 1, 0.0, task)]
+
+
 @pytest.fixture(scope="module")
 def control() -> Mock:
     control = Mock(spec=MissionControl)
@@ -35,6 +47,7 @@ def control() -> Mock:
     control.holders = AsyncMock(
         return_value={"uav1": "", "uav1/camera": "r9999.b3", "uav2": "r10000.b1", "uav3": "anna"}
     )
+    control.records = AsyncMock(side_effect=records_of)
     return control
 
 
@@ -68,14 +81,34 @@ async def test_a_page_has_those_that_go_on_first_then_the_newest(control: Mock) 
         ("text=survey+blocked", 1667),
         ("text=r9999", 1),
         ("since_us=5000000&until_us=9000000", 5),
-        ("vehicle=uav1", 1),
-        ("vehicle=uav3", 0),
+        ("vehicle=uav3&since_us=9998000000", 0),
         ("text=nowhere", 0),
     ],
 )
 async def test_runs_are_filtered(control: Mock, query: str, total: int) -> None:
     found = await page(control, query)
     assert (found["total"], found["all"]) == (total, MANY)
+
+
+async def test_runs_are_found_by_a_vehicle_that_they_have_or_had(control: Mock) -> None:
+    app = app_of(Mock(control=control), run_pages.router(control))
+    transport = httpx.ASGITransport(As(app))
+    async with httpx.AsyncClient(transport=transport, base_url="http://test") as http:
+
+        async def asked(vehicle: str) -> Any:
+            return (await http.get(f"/api/run-pages?vehicle={vehicle}&sort=began")).json()
+
+        # An answer does not wait until all were read: it says how many are left.
+        while (found := await asked("uav1"))["unread"]:
+            assert found["total"] < 8
+        assert ids(found) == [
+            f"r{number}" for number in (10000, 9999, 9000, 7000, 6000, 4000, 3000, 1000)
+        ]
+        control.records.reset_mock()
+        assert ids(await asked("uav10")) == ["r8000", "r5000", "r2000"]
+        assert ids(await asked("uav2")) == ["r10000"]
+        # Only what goes on is read again.
+        assert {each.args[0] for each in control.records.await_args_list} == {"r9999", "r10000"}
 
 
 async def test_runs_are_sorted_either_way(control: Mock) -> None:

@@ -15,6 +15,7 @@ from m2pem.errors import M2pemError
 from m2pem_plugin_web.access.permissions import Viewer
 from m2pem_plugin_web.problems import RESPONSES
 from m2pem_plugin_web.rest.models import RunModel, run_model
+from m2pem_plugin_web.rest.run_resources import RunResources
 
 MOST = 200
 FRESH_S = 1.0
@@ -35,11 +36,15 @@ class SortedBy(StrEnum):
 
 
 class RunsPage(BaseModel):
-    """A page. `total`: how many runs are like what was asked for; `all`: how many there are."""
+    """A page. `total`: how many runs are like what was asked for; `all`: how many there are.
+
+    `unread`: of how many runs it is not known yet which vehicles they had: ask again.
+    """
 
     runs: list[RunModel]
     total: int
     all: int
+    unread: int = 0
 
 
 class RunIndex:
@@ -78,20 +83,17 @@ def found(
     *,
     statuses: Collection[RunStatus] = (),
     text: str = "",
-    of: Collection[str] | None = None,
     since_us: int = 0,
     until_us: int = LARGEST,
     sort: SortedBy = SortedBy.ACTIVE,
     descending: bool = True,
 ) -> list[RunSummary]:
     """Return the runs that are like this, sorted. `text`: in the id, the mission, the process or
-    the detail. `of`: of these runs alone; None: of all."""
+    the detail."""
     words = text.casefold().split()
 
     def wanted(run: RunSummary) -> bool:
         if statuses and run.status not in statuses:
-            return False
-        if of is not None and run.run not in of:
             return False
         if not since_us <= _began_us(run) <= until_us:
             return False
@@ -105,6 +107,7 @@ def router(control: MissionControl) -> APIRouter:
     """The route of pages of runs."""
     routes = APIRouter(prefix="/api/run-pages", tags=["runs"], responses=RESPONSES)
     index = RunIndex(control)
+    resources = RunResources(control)
 
     async def commanding(resource: str) -> set[str]:
         """The runs that have a vehicle or payload now."""
@@ -136,24 +139,29 @@ def router(control: MissionControl) -> APIRouter:
         limit: Annotated[int, Query(ge=1, le=MOST)] = 25,
     ) -> RunsPage:
         """Runs by pages. `text`: all its words are in the id, mission, process or detail.
-        `vehicle`: only the runs that have it, or a payload on it, now."""
-        of = await commanding(vehicle) if vehicle else None
+        `vehicle`: only the runs that have or had it, or a payload on it."""
         runs = await index.runs()
         lines = await asyncio.to_thread(
             found,
             runs,
             statuses=frozenset(status),
             text=text,
-            of=of,
             since_us=since_us,
             until_us=until_us,
             sort=sort,
             descending=descending,
         )
+        unread = 0
+        if vehicle:
+            resources.keep({each.run for each in runs})
+            now = await commanding(vehicle)
+            had, unread = await resources.having(vehicle, lines)
+            lines = [each for each in lines if each.run in had or each.run in now]
         return RunsPage(
             runs=[await model(each) for each in lines[offset : offset + limit]],
             total=len(lines),
             all=len(runs),
+            unread=unread,
         )
 
     return routes
