@@ -1,7 +1,7 @@
 // Trails on a canvas that is larger than the map. What is new is added to it; all is drawn anew only
 // where the map goes beyond it, or zooms.
 import L from "leaflet";
-import { zoomWith } from "./zoomWith";
+import { MapCanvas } from "./mapCanvas";
 import { TrailPoints, type WorldPoint } from "./trailPoints";
 
 const COLOUR = "#3a7bd0";
@@ -17,14 +17,10 @@ const TRIM_MS = 5000;
 
 type Segment = readonly [WorldPoint, WorldPoint];
 
-export class TrailLayer extends L.Layer {
+export class TrailLayer extends MapCanvas {
   private readonly trails = new Map<string, TrailPoints>();
-  private canvas: HTMLCanvasElement | null = null;
-  private map: L.Map | null = null;
   private fresh: Segment[] = [];
-  private wanted = 0;
   private isWhole = false;
-  private isZooming = false;
   private trimmed_ms = 0;
   private zoom = NaN;
   /** Of the canvas, in the pixels of the map's layers. */
@@ -32,41 +28,13 @@ export class TrailLayer extends L.Layer {
   private size = L.point(0, 0);
 
   constructor(private readonly most: number) {
-    super();
-  }
-
-  override onAdd(map: L.Map): this {
-    this.map = map;
-    this.canvas = L.DomUtil.create(
-      "canvas",
-      "trail-canvas leaflet-zoom-animated",
-      map.getPanes().overlayPane,
-    );
-    map.on("move zoom resize", this.look, this);
-    map.on("viewreset", this.redraw, this);
-    map.on("zoomanim", this.animate, this);
-    map.on("zoomend", this.settle, this);
-    this.redraw();
-    return this;
-  }
-
-  override onRemove(map: L.Map): this {
-    map.off("move zoom resize", this.look, this);
-    map.off("viewreset", this.redraw, this);
-    map.off("zoomanim", this.animate, this);
-    map.off("zoomend", this.settle, this);
-    cancelAnimationFrame(this.wanted);
-    this.wanted = 0;
-    this.canvas?.remove();
-    this.canvas = null;
-    this.map = null;
-    return this;
+    super("overlayPane", "trail-canvas");
   }
 
   /** Where a vehicle has been, anew. */
   replace(resource: string, pieces: readonly (readonly L.LatLngTuple[])[]): void {
     this.trailOf(resource).replace(pieces.map((piece) => piece.map(worldOf)));
-    this.redraw();
+    this.reset();
   }
 
   /** Where a vehicle is now, `since_s` after it was where its trail ends. */
@@ -77,7 +45,7 @@ export class TrailLayer extends L.Layer {
     const now_ms = performance.now();
     if (trail.trim() && now_ms - this.trimmed_ms > TRIM_MS) {
       this.trimmed_ms = now_ms;
-      this.redraw();
+      this.reset();
     }
     if (!from || !this.map) return;
     this.fresh.push([from, to]);
@@ -85,7 +53,7 @@ export class TrailLayer extends L.Layer {
   }
 
   forget(resource: string): void {
-    if (this.trails.delete(resource)) this.redraw();
+    if (this.trails.delete(resource)) this.reset();
   }
 
   private trailOf(resource: string): TrailPoints {
@@ -94,50 +62,32 @@ export class TrailLayer extends L.Layer {
     return trail;
   }
 
-  private redraw(): void {
+  protected reset(): void {
     this.isWhole = false;
     this.ask();
   }
 
-  private ask(): void {
-    if (!this.map) return;
-    this.wanted ||= requestAnimationFrame(() => {
-      this.wanted = 0;
-      if (!this.isZooming) this.draw();
-    });
-  }
-
   /** Draw anew if the map shows what the canvas does not have. */
-  private look(): void {
+  protected moved(): void {
     const { map } = this;
     if (!map) return;
     const [from, to] = [this.corner, this.corner.add(this.size)];
     const seen = map.containerPointToLayerPoint([0, 0]);
     const end = seen.add(map.getSize());
     const isOnIt = from.x <= seen.x && from.y <= seen.y && to.x >= end.x && to.y >= end.y;
-    if (!isOnIt || map.getZoom() !== this.zoom) this.redraw();
+    if (!isOnIt || map.getZoom() !== this.zoom) this.reset();
   }
 
-  private animate({ center, zoom }: L.ZoomAnimEvent): void {
-    if (!this.map || !this.canvas) return;
-    this.isZooming = true;
-    zoomWith(this.map, this.canvas, center, zoom);
-  }
-
-  private settle(): void {
-    this.isZooming = false;
-    this.redraw();
-  }
-
-  private draw(): void {
-    const { map, canvas } = this;
-    const context = canvas?.getContext("2d");
-    if (!map || !canvas || !context) return;
-    const ratio = window.devicePixelRatio || 1;
-    if (!this.isWhole) this.lay(map, canvas, ratio);
+  protected draw(map: L.Map, context: CanvasRenderingContext2D): void {
+    if (!this.isWhole) {
+      const seen = map.getSize();
+      this.size = seen.multiplyBy(1 + 2 * MARGIN).round();
+      this.corner = map.containerPointToLayerPoint(seen.multiplyBy(-MARGIN)).round();
+      this.zoom = map.getZoom();
+      this.lay(context, this.corner, this.size);
+    }
     const scale = map.getZoomScale(this.zoom, 0);
     const origin = map.getPixelOrigin().add(this.corner);
-    context.setTransform(ratio, 0, 0, ratio, 0, 0);
     context.strokeStyle = COLOUR;
     context.lineWidth = WIDTH_PX;
     context.lineJoin = context.lineCap = "round";
@@ -156,20 +106,6 @@ export class TrailLayer extends L.Layer {
     context.stroke();
     this.fresh = [];
     this.isWhole = true;
-  }
-
-  /** Put the canvas where the map is. */
-  private lay(map: L.Map, canvas: HTMLCanvasElement, ratio: number): void {
-    const seen = map.getSize();
-    this.size = seen.multiplyBy(1 + 2 * MARGIN).round();
-    this.corner = map.containerPointToLayerPoint(seen.multiplyBy(-MARGIN)).round();
-    this.zoom = map.getZoom();
-    const [width, height] = [Math.round(this.size.x * ratio), Math.round(this.size.y * ratio)];
-    if (canvas.width !== width || canvas.height !== height) {
-      [canvas.width, canvas.height] = [width, height];
-      [canvas.style.width, canvas.style.height] = [`${this.size.x}px`, `${this.size.y}px`];
-    }
-    L.DomUtil.setPosition(canvas, this.corner);
   }
 
   private trace(

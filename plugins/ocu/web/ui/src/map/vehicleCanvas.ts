@@ -2,8 +2,8 @@
 // of them. Each change is drawn with the next picture of the browser, however many there are.
 import L from "leaflet";
 import { theme } from "../shared/theme";
+import { MapCanvas } from "./mapCanvas";
 import { roomFor } from "./names";
-import { zoomWith } from "./zoomWith";
 import {
   coloursOf,
   VehicleSymbols,
@@ -44,33 +44,21 @@ export interface VehicleCanvasSource {
   done?(): void;
 }
 
-export class VehicleCanvas extends L.Layer {
-  private canvas: HTMLCanvasElement | null = null;
-  private map: L.Map | null = null;
+export class VehicleCanvas extends MapCanvas {
   private drawn: Drawn[] = [];
-  private wanted = 0;
   private symbols: VehicleSymbols | null = null;
   private selected: ReadonlySet<string> = new Set();
   private hasNames = true;
-  private isZooming = false;
   private font = "";
   private readonly widths = new Map<string, number>();
   private stops: (() => void)[] = [];
 
   constructor(private readonly source: VehicleCanvasSource) {
-    super();
+    super("markerPane", "vehicle-canvas");
   }
 
   override onAdd(map: L.Map): this {
-    this.map = map;
-    this.canvas = L.DomUtil.create(
-      "canvas",
-      "vehicle-canvas leaflet-zoom-animated",
-      map.getPanes().markerPane,
-    );
-    map.on("move zoom resize viewreset", this.redraw, this);
-    map.on("zoomanim", this.animate, this);
-    map.on("zoomend", this.settle, this);
+    super.onAdd(map);
     map.on("mousemove", this.hover, this);
     const forced = matchMedia("(forced-colors: active)");
     const recolour = () => this.recolour();
@@ -80,22 +68,13 @@ export class VehicleCanvas extends L.Layer {
       // The style of a theme is that of the next frame.
       theme.subscribe(() => void requestAnimationFrame(recolour)),
     ];
-    this.redraw();
     return this;
   }
 
   override onRemove(map: L.Map): this {
-    map.off("move zoom resize viewreset", this.redraw, this);
-    map.off("zoomanim", this.animate, this);
-    map.off("zoomend", this.settle, this);
     map.off("mousemove", this.hover, this);
     for (const stop of this.stops) stop();
-    cancelAnimationFrame(this.wanted);
-    this.wanted = 0;
-    this.canvas?.remove();
-    this.canvas = null;
-    this.map = null;
-    return this;
+    return super.onRemove(map);
   }
 
   choose(selected: ReadonlySet<string>): void {
@@ -119,13 +98,16 @@ export class VehicleCanvas extends L.Layer {
     return best?.mark ?? null;
   }
 
-  /** Once, when the browser is about to paint, however often it is asked for. */
   redraw(): void {
-    if (!this.map) return;
-    this.wanted ||= requestAnimationFrame(() => {
-      this.wanted = 0;
-      if (!this.isZooming) this.draw();
-    });
+    this.ask();
+  }
+
+  protected moved(): void {
+    this.ask();
+  }
+
+  protected reset(): void {
+    this.ask();
   }
 
   /** The theme has changed. */
@@ -138,30 +120,9 @@ export class VehicleCanvas extends L.Layer {
     this.map?.getContainer().classList.toggle("map-over-vehicle", this.at(containerPoint) !== null);
   }
 
-  private animate({ center, zoom }: L.ZoomAnimEvent): void {
-    if (!this.map || !this.canvas) return;
-    this.isZooming = true;
-    zoomWith(this.map, this.canvas, center, zoom);
-  }
-
-  private settle(): void {
-    this.isZooming = false;
-    this.redraw();
-  }
-
-  private draw(): void {
-    const { map, canvas } = this;
-    const context = canvas?.getContext("2d");
-    if (!map || !canvas || !context) return;
+  protected draw(map: L.Map, context: CanvasRenderingContext2D): void {
     const size = map.getSize();
-    const ratio = window.devicePixelRatio || 1;
-    const [width, height] = [Math.round(size.x * ratio), Math.round(size.y * ratio)];
-    if (canvas.width !== width || canvas.height !== height) {
-      [canvas.width, canvas.height] = [width, height];
-      [canvas.style.width, canvas.style.height] = [`${size.x}px`, `${size.y}px`];
-    }
-    L.DomUtil.setPosition(canvas, map.containerPointToLayerPoint([0, 0]));
-    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    const ratio = this.lay(context, map.containerPointToLayerPoint([0, 0]), size);
     context.clearRect(0, 0, size.x, size.y);
     const symbols = this.symbolsFor(map.getContainer(), ratio);
     this.drawn = this.seen(map, size);

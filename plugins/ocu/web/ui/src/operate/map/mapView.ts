@@ -19,6 +19,8 @@ export interface MapListener {
 const OF_FLEET = "#56687a";
 const OF_OPERATOR = "#8347c7";
 const OF_MISSION = "#0b63ce";
+/** Below the vehicles: their names are read on top of others. */
+const NAMES_PANE = "shadowPane";
 /** From how large on a geometry's name is shown. */
 const NAMED_PX = 120;
 const NAMED_ZOOM = 17;
@@ -75,7 +77,12 @@ export class MapView {
     this.geometries.clearLayers();
     for (const geometry of geometries) {
       layerOf(geometry)
-        .bindTooltip(geometry.name, { permanent: true, direction: "center", className: "map-name" })
+        .bindTooltip(escaped(geometry.name), {
+          permanent: true,
+          direction: "center",
+          className: "map-name",
+          pane: NAMES_PANE,
+        })
         .addTo(this.geometries);
     }
     this.nameGeometries();
@@ -102,10 +109,12 @@ export class MapView {
           direction: "top",
           offset: [0, -LABEL_PX],
           className: "map-name map-space",
+          pane: NAMES_PANE,
         })
         .addTo(this.spaces);
     }
     this.widenCorridors();
+    this.nameGeometries();
   }
 
   /** A corridor is as wide on the map as it is on the ground. */
@@ -121,22 +130,39 @@ export class MapView {
     });
   }
 
-  /** Names of what is small would lie on top of each other. */
+  /** Names of what is small are left out, and those that would lie on one of something larger. */
   private nameGeometries(): void {
+    const named: { element: HTMLElement; size: number }[] = [];
+    this.spaces.eachLayer((layer) => {
+      const element = layer.getTooltip()?.getElement();
+      if (element) named.push({ element, size: Infinity });
+    });
     this.geometries.eachLayer((layer) => {
-      if (!(layer instanceof L.GeoJSON)) return;
+      const element = layer.getTooltip()?.getElement();
+      if (!element || !(layer instanceof L.GeoJSON)) return;
       const bounds = layer.getBounds();
       const from = this.map.latLngToLayerPoint(bounds.getNorthWest());
       const size = from.distanceTo(this.map.latLngToLayerPoint(bounds.getSouthEast()));
       const isPoint = bounds.getNorthWest().equals(bounds.getSouthEast());
-      const named = isPoint ? this.map.getZoom() >= NAMED_ZOOM : size >= NAMED_PX;
-      layer.getTooltip()?.getElement()?.classList.toggle("map-unnamed", !named);
+      const isLarge = isPoint ? this.map.getZoom() >= NAMED_ZOOM : size >= NAMED_PX;
+      element.classList.toggle("map-unnamed", !isLarge);
+      if (isLarge) named.push({ element, size });
+    });
+    named.sort((one, other) => other.size - one.size);
+    const boxes = named.map(({ element }) => element.getBoundingClientRect());
+    const kept: DOMRect[] = [];
+    named.forEach(({ element, size }, index) => {
+      const box = boxes[index]!;
+      const hasRoom = !kept.some((other) => overlaps(box, other));
+      if (size < Infinity) element.classList.toggle("map-unnamed", !hasRoom);
+      if (hasRoom) kept.push(box);
     });
   }
 
   turnGeometries(on: boolean): void {
     if (on) this.geometries.addTo(this.map);
     else this.geometries.remove();
+    this.nameGeometries();
   }
 
   fitAll(): void {
@@ -194,6 +220,12 @@ export class MapView {
     marker.addTo(this.drafted);
   }
 }
+
+const overlaps = (one: DOMRect, other: DOMRect): boolean =>
+  one.left < other.right &&
+  other.left < one.right &&
+  one.top < other.bottom &&
+  other.top < one.bottom;
 
 function layerOf({ kind, from, geometry }: Geometry): L.GeoJSON {
   const color = { fleet: OF_FLEET, operator: OF_OPERATOR, mission: OF_MISSION }[from];
