@@ -9,7 +9,7 @@ export const busy = {
   nothing: "named by the mission, no task has it now",
   free: "free now",
   wait: "Wait in the queue",
-  waitHint: "It starts as soon as all its vehicles are free.",
+  waitHint: "“Wait in the queue” starts it as soon as all its vehicles are free.",
   queued: "{mission} waits as {entry} until its vehicles are free.",
   choose: "Choose other vehicles",
   chooseHint:
@@ -18,6 +18,8 @@ export const busy = {
   stopSure: "Stop {run}: its mission ends",
   stopping: "{run} is being stopped. Its vehicles are free when they have stopped.",
   start: "Start now",
+  startHint:
+    "“Start all the same” starts it at once. A task whose vehicle is busy then waits, fails, or takes it by its priority, as the mission and the fleet say.",
   yes: "Start all the same",
   no: "Do not start",
 } as const;

@@ -58,13 +58,24 @@ export function BusyDialog({ mission, busy, real, startNow, close }: BusyDialogP
           <button type="button" class="secondary" onClick={close}>
             {words.no}
           </button>
-          <button
-            type="button"
-            class={real ? "primary m2r-real" : "primary"}
-            onClick={() => startNow(!isFree)}
-          >
-            {isFree ? words.start : words.yes}
-          </button>
+          {!isFree && (
+            <button type="button" class="secondary m2r-caution" onClick={() => startNow(true)}>
+              {words.yes}
+            </button>
+          )}
+          {isFree ? (
+            <button
+              type="button"
+              class={real ? "primary m2r-real" : "primary"}
+              onClick={() => startNow(false)}
+            >
+              {words.start}
+            </button>
+          ) : (
+            <button type="button" class="primary" onClick={() => void queue()}>
+              {words.wait}
+            </button>
+          )}
         </>
       }
     >
@@ -87,12 +98,8 @@ export function BusyDialog({ mission, busy, real, startNow, close }: BusyDialogP
         </table>
       </div>
       <ul class="m2r-choices">
-        <li>
-          <button type="button" class="secondary" onClick={() => void queue()}>
-            {words.wait}
-          </button>{" "}
-          {words.waitHint}
-        </li>
+        {!isFree && <li>{words.waitHint}</li>}
+        {!isFree && <li>{words.startHint}</li>}
         <li>
           <button type="button" class="secondary" onClick={close}>
             {words.choose}
