@@ -6,32 +6,60 @@ import { scheduleChanges } from "../shared/executive";
 import { moment } from "../shared/moments";
 import { may } from "../shared/session";
 import { attempt } from "../shared/Toasts";
-import type { Schedule, ScheduledMission } from "../shared/types";
+import type { Schedule, ScheduledMission, ScheduledStatus } from "../shared/types";
 import { fill, strings } from "../strings";
 import { Link } from "./Link";
+import { inOrder, isOver, nameOf, type Wanted } from "./queue";
 import { ScheduleDialog } from "./ScheduleDialog";
 
 const words = strings.home.schedule;
 const EVERY_MS = 5000;
-const OVER = new Set(["ended", "cancelled", "failed"]);
-const SHOWN_OVER = 3;
+const STATUSES = Object.keys(words.status) as ScheduledStatus[];
+/** So few need no search. */
+const FEW = 3;
 
 export function ScheduleList() {
   const { schedule, failed, refresh } = useSchedule();
   const [adding, setAdding] = useState(false);
+  const [wanted, setWanted] = useState<Wanted>({ text: "", status: "" });
   const [asked, setAsked] = useState<Asked | null>(null);
   const act = async (path: string) => {
     await attempt(() => post(`/schedule${path}`));
     await refresh();
   };
   const entries = schedule?.entries ?? [];
-  const active = entries.filter(({ status }) => !OVER.has(status));
-  const over = entries.filter(({ status }) => OVER.has(status)).slice(-SHOWN_OVER);
+  const hasActive = entries.some((each) => !isOver(each));
+  const shown = inOrder(entries, wanted);
   if (schedule && !schedule.served && entries.length === 0) return null;
   return (
     <section class="home-wide" aria-labelledby="schedule-head">
       <div class="home-head">
         <h1 id="schedule-head">{words.title}</h1>
+        {entries.length > FEW && (
+          <div class="home-filters" role="search">
+            <input
+              type="search"
+              aria-label={words.find}
+              placeholder={words.find}
+              value={wanted.text}
+              onInput={(event) => setWanted({ ...wanted, text: event.currentTarget.value })}
+            />
+            <select
+              aria-label={strings.home.status}
+              value={wanted.status}
+              onChange={(event) =>
+                setWanted({ ...wanted, status: event.currentTarget.value as Wanted["status"] })
+              }
+            >
+              <option value="">{strings.runs.anyStatus}</option>
+              {STATUSES.map((each) => (
+                <option key={each} value={each}>
+                  {words.status[each]}
+                </option>
+              ))}
+            </select>
+          </div>
+        )}
         <span class="home-stretch" />
         {may("commander") && schedule?.served && (
           <button type="button" class="secondary" onClick={() => setAdding(true)}>
@@ -43,7 +71,7 @@ export function ScheduleList() {
             {words.releaseAll}
           </button>
         )}
-        {may("operator") && active.length > 0 && !schedule?.hold && (
+        {may("operator") && hasActive && !schedule?.hold && (
           <button type="button" class="secondary" onClick={() => void act("/hold")}>
             {words.holdAll}
           </button>
@@ -56,7 +84,8 @@ export function ScheduleList() {
         </p>
       )}
       {schedule && entries.length === 0 && <p class="home-none">{words.none}</p>}
-      {entries.length > 0 && (
+      {entries.length > 0 && shown.length === 0 && <p class="home-none">{words.noneFound}</p>}
+      {shown.length > 0 && (
         <div class="home-scroll">
           <table class="home-table">
             <thead>
@@ -74,7 +103,7 @@ export function ScheduleList() {
               </tr>
             </thead>
             <tbody>
-              {[...active, ...over].map((each) => (
+              {shown.map((each) => (
                 <EntryRow key={each.entry} each={each} act={act} ask={setAsked} />
               ))}
             </tbody>
@@ -138,7 +167,7 @@ interface EntryRowProps {
 
 function EntryRow({ each, act, ask }: EntryRowProps) {
   const { entry, status, run, reason } = each;
-  const isOver = OVER.has(status);
+  const hasEnded = isOver(each);
   const next = each.starts_us ?? each.next_us;
   const isHeld = status === "held";
   const name = isHeld ? words.releaseLabel : words.holdLabel;
@@ -148,13 +177,16 @@ function EntryRow({ each, act, ask }: EntryRowProps) {
       <td>{nameOf(each)}</td>
       <td>
         <span class={`home-chip home-schedule-${status}`}>{words.status[status]}</span>
+        {each.priority !== 0 && (
+          <span class="home-title">{fill(words.priority, { priority: each.priority })}</span>
+        )}
       </td>
-      <td class="home-when">{next === null || isOver ? "–" : moment(next / 1000)}</td>
+      <td class="home-when">{next === null || hasEnded ? "–" : moment(next / 1000)}</td>
       <td>{each.when}</td>
       <td title={reason || undefined}>{reason.split("\n")[0]}</td>
       <td>{run ? <Link to={`/runs/${encodeURIComponent(run)}`}>{run}</Link> : "–"}</td>
       <td class="home-actions">
-        {!isOver && may(isHeld ? "commander" : "operator") && (
+        {!hasEnded && may(isHeld ? "commander" : "operator") && (
           <button
             type="button"
             class="plain"
@@ -164,7 +196,7 @@ function EntryRow({ each, act, ask }: EntryRowProps) {
             {isHeld ? words.release : words.hold}
           </button>
         )}
-        {!isOver && !isHeld && may("commander") && (
+        {!hasEnded && !isHeld && may("commander") && (
           <button
             type="button"
             class="plain"
@@ -174,7 +206,7 @@ function EntryRow({ each, act, ask }: EntryRowProps) {
             {words.runNow}
           </button>
         )}
-        {!isOver && may("operator") && (
+        {!hasEnded && may("operator") && (
           <button
             type="button"
             class="plain"
@@ -188,9 +220,6 @@ function EntryRow({ each, act, ask }: EntryRowProps) {
     </tr>
   );
 }
-
-const nameOf = ({ mission }: ScheduledMission): string =>
-  mission.replace(/^.*[\\/]/, "").replace(/\.bpmn$/, "");
 
 function useSchedule() {
   const [schedule, setSchedule] = useState<Schedule | null>(null);
