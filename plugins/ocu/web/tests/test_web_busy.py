@@ -58,7 +58,7 @@ async def see_that_a_run_failed_before_its_page_loaded(desk: Desk) -> None:
     await expect(ended).to_contain_text("Failed")
     await expect(ended).to_contain_text(f"{run} failed")
     await expect(ended).to_contain_text("RESOURCE_UNAVAILABLE")
-    await ended.get_by_role("button", name="Keep looking").click()
+    await ended.get_by_role("button", name="Stay on this page").click()
     await wait_for_status(page, "Failed")
     task = page.locator(".drawing:not([hidden]) [data-element-id='Task1']").first
     await expect(task).to_contain_class("m2-failed")

@@ -6,11 +6,12 @@ import { go } from "../shared/router";
 import { moment } from "../shared/moments";
 import { titleOf } from "../shared/runs";
 import { may } from "../shared/session";
-import type { RunLine, RunStatus } from "../shared/types";
+import type { RunLine, RunStatus, WaitingTask } from "../shared/types";
 import { counted, fill, strings } from "../strings";
 import { BulkDialog } from "./BulkDialog";
 import { Link } from "./Link";
-import { useIncidents, type IncidentLine } from "./incidents";
+import { heldFor, type IncidentLine } from "./blocking";
+import { useIncidents, type Incidents } from "./incidents";
 import {
   ALL_RUNS,
   mayDo,
@@ -26,6 +27,8 @@ import { grouped } from "../shared/format";
 const words = strings.home;
 const texts = strings.runs;
 const EVERY_MS = 5000;
+/** More is read with each answer. */
+const UNREAD_MS = 250;
 const TYPED_MS = 250;
 const STATUSES = Object.keys(strings.operate.run.status) as RunStatus[];
 const TIMES = [
@@ -40,6 +43,8 @@ interface RunsPage {
   runs: RunLine[];
   total: number;
   all: number;
+  /** Of so many runs it is not known yet which vehicles they had. */
+  unread: number;
 }
 
 export function RunList() {
@@ -72,6 +77,11 @@ export function RunList() {
       {failed && <p role="alert">{words.failed}</p>}
       {page?.all === 0 && <p class="home-none">{texts.none}</p>}
       {page && page.all > 0 && total === 0 && <p class="home-none">{texts.noneFound}</p>}
+      {page && page.unread > 0 && (
+        <p class="home-none" role="status">
+          {counted(texts.unread, page.unread)}
+        </p>
+      )}
       {steers && chosen.length > 0 && (
         <div class="home-bulk" role="group" aria-label={counted(texts.selected, chosen.length)}>
           <span role="status">{counted(texts.selected, chosen.length)}</span>
@@ -127,7 +137,7 @@ export function RunList() {
                 <RunRow
                   key={run.run}
                   run={run}
-                  incidents={incidents.filter((each) => each.run === run.run)}
+                  incidents={incidents}
                   selected={steers ? selected.has(run.run) : null}
                   select={(on) => select(run, on)}
                 />
@@ -266,13 +276,19 @@ function Pages({ query: { page }, total, turn }: PagesProps) {
 
 interface RunRowProps {
   run: RunLine;
-  incidents: readonly IncidentLine[];
+  incidents: Incidents;
   /** null: it cannot be. */
   selected: boolean | null;
   select(on: boolean): void;
 }
 
-function RunRow({ run, incidents, selected, select }: RunRowProps) {
+function RunRow({ run, incidents: { open, blocked }, selected, select }: RunRowProps) {
+  const incidents = open.filter((each) => each.run === run.run);
+  const blocking = open.flatMap((each) =>
+    (blocked.get(each.incident) ?? [])
+      .filter((waiting) => waiting.run === run.run)
+      .map(({ task }) => ({ task, run: each.run, incident: each.incident })),
+  );
   const path = `/runs/${encodeURIComponent(run.run)}`;
   return (
     <tr onDblClick={() => go(path)} aria-selected={selected || undefined}>
@@ -300,13 +316,20 @@ function RunRow({ run, incidents, selected, select }: RunRowProps) {
           {strings.operate.run.status[run.status]}
         </span>
         {incidents.length > 0 && (
-          <span
-            class="home-chip home-chip-bad"
-            title={incidents.map(({ task, code }) => `${task}: ${code}`).join("; ")}
-          >
+          <span class="home-chip home-chip-bad">
             {counted(texts.incidents, incidents.length)}
           </span>
         )}
+        {incidents.map((each) => (
+          <span key={each.incident} class="home-title">
+            {saidOf(each, blocked.get(each.incident) ?? [])}
+          </span>
+        ))}
+        {blocking.map(({ task, run: other, incident }) => (
+          <span key={`${incident} ${task}`} class="home-title">
+            {fill(texts.blockedBy, { task, run: other })}
+          </span>
+        ))}
       </td>
       <td class="home-when">{moment(run.began_us / 1000)}</td>
       <td>{run.took_s === null ? "–" : duration(run.took_s)}</td>
@@ -314,28 +337,40 @@ function RunRow({ run, incidents, selected, select }: RunRowProps) {
   );
 }
 
+const saidOf = (incident: IncidentLine, blocked: readonly WaitingTask[]): string =>
+  [`${incident.task}: ${incident.code}`, heldFor(incident, blocked)].filter(Boolean).join("; ");
+
 function usePage(query: RunQuery) {
   const [page, setPage] = useState<RunsPage | null>(null);
   const [failed, setFailed] = useState(false);
   const newest = useRef(0);
-  const refresh = async () => {
+  /** Returns of how many runs more is to be read. */
+  const refresh = async (): Promise<number> => {
     const number = ++newest.current;
     try {
       const found = await get<RunsPage>(pathOf(query, Date.now()));
       // Answers may come in another order than they were asked for.
-      if (number !== newest.current) return;
+      if (number !== newest.current) return 0;
       setPage(found);
       setFailed(false);
+      return found.unread;
     } catch {
       if (number === newest.current) setFailed(true);
+      return 0;
     }
   };
   useEffect(() => {
-    void refresh();
-    const timer = setInterval(() => {
-      if (!document.hidden) void refresh();
-    }, EVERY_MS);
-    return () => clearInterval(timer);
+    let timer: ReturnType<typeof setTimeout>;
+    let isOver = false;
+    const again = async () => {
+      const unread = document.hidden ? 0 : await refresh();
+      if (!isOver) timer = setTimeout(() => void again(), unread > 0 ? UNREAD_MS : EVERY_MS);
+    };
+    void again();
+    return () => {
+      isOver = true;
+      clearTimeout(timer);
+    };
   }, [query]);
   return { page, failed, refresh };
 }

@@ -8,6 +8,8 @@ import { may } from "../../shared/session";
 import { toast } from "../../shared/Toasts";
 import { fill, strings } from "../../strings";
 import { useOperating } from "../context";
+import { blockedBy, heldFor } from "../../home/blocking";
+import { resources } from "../vehicles/resources";
 import { dataOf } from "../runbar/data";
 
 const text = strings.operate.incidents;
@@ -136,9 +138,7 @@ export function IncidentPanel() {
     <section class="prompt incident" role="alertdialog" aria-label={title}>
       <div class="prompt-about">
         <strong>{title}</strong>
-        {incident.resources.length > 0 && (
-          <span>{fill(text.held, { resources: incident.resources.join(", ") })}</span>
-        )}
+        <span>{heldFor(incident, blockedBy(incident, resources.value.waiting))}</span>
         {incident.operator_role && (
           <span>{fill(text.decides, { role: incident.operator_role })}</span>
         )}
