@@ -329,7 +329,7 @@ async def show_panel_of_alerts(desk: Desk) -> None:
 
 async def show_alerts(desk: Desk) -> None:
     await desk.page.goto(f"{desk.executive.origin}/alerts")
-    await expect(desk.page.get_by_role("region", name="Over")).to_be_visible()
+    await expect(desk.page.get_by_role("region", name="Ended")).to_be_visible()
 
 
 async def show_present(desk: Desk) -> None:

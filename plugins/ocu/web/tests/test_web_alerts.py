@@ -74,8 +74,8 @@ async def test_an_alert_is_seen_acknowledged_and_owned_by_all_operators(
         await expect(question).to_contain_text(run)
         await look(page, "alert_panel")
         await accessible(page, "the panel of alerts")
-        await question.get_by_role("button", name="Take care").click()
-        await expect(question).to_contain_text("anna takes care")
+        await question.get_by_role("button", name="Assign to me").click()
+        await expect(question).to_contain_text("assigned to anna")
         await question.get_by_role("button", name="Acknowledge").click()
         await expect(question).to_contain_text("seen by anna")
         await bell(otto.page, 0)
@@ -83,11 +83,11 @@ async def test_an_alert_is_seen_acknowledged_and_owned_by_all_operators(
         await expect(panel).to_have_count(0)
         await otto.page.get_by_role("button", name=NONE).click()
         seen = otto.page.get_by_role("dialog", name="Alerts")
-        await expect(seen).to_contain_text("anna takes care")
+        await expect(seen).to_contain_text("assigned to anna")
         await answer(page, "Abort").click()
         await expect(seen).to_contain_text("There is nothing that operators must know now.")
         await seen.get_by_role("link", name="All alerts and their history").click()
-        over = otto.page.get_by_role("region", name="Over").get_by_role("row", name=run).first
+        over = otto.page.get_by_role("region", name="Ended").get_by_role("row", name=run).first
         await expect(over).to_contain_text("anna")
         await look(otto.page, "alert_page")
         await accessible(otto.page, "the page of alerts")
@@ -101,6 +101,9 @@ async def test_a_new_alert_is_told_in_the_ways_that_this_browser_wants(desk: Des
     await page.goto(f"{desk.executive.origin}/alerts")
     for name in ("Messages of the browser", "Read aloud"):
         await page.get_by_label(name).check()
+    sound = page.get_by_role("combobox", name="Sound")
+    await expect(sound).to_have_value("critical")
+    await sound.select_option("errors and worse")
     await page.get_by_role("button", name="Try it").click()
     said = "This is how an alert is announced."
     assert await page.evaluate("told.splice(0)") == [
@@ -112,7 +115,7 @@ async def test_a_new_alert_is_told_in_the_ways_that_this_browser_wants(desk: Des
     ]
     await page.reload()
     await expect(page.get_by_label("Read aloud")).to_be_checked()
-    await page.get_by_role("combobox", name="Sound").select_option("off")
+    await sound.select_option("off")
     await expect(page.locator(".link-open")).to_have_count(1)
     run = (await desk.ask("POST", "/api/runs", {"mission": "vignette1"}))["run"]
     await bell(page, 1)

@@ -5,6 +5,8 @@ import { may } from "../shared/session";
 import { counted, fill, strings } from "../strings";
 import { Age, AlertActions, AlertText, SeverityMark, Source } from "./AlertLine";
 import { acknowledgeAll, alerts, calling, failed, isSevere, nextDeadline_s, span } from "./alerts";
+import { EarlierMessages } from "./EarlierMessages";
+import { SoundHint } from "./SoundHint";
 import "./alerts.css";
 
 const words = strings.alerts;
@@ -126,6 +128,8 @@ function AlertPanel({ close }: { close: () => void }) {
           </li>
         ))}
       </ul>
+      <EarlierMessages />
+      <SoundHint />
       <a
         class="alert-all"
         href="/alerts"

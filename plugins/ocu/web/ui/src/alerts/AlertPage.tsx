@@ -15,6 +15,8 @@ import {
   failed,
   settings,
 } from "./alerts";
+import { EarlierMessages } from "./EarlierMessages";
+import { SoundHint } from "./SoundHint";
 import { askToNotify, mayNotify } from "./outputs";
 import { isAtLeast, SEVERITIES, type OperatorAlert, type Severity } from "./types";
 import "../home/home.css";
@@ -81,6 +83,7 @@ export default function AlertPage() {
           <Table alerts={over} over />
         </section>
       )}
+      <EarlierMessages />
       <Settings />
     </div>
   );
@@ -190,6 +193,7 @@ function Settings() {
           ))}
         </select>
       </label>
+      <SoundHint isBrief />
       <p class="alert-hint">{words.repeated}</p>
       <Check
         label={words.notify}
@@ -211,7 +215,9 @@ function Settings() {
         type="button"
         class="secondary"
         onClick={() =>
-          announcer.tell([{ severity: "error", text: words.testText, run: "" }])
+          announcer.tell([
+            { severity: sound === "off" ? "error" : sound, text: words.testText, run: "" },
+          ])
         }
       >
         {words.test}

@@ -35,7 +35,7 @@ function listening(settings: Partial<AlertSettings> = {}) {
       notify: (severity, text) => told.push(`notify ${severity} ${text}`),
       speak: (text) => told.push(`speak ${text}`),
     },
-    () => ({ ...DEFAULTS, vibrate: false, ...settings }),
+    () => ({ ...DEFAULTS, sound: "warning", vibrate: false, ...settings }),
     (count, first) => `${count} alerts: ${first}`,
   );
   announcer.announce([]);
@@ -79,6 +79,15 @@ test("only alerts that are severe enough sound", () => {
   expect(told).toEqual([]);
   announcer.announce([alert("a1", { severity: "warning" }), alert("a2")]);
   expect(told).toEqual(["sound error"]);
+});
+
+test("until a person has chosen, only what is critical sounds", () => {
+  const { announcer, told } = listening({ sound: DEFAULTS.sound });
+  announcer.announce([]);
+  announcer.announce([alert("a1", { severity: "error" })]);
+  expect(told).toEqual([]);
+  announcer.announce([alert("a1", { severity: "error" }), alert("a2", { severity: "critical" })]);
+  expect(told).toEqual(["sound critical"]);
 });
 
 test("a critical one sounds again until it is acknowledged, and not if sound is off", () => {

@@ -2,7 +2,7 @@
 // critical ones again until somebody has acknowledged them.
 import { isAtLeast, SEVERITIES, type OperatorAlert, type Severity } from "./types";
 
-/** What the user of this browser wants. `sound`: the least severe alert that sounds. */
+/** What the user of this browser wants; until they choose, only what is critical sounds. `sound`: the least severe alert that sounds. */
 export interface AlertSettings {
   sound: Severity | "off";
   notify: boolean;
@@ -11,7 +11,7 @@ export interface AlertSettings {
 }
 
 export const DEFAULTS: AlertSettings = {
-  sound: "warning",
+  sound: "critical",
   notify: false,
   vibrate: true,
   speech: false,

@@ -1,4 +1,5 @@
 // How this browser sounds, shows messages, vibrates and speaks.
+import { signal } from "@preact/signals";
 import { strings } from "../strings";
 import type { Outputs } from "./announcer";
 import type { Severity } from "./types";
@@ -23,10 +24,17 @@ const SHAKES: Record<Severity, number[]> = {
 
 let audio: AudioContext | null = null;
 
+/** Whether the browser lets this page sound. */
+export const maySound = signal(false);
+
 /** Browsers let a page sound only after its user has touched it. */
 function audioOf(): AudioContext | null {
   if (!("AudioContext" in window)) return null;
-  audio ??= new AudioContext();
+  if (audio === null) {
+    audio = new AudioContext();
+    audio.onstatechange = () => (maySound.value = audio?.state === "running");
+    maySound.value = audio.state === "running";
+  }
   if (audio.state === "suspended") void audio.resume().catch(() => undefined);
   return audio;
 }

@@ -1,33 +1,38 @@
 // Short messages that come and go by themselves; refusals stay until they are dismissed.
 import { signal } from "@preact/signals";
-import { strings } from "../strings";
+import { counted, strings } from "../strings";
 import { ApiError } from "./api";
 import { newest, type Tone } from "./newestToasts";
 import "./toasts.css";
 import { textScale } from "./textScale";
 import { atScale } from "./useMedia";
 
-interface Toast {
+export interface Toast {
   id: number;
   text: string;
   tone: Tone;
+  at_ms: number;
 }
 
 const SHOWN_MS = 6000;
 /** Of faults, which the alerts and the log of their run keep: what is below is needed then. */
 const FAULT_SHOWN_MS = 20_000;
-/** A phone has less room: what is below, such as a question, stays in view. */
-const SMALL = "(width < 600px)";
+/** A phone that lies has less room: what is below, such as a question, stays in view. */
 const LOW = "(height < 480px)";
-const isSo = (query: string): boolean => matchMedia(atScale(query, textScale.value)).matches;
-const most = (): number => (isSo(LOW) ? 1 : isSo(SMALL) ? 3 : 5);
+const most = (): number => (matchMedia(atScale(LOW, textScale.value)).matches ? 1 : 3);
+const MOST_EARLIER = 100;
 
 const toasts = signal<Toast[]>([]);
+/** Those that had to make room, the newest first: the list of alerts has them. */
+export const earlier = signal<readonly Toast[]>([]);
 let count = 0;
 
 export function toast(text: string, tone: Tone = "plain"): void {
   const id = ++count;
-  toasts.value = newest([...toasts.value, { id, text, tone }], most());
+  const all = [...toasts.value, { id, text, tone, at_ms: Date.now() }];
+  toasts.value = newest(all, most());
+  const left = all.filter((each) => !toasts.peek().includes(each)).reverse();
+  if (left.length > 0) earlier.value = [...left, ...earlier.peek()].slice(0, MOST_EARLIER);
   if (tone !== "bad") setTimeout(() => dismiss(id), SHOWN_MS);
 }
 
@@ -54,12 +59,18 @@ function dismiss(id: number): void {
 }
 
 export function Toasts() {
+  const count = earlier.value.length;
   const shown = (tone: "bad" | "other") =>
     toasts.value.filter((each) => (each.tone === "bad") === (tone === "bad"));
   return (
     <div class="toasts">
       <div role="alert">{shown("bad").map(line)}</div>
-      <div role="status">{shown("other").map(line)}</div>
+      <div role="status">
+        {shown("other").map(line)}
+        {count > 0 && toasts.value.length > 0 && (
+          <p class="toast-more">{counted(strings.shell.earlierMessages, count)}</p>
+        )}
+      </div>
     </div>
   );
 }

@@ -46,6 +46,10 @@ export const shell = {
   loading: "Loading…",
   notLoaded:
     "This part of the page could not be loaded. It is loaded when the executive answers again.",
+  earlierMessages: {
+    one: "1 earlier message is in the list of alerts",
+    many: "{count} earlier messages are in the list of alerts",
+  },
   dismiss: "Dismiss",
   close: "Close",
   fault: "Fault",
