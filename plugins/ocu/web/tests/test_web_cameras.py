@@ -6,6 +6,7 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 
 from playwright.async_api import Locator, Page, async_playwright, expect
+from test_web_alerts import look
 from web_axe import Accessibility
 from web_browsing import ARGUMENTS, chromium, page_at
 from web_cameras import cameras
@@ -116,6 +117,51 @@ async def test_operators_look_through_cameras_of_every_kind(tmp_path: Path) -> N
             refused = ("404 (Not Found)", f"{there.base}/closed", "ERR_FAILED")
             said = [each for each in watched.complaints if not any(map(each.__contains__, refused))]
             assert said == []
+        await started.close()
+
+
+async def test_the_page_of_the_fleet_shows_the_cameras_of_a_vehicle_on_request(
+    tmp_path: Path,
+) -> None:
+    hls = tmp_path / "hls"
+    hls.mkdir()
+    async with (
+        cameras(hls) as there,
+        serving_fleet(fleet_of(tmp_path, there.base), tmp_path) as world,
+        async_playwright() as playwright,
+    ):
+        started = await playwright.chromium.launch(
+            executable_path=chromium(), args=[*ARGUMENTS, *WEBRTC]
+        )
+        async with page_at(started, world.ocu.url, width=1440, height=960) as watched:
+            page = watched.page
+            await page.goto(f"{world.base}/fleet")
+            await page.get_by_role("row", name="ugv1").first.click()
+            show = page.get_by_role("button", name="Show what its cameras see")
+            await expect(show).to_be_visible()
+            assert not await page.evaluate(
+                "performance.getEntriesByType('resource').some(({name}) => /CameraList/.test(name))"
+            )
+            await show.click()
+            await expect(page.locator(".camera")).to_have_count(2)
+            await expect(camera(page, "ugv1/front").locator(".camera-state")).to_have_text("live")
+            # Who chooses another vehicle lets go of the cameras.
+            assert not there.left.is_set()
+            await page.get_by_role("row", name="uav1").first.click()
+            await expect(page.locator(".camera")).to_have_count(3)
+            async with asyncio.timeout(WITHIN_S):
+                await there.left.wait()
+            for name in ("uav1/belly", "uav1/still"):
+                await expect(camera(page, name).locator(".camera-state")).to_have_text("live")
+                await assert_picture(camera(page, name))
+            await look(page, "fleet_cameras")
+            eyes = Accessibility(page)
+            await eyes.look("cameras of the fleet", ".fleet-panel")
+            eyes.assert_well()
+            await page.get_by_role("button", name="Dark theme").click()
+            await look(page, "fleet_cameras_dark")
+            await page.get_by_role("button", name="Hide what its cameras see").click()
+            await expect(page.locator(".camera")).to_have_count(0)
         await started.close()
 
 

@@ -148,12 +148,12 @@ async def test_a_dead_network_makes_it_gray_and_sends_nothing(desk: Desk) -> Non
         await row(page, "uav1").click()
         proxy.stall()
         await expect(page.locator(".fleet-page.stale")).to_have_count(1)
-        await expect(row(page, "uav1")).to_contain_text("Lost")
+        await expect(row(page, "uav1")).to_contain_text("Not known")
         await press(page, "Hold")
         await expect(page.locator(".toasts")).to_contain_text("Not connected: nothing was sent.")
         proxy.heal()
         await expect(page.locator(".fleet-page.stale")).to_have_count(0)
-        await expect(row(page, "uav1")).to_contain_text("Well")
+        await expect(row(page, "uav1")).to_contain_text("OK")
         assert not (await desk.ask("GET", "/api/resources"))["holders"]["uav1"]
         await page.close()
 

@@ -17,6 +17,7 @@ import { inCommon, QUICK } from "./offers";
 import type { Row } from "./rows";
 import { centred, selected, targets } from "./state";
 import { cellOf, holderOf } from "./text";
+import { VehicleCameras } from "./VehicleCameras";
 
 const text = strings.fleet;
 const words = text.commands;
@@ -36,6 +37,7 @@ export function CommandPanel({ catalogue, offers, rows }: CommandPanelProps) {
     <section class="fleet-panel" aria-label={text.panes.commands}>
       {known.length === 0 && <p class="nothing">{text.details.choose}</p>}
       {known.length === 1 && only && <Details row={only} />}
+      {known.length === 1 && only && <VehicleCameras fleet={catalogue.fleet} resource={only.id} />}
       {known.length > 1 && <Names resources={resources} />}
       <Refused />
       {known.length > 0 &&

@@ -3,7 +3,7 @@ import { locale } from "../strings/language";
 
 const MOMENT = new Intl.DateTimeFormat(locale, { dateStyle: "medium", timeStyle: "short" });
 
-const TIME = new Intl.DateTimeFormat(undefined, { timeStyle: "medium" });
+const TIME = new Intl.DateTimeFormat(undefined, { timeStyle: "medium", hourCycle: "h23" });
 
 /** `ms`: since the Unix epoch. */
 export function moment(ms: number): string {
