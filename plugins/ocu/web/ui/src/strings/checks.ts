@@ -15,7 +15,7 @@ export const verify = {
   specHint: "As for m2pem verify --spec. They are not kept with the mission.",
   specExample: "requirements:\n  - id: in-the-end\n    ltl: <> ended",
   specLine: "Line",
-  starting: "Begins…",
+  starting: "Starting…",
   progress: "{states} states found, {waiting} still to search, {seconds} s",
   cancelled: "The verification was cancelled.",
   failed: "The mission could not be verified",

@@ -61,7 +61,7 @@ export const plan = {
   dragAll: "Drag to move all of it",
   play: "Play on the map",
   endRehearsal: "End of the rehearsal on the map",
-  picking: "Click what “{label}” shall be, or draw it.",
+  picking: "Click the route, area or point for “{label}”, or draw it.",
   pickingPlace: "Click the place or point for “{label}”.",
   pick: "Pick on the map",
   incoming: "From {file}",
