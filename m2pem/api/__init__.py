@@ -196,6 +196,7 @@ if TYPE_CHECKING:
         BehaviorState,
         ParameterKind,
         ParameterSpec,
+    from m2pem.geo.terrain_following import TOLERANCE_M, follow_terrain, not_covered
         ResourceId,
         ResumePolicy,
     )
@@ -308,6 +309,7 @@ _LAZY = {name: module for module, names in _MODULES.items() for name in names.sp
 
 __all__ = [
     "ABSENT_AFTER_S",
+    "m2pem.geo.terrain_following": "TOLERANCE_M follow_terrain not_covered",
     "MAX_NOTE_CHARACTERS",
     "OpenControlRequest",
     "OperatorPresence",
@@ -500,6 +502,9 @@ __all__ = [
     "UnitError",
     "Value",
     "VehiclePosition",
+    "TOLERANCE_M",
+    "follow_terrain",
+    "not_covered",
     "VehicleState",
     "WhenCutOff",
     "adjusts",

@@ -15,6 +15,7 @@ from m2pem.fleet.same_vehicle import check_same_vehicle
 from m2pem.fleet.shortage import Demand, check_shortages
 from m2pem.fleet.space_check import check_space
 from m2pem.fleet.task_findings import TaskFindings
+from m2pem.fleet.terrain_check import GroundCheck
 from m2pem.geo.positions import NO_ORIGIN, geometry_out_of_reach
 from m2pem.mission.behavior import Behavior, BehaviorType, Role, RoleKind, ServiceCall
 from m2pem.mission.catalogue import BehaviorSpec, ParameterKind, ResourceId
@@ -270,6 +271,10 @@ class _Check:
     demands: dict[Activity, Demand] = field(default_factory=dict)
     """What tasks need whose roles can be filled."""
     known: KnownFits = field(default_factory=dict)
+    ground: GroundCheck = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "ground", GroundCheck(self.fleet))
 
     def task(self, task: Activity) -> list[Finding]:
         findings = TaskFindings(self.mission.file_of(task), task)
@@ -318,8 +323,10 @@ class _Check:
                 self._near_behavior(behavior, SHARED.values()),
                 line=behavior.line,
             )
+        acting = [each for resources in possible.values() for each in resources]
+        acting += [each for role in matching for each in resources_of(role, self.fleet)]
         for taker in takers:
-            self._check_parameters(behavior, taker, findings)
+            self._check_parameters(behavior, taker, acting, findings)
         for role in matching:
             for resource in resources_of(role, self.fleet):
                 self._check_speed(behavior, role, resource, findings)
@@ -413,12 +420,18 @@ class _Check:
             return f"it is offered on {', '.join(others[:3])}"
         return hint or f"it offers: {', '.join(sorted(names)) or 'nothing'}"
 
-    def _check_parameters(self, behavior: Behavior, taker: _Taker, findings: TaskFindings) -> None:
+    def _check_parameters(
+        self,
+        behavior: Behavior,
+        taker: _Taker,
+        acting: Iterable[ResourceId],
+        findings: TaskFindings,
+    ) -> None:
         lines = {parameter.name: parameter.line for parameter in behavior.parameters}
         literal = {p.name: p.value for p in behavior.parameters if isinstance(p.value, str)}
         deferred = [p.name for p in behavior.parameters if not isinstance(p.value, str)]
         geometry = {**self.fleet.geometries, **self.mission.geometries}.get
-        _, problems = examine(
+        values, problems = examine(
             taker.spec, literal, geometry, self.fleet.vehicles, deferred, self.fleet.origin
         )
         for problem in problems:
@@ -428,6 +441,8 @@ class _Check:
             else:
                 message = taker.place + problem.message
                 findings.add(problem.rule, message, problem.remedy, line=line, role=taker.role)
+        if not problems:
+            self.ground.check(acting, values, lines, findings)
 
     def _unknown_geometry(
         self, problem: ParameterProblem, name: str, line: int, taker: _Taker, findings: TaskFindings

@@ -170,7 +170,9 @@ class Fleet:
     how long at no unit an operator counts as gone, so that others may give back what that operator
     has; `supervisor_role`: which operators may at any time, "": none. `hosts`: the other computers
     that arbiters run on, by name. `faces`: the settings of each face; `videos`: of cameras that
-    operators can look through. No run depends on them, and no journal has them.
+    operators can look through. `terrain_folder`: of elevation files, "": none is named;
+    `clearance_m`: the least height of aircraft above the ground, None: it is not checked. No run
+    depends on these four, and no journal has them.
     """
 
     name: str
@@ -208,6 +210,8 @@ class Fleet:
     hosts: Mapping[str, Host] = field(default_factory=dict)
     faces: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     videos: Mapping[ResourceId, Video] = field(default_factory=dict)
+    terrain_folder: str = ""
+    clearance_m: float | None = None
 
     @property
     def detectors(self) -> tuple[ResourceId, ...]:
@@ -273,11 +277,11 @@ _TYPES: dict[str, type[Geometry]] = {
 }
 
 
-_NOT_IN_JOURNALS = ("faces", "videos")
+_NOT_IN_JOURNALS = ("faces", "videos", "terrain_folder", "clearance_m")
 
 
 def dump(fleet: Fleet) -> bytes:
-    """The whole fleet, with its geometries, without its faces and videos."""
+    """The whole fleet, with its geometries, without what no run depends on."""
     content = {
         field: getattr(fleet, field)
         for field in fleet.__dataclass_fields__

@@ -339,6 +339,8 @@ def _build(source: YamlSource, model: FleetModel, geometries: dict[str, Geometry
         control_unanswered=Unanswered(handing_over.unanswered),
         control_gone_after_s=handing_over.gone_after,
         supervisor_role=handing_over.supervisor or "",
+        terrain_folder=_beside(source, model.terrain.folder) if model.terrain else "",
+        clearance_m=model.terrain.clearance if model.terrain else None,
         hosts={name: _host(source, name, each) for name, each in model.hosts.items()},
         faces={name: settings or {} for name, settings in model.faces.items()},
         videos={
@@ -363,11 +365,14 @@ def _cut_off(vehicle: VehicleModel) -> CutOffPolicy:
     return CutOffPolicy(WhenCutOff(said.action), said.after, behaviors)
 
 
-def _host(source: YamlSource, name: str, model: HostModel) -> Host:
-    folder = Path(source.file).parent
+def _beside(source: YamlSource, file: str) -> str:
+    """Return a path that is relative to the fleet file."""
+    return str(Path(source.file).parent / Path(file).expanduser())
 
+
+def _host(source: YamlSource, name: str, model: HostModel) -> Host:
     def beside(file: str | None) -> str:
-        return str(folder / Path(file).expanduser()) if file else ""
+        return _beside(source, file) if file else ""
 
     tls = model.tls
     return Host(

@@ -347,6 +347,18 @@ class ApprovalModel(_Model):
     ] = None
 
 
+class TerrainModel(_Model):
+    """The ground: elevation files of this machine, and how far aircraft keep from it."""
+
+    folder: Annotated[
+        Text, Field(description="Of elevation files (SRTM tiles, GeoTIFF), relative to this file.")
+    ]
+    clearance: Annotated[
+        Annotated[Distance, Field(gt=0)] | None,
+        Field(description="Least height of aircraft above the ground on routes and at points."),
+    ] = None
+
+
 class HandOverModel(_Model):
     """How operators ask each other for vehicles and payloads."""
 
@@ -419,6 +431,10 @@ class FleetModel(_Model):
     hand_over: Annotated[
         HandOverModel | None,
         Field(description="How operators ask each other for vehicles and payloads."),
+    ] = None
+    terrain: Annotated[
+        TerrainModel | None,
+        Field(description="Elevation files, and how far aircraft keep from the ground."),
     ] = None
     faces: Annotated[
         dict[Name, dict[str, Any] | None],

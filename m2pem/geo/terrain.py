@@ -249,12 +249,10 @@ def profile(
         TerrainError: an elevation file cannot be used.
     """
     waypoints = route.waypoints
-    length_m = sum(distance_m(a[:2], b[:2]) for a, b in pairwise(waypoints))
-    step_m = max(step_m, length_m / MOST_SAMPLES)
     if home_m is None and route.altitude_frame == "relative":
         home_m = terrain.height_m(waypoints[0][:2])
     points: list[ProfilePoint] = []
-    for along_m, place, height_m, waypoint in _samples(waypoints, step_m):
+    for along_m, place, height_m, waypoint in along_route(waypoints, step_m):
         ground_m = terrain.height_m(place)
         base_m = {"amsl": 0.0, "relative": home_m, "terrain": ground_m}[route.altitude_frame]
         altitude_m = None if height_m is None or base_m is None else height_m + base_m
@@ -262,10 +260,13 @@ def profile(
     return points
 
 
-def _samples(
+def along_route(
     waypoints: Sequence[Coordinate], step_m: float
 ) -> Iterator[tuple[float, LatLon, float | None, int | None]]:
-    """Yield distance, place, height in the route's frame, and the index of a waypoint."""
+    """Yield distance, place, height in the route's frame, and the index of a waypoint, at most
+    `step_m` apart, but about `MOST_SAMPLES` in all."""
+    length_m = sum(distance_m(a[:2], b[:2]) for a, b in pairwise(waypoints))
+    step_m = max(step_m, length_m / MOST_SAMPLES)
     along_m = 0.0
     for index, (a, b) in enumerate(pairwise(waypoints)):
         leg_m = distance_m(a[:2], b[:2])

@@ -1,0 +1,90 @@
+"""`m2pem check` finds aircraft that would come too near to the ground."""
+
+import struct
+from pathlib import Path
+
+import pytest
+
+from m2pem.fleet.fleet_file import load_fleet
+from m2pem.scripting.checking import check
+
+SIDE = 1201
+FLEET = """version: 1
+origin: {{lat: 38.105, lon: -77.305, alt: 60}}
+terrain: {{folder: elevation{clearance}}}
+vehicles:
+  rover: {{domain: ground, arbiter: sim}}
+  uav: {{domain: air, arbiter: sim}}
+"""
+MISSION = """<definitions xmlns="http://www.omg.org/spec/BPMN/20100524/MODEL"
+ xmlns:m2pem="https://m2pem.org/schema/1" targetNamespace="t"><process id="p" isExecutable="true">
+ <extensionElements><m2pem:geometry name="lane">{lane}</m2pem:geometry></extensionElements>
+ <startEvent id="s"/><sequenceFlow id="f1" sourceRef="s" targetRef="fly"/>
+ <scriptTask id="fly"><extensionElements>
+  <m2pem:behavior type="vehicle" name="single_vehicle_routing">
+   <m2pem:properties>{properties}</m2pem:properties>
+   <m2pem:resources><m2pem:role name="pilot" vehicle="{vehicle}"/></m2pem:resources>
+  </m2pem:behavior></extensionElements></scriptTask>
+ <sequenceFlow id="f2" sourceRef="fly" targetRef="e"/><endEvent id="e"/></process></definitions>"""
+ROUTE = '<m2pem:property name="route" value="lane"/>'
+
+
+def lane(altitude_m: float, frame: str, longitude: float = -77.3) -> str:
+    return (
+        f'{{"type": "Feature", "properties": {{"altitude_frame": "{frame}"}}, "geometry": '
+        f'{{"type": "LineString", "coordinates": [[{longitude}, 38.10, {altitude_m}], '
+        f"[{longitude}, 38.11, {altitude_m}]]}}}}"
+    )
+
+
+def found(
+    folder: Path, route: str, *, clearance: str = ", clearance: 20 m", more: str = "", who: str = ""
+) -> list[tuple[str, str, str]]:
+    elevation = folder / "elevation"
+    elevation.mkdir(exist_ok=True)
+    row = struct.pack(f">{SIDE}h", *([75] * SIDE))
+    (elevation / "N38W078.hgt").write_bytes(row * SIDE)
+    (folder / "fleet.yaml").write_text(FLEET.format(clearance=clearance))
+    mission = MISSION.format(lane=route, properties=ROUTE + more, vehicle=who or "uav")
+    (folder / "m.bpmn").write_text(mission)
+    findings = check(folder / "m.bpmn", folder / "fleet.yaml")
+    return [(each.rule, each.element, str(each)) for each in findings]
+
+
+@pytest.mark.parametrize(
+    ("route", "says"),
+    [
+        (lane(90, "amsl"), "uav would be 15 m above it at [38.10"),
+        (lane(60, "amsl"), "uav would be 15 m below the ground"),
+        (lane(12, "terrain"), "12 m above it"),
+        (lane(12, "relative"), "raise it by 8 m, or let the route follow the terrain"),
+    ],
+)
+def test_a_route_below_the_clearance_is_found_at_its_task(
+    tmp_path: Path, route: str, says: str
+) -> None:
+    [(rule, element, text)] = found(tmp_path, route)
+    assert (rule, element) == ("low-over-ground", "fly")
+    assert says in text
+    assert load_fleet(tmp_path / "fleet.yaml").clearance_m == 20.0
+
+
+def test_enough_height_other_vehicles_and_fleets_without_a_clearance_are_fine(
+    tmp_path: Path,
+) -> None:
+    assert found(tmp_path, lane(96, "amsl")) == []
+    assert found(tmp_path, lane(1, "relative"), clearance="") == []
+    assert found(tmp_path, lane(1, "relative"), who="rover") == []
+    higher = '<m2pem:property name="altitude" value="25 m"/>'
+    assert found(tmp_path, lane(1, "relative"), more=higher) == []
+
+
+def test_ground_that_is_not_known_is_a_warning(tmp_path: Path) -> None:
+    [(rule, _, text)] = found(tmp_path, lane(90, "amsl", longitude=-76.5))
+    assert rule == "ground-unknown"
+    assert "put N38W077.hgt" in text
+    (tmp_path / "elevation" / "N38W078.hgt").unlink()
+    (tmp_path / "elevation").rmdir()
+    findings = check(tmp_path / "m.bpmn", tmp_path / "fleet.yaml")
+    assert [each.rule for each in findings] == ["ground-unknown"]
+    assert "elevation: cannot be read" in str(findings[0])

@@ -1,0 +1,53 @@
+"""Routes that follow the ground, over a hill that the test makes."""
+
+import math
+
+import pytest
+
+from m2pem.geo.geojson import GeometryError
+from m2pem.geo.local_frame import LatLon
+from m2pem.geo.terrain import Terrain, TerrainError, profile
+from m2pem.geo.terrain_following import follow_terrain
+from m2pem.mission.geometry import Route
+
+SOUTH, NORTH = (38.10, -77.30), (38.12, -77.30)
+HILL_M, FOOT_M = 80.0, 50.0
+
+
+class Hill(Terrain):
+    """Even ground with a hill in the middle; nothing is known east of it."""
+
+    def __init__(self) -> None:
+        pass
+
+    def height_m(self, place: LatLon) -> float | None:
+        if place[1] > -77.0:
+            return None
+        return FOOT_M + HILL_M * math.exp(-(((place[0] - 38.11) / 0.002) ** 2))
+
+
+def test_a_route_keeps_its_height_over_a_hill_within_the_tolerance() -> None:
+    route = Route(((*SOUTH, 40.0), (*NORTH, 40.0)))
+    followed = follow_terrain(route, Hill(), tolerance_m=3.0)
+    assert followed.altitude_frame == "amsl"
+    assert followed.waypoints[0] == (*SOUTH, pytest.approx(FOOT_M + 40, abs=0.1))
+    heights = [each.above_ground_m for each in profile(followed, Hill(), step_m=10)]
+    assert min(h for h in heights if h is not None) > 40 - 3.5
+    assert max(h for h in heights if h is not None) < 40 + 3.5
+    coarse = follow_terrain(route, Hill(), tolerance_m=20.0)
+    assert 2 < len(coarse.waypoints) < len(followed.waypoints)
+
+
+def test_even_ground_needs_no_more_waypoints_and_one_height_is_that_of_all() -> None:
+    west = Route(((38.10, -77.30, None), (38.10, -77.31, None), (38.10, -77.32, None)))
+    followed = follow_terrain(west, Hill(), height_m=25.0)
+    assert len(followed.waypoints) == 3
+    assert {altitude for *_, altitude in followed.waypoints} == {FOOT_M + 25}
+    with pytest.raises(GeometryError, match="waypoint 1 has no altitude"):
+        follow_terrain(west, Hill())
+
+
+def test_ground_that_no_file_has_is_said_with_the_file_that_would_have_it() -> None:
+    east = Route(((38.10, -77.001, 20.0), (38.10, -76.99, 20.0)))
+    with pytest.raises(TerrainError, match=r"no elevation file has .* put N38W077.hgt"):
+        follow_terrain(east, Hill())
