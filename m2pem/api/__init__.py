@@ -55,6 +55,12 @@ if TYPE_CHECKING:
     from m2pem.api.declared_behaviors import read_declared_behaviors
     from m2pem.api.description import Description, Importance, Kind, describe
     from m2pem.api.epoch_fence import EpochFence
+    from m2pem.api.estimates import (
+        MissionEstimate,
+        NotEstimated,
+        TaskEstimate,
+        VehicleEstimate,
+    )
     from m2pem.api.event_rules import (
         UNKNOWN,
         AnswerRule,
@@ -190,13 +196,13 @@ if TYPE_CHECKING:
         lowest,
         profile,
     )
+    from m2pem.geo.terrain_following import TOLERANCE_M, follow_terrain, not_covered
     from m2pem.mission.behavior import BehaviorType, Decision
     from m2pem.mission.catalogue import (
         BehaviorSpec,
         BehaviorState,
         ParameterKind,
         ParameterSpec,
-    from m2pem.geo.terrain_following import TOLERANCE_M, follow_terrain, not_covered
         ResourceId,
         ResumePolicy,
     )
@@ -237,6 +243,7 @@ _MODULES = {
     "m2pem.api.behavior_tracker": "BehaviorTracker",
     "m2pem.api.async_queue": "AsyncQueue",
     "m2pem.api.latest_task": "LatestTask",
+    "m2pem.api.estimates": "MissionEstimate NotEstimated TaskEstimate VehicleEstimate",
     "m2pem.api.event_rules": "AnswerRule EventCondition EventThrower Fields ReceiveRule SendRule "
     "Thrown ThrownEvents UNKNOWN Unknown read_rules read_template",
     "m2pem.api.exporter": "ExportedRecord ExportedRun Exporter ExportOptions",
@@ -302,6 +309,7 @@ _MODULES = {
     "m2pem.geo.survey_pattern": "SurveyPattern SurveyRoute Surveyor best_heading_rad survey_routes",
     "m2pem.geo.survey_tracks": "SurveyTracks",
     "m2pem.geo.terrain": ("ProfilePoint TERRAIN_FOLDER Terrain TerrainError lowest profile"),
+    "m2pem.geo.terrain_following": "TOLERANCE_M follow_terrain not_covered",
     "m2pem.suggestions": "did_you_mean",
     "m2pem.units": "US_PER_S Dimension UnitError quantity",
 }
@@ -309,7 +317,6 @@ _LAZY = {name: module for module, names in _MODULES.items() for name in names.sp
 
 __all__ = [
     "ABSENT_AFTER_S",
-    "m2pem.geo.terrain_following": "TOLERANCE_M follow_terrain not_covered",
     "MAX_NOTE_CHARACTERS",
     "OpenControlRequest",
     "OperatorPresence",
@@ -432,6 +439,10 @@ __all__ = [
     "IncidentPreview",
     "IncidentVerdict",
     "MissionControl",
+    "MissionEstimate",
+    "NotEstimated",
+    "TaskEstimate",
+    "VehicleEstimate",
     "MissionFile",
     "MissionFiles",
     "MissionSource",
@@ -491,6 +502,9 @@ __all__ = [
     "profile",
     "ProfilePoint",
     "TERRAIN_FOLDER",
+    "TOLERANCE_M",
+    "follow_terrain",
+    "not_covered",
     "Terrain",
     "TerrainError",
     "survey_routes",
@@ -502,9 +516,6 @@ __all__ = [
     "UnitError",
     "Value",
     "VehiclePosition",
-    "TOLERANCE_M",
-    "follow_terrain",
-    "not_covered",
     "VehicleState",
     "WhenCutOff",
     "adjusts",

@@ -22,6 +22,7 @@ from m2pem.api.authoring import (
     SearchLimits,
     SearchProgress,
 )
+from m2pem.api.estimates import MissionEstimate
 from m2pem.api.health import ExecutiveAddress, HealthCheck
 from m2pem.api.people import OpenControlRequest, OperatorPresence, OperatorsChanged
 from m2pem.api.runs import (
@@ -599,6 +600,16 @@ class MissionControl(Protocol):
         """All findings of `m2pem check` for a mission and the fleet in use.
 
         `data`: names that are given at start.
+        """
+        ...
+
+    def estimate(self, mission: MissionSource, *, process: str | None = None) -> MissionEstimate:
+        """What a mission takes as it is drawn: distance, time and battery of each vehicle.
+
+        Raises:
+            FindingsError: the mission cannot be read, has no such process, or a vehicle of the
+                fleet cannot be simulated.
+            OperatorError: this executive cannot estimate missions.
         """
         ...
 

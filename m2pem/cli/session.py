@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from m2pem.api.clock import SystemClock
+from m2pem.api.estimates import MissionEstimate
 from m2pem.api.runs import FACE, Alert, RunId, RunStatus, SimulationResult
 from m2pem.cli.group import STOPPED, ignore_closed_stdout, log_from_a_thread
 from m2pem.cli.interruption import Interruption
@@ -241,6 +242,7 @@ def make_executive(
             on_records=None if answers is None else answers.seen,
             rehearse=_rehearse,
             foresee=outlook_in_subprocess,
+            estimate=_estimate,
             has_others=partial(_others_on, journal.file),
             page=page,
         )
@@ -259,6 +261,12 @@ def _scripted(plugins: PluginManager, answers: "Answers") -> Plugins:
     from m2pem.rehearsal.scripted import ScriptedPlugins
 
     return ScriptedPlugins(plugins, answers)
+
+
+def _estimate(mission: Mission, fleet: Fleet, process: str | None) -> MissionEstimate:
+    from m2pem.simulation.estimates import estimate_mission
+
+    return estimate_mission(mission, fleet, process)
 
 
 async def _rehearse(*arguments: Any, **options: Any) -> SimulationResult:

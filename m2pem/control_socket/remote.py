@@ -28,6 +28,7 @@ from m2pem.mission.mission import Mission
 REFUSED = {
     "simulate": "missions are rehearsed where the executive runs: m2pem simulate",
     "verify": "missions are verified where the executive runs: m2pem verify",
+    "estimate": "missions are edited where the executive runs",
     "editable": "missions are edited where the executive runs",
     "outline": "missions are edited where the executive runs",
     "geometries": "geometries are listed where the executive runs",

@@ -4,7 +4,7 @@ import asyncio
 from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractAsyncContextManager
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeAlias
 
 from m2pem.api.alerts import OperatorAlert
 from m2pem.api.allocation import (
@@ -24,6 +24,7 @@ from m2pem.api.authoring import (
     SearchProgress,
 )
 from m2pem.api.control import ControlEvent
+from m2pem.api.estimates import MissionEstimate
 from m2pem.api.health import ExecutiveAddress, HealthCheck
 from m2pem.api.people import MAX_NOTE_CHARACTERS, OpenControlRequest, OperatorPresence
 from m2pem.api.runs import (
@@ -98,6 +99,10 @@ class Rehearse(Protocol):
         ...
 
 
+Estimate: TypeAlias = Callable[[Mission, Fleet, str | None], MissionEstimate]
+"""Estimates what a mission takes with a fleet, from the start of a process; None: its main one."""
+
+
 class Control:
     """Implements `m2pem.api.control.MissionControl`; see there for every promise."""
 
@@ -114,6 +119,7 @@ class Control:
         statistics: StatisticsReader,
         rehearse: Rehearse | None = None,
         foresee: Foresee | None = None,
+        estimate: Estimate | None = None,
     ) -> None:
         self._supervisor = supervisor
         self._starter = starter
@@ -125,6 +131,7 @@ class Control:
         self._health = health
         self._statistics = statistics
         self._rehearse = rehearse
+        self._estimate = estimate
         self._choices = IncidentChoices(supervisor, foresee)
         self._direct = DirectBehaviors(supervisor, starter)
 
@@ -657,6 +664,13 @@ class Control:
         except MissionError as error:
             return error.findings
         return self._starter.findings(loaded, process, tuple(data))
+
+    def estimate(self, mission: MissionSource, *, process: str | None = None) -> MissionEstimate:
+        """What a mission takes as it is drawn, of each vehicle of the fleet in use."""
+        if self._estimate is None:
+            raise OperatorError("this executive cannot estimate missions")
+        loaded = load_source(mission, self._supervisor.settings.search_path)
+        return self._estimate(loaded, self._supervisor.fleet_now, process)
 
     async def simulate(self, mission: MissionSource, **options: Any) -> SimulationResult:
         """Rehearse a mission with this fleet on a virtual clock."""

@@ -24,7 +24,7 @@ from m2pem.executive.alert_list import AlertList
 from m2pem.executive.alert_watch import keep_alerts, watch_alerts, write_alerts
 from m2pem.executive.approvals import Approvals
 from m2pem.executive.behavior_lifecycle import ExecutiveViews
-from m2pem.executive.control import Control, Rehearse
+from m2pem.executive.control import Control, Estimate, Rehearse
 from m2pem.executive.control_events import ControlEvents, LoggedAlerts, RecordObservers
 from m2pem.executive.fleet_connections import FleetArbiters, FleetConnections
 from m2pem.executive.health import ExecutiveHealth
@@ -64,7 +64,8 @@ class Executive:
     whether silence of a vehicle ends its behaviors. `observed`: whether plugins observe records.
     `search_path`, `limit`, `on_records`, `has_others`: as in `RunSettings`. `rehearse`: what
     `MissionControl.simulate` awaits; None: it is refused. `foresee`: what explores the choices
-    about incidents; None: what follows them is not known. `page`: the address of its web page, for
+    about incidents; None: what follows them is not known. `estimate`: what
+    `MissionControl.estimate` asks; None: it is refused. `page`: the address of its web page, for
     operators of other executives.
     """
 
@@ -83,6 +84,7 @@ class Executive:
         on_records: OnRecords | None = None,
         rehearse: Rehearse | None = None,
         foresee: Foresee | None = None,
+        estimate: Estimate | None = None,
         has_others: Callable[[], bool] = lambda: False,
         page: str = "",
     ) -> None:
@@ -157,6 +159,7 @@ class Executive:
             ),
             rehearse,
             foresee,
+            estimate,
         )
         self._scheduling: asyncio.Task[None] | None = None
         self._locks = VehicleLocks(addresses_of(self.arbiters), journal.file, page)

@@ -38,6 +38,7 @@ from m2pem.mission.values import Value
 from m2pem.plugins import PluginManager
 from m2pem.rehearsal.worker import rehearse_in_subprocess
 from m2pem.scripting.run_result import RunResult
+from m2pem.simulation.estimates import estimate_mission
 
 BACKLOG = 1_000_000
 """The maximum number of events that wait for a reader of `Run.records` or `Run.prompts`."""
@@ -324,6 +325,7 @@ class Executive:
                 search_path=self._search_path,
                 rehearse=_rehearse,
                 foresee=outlook_in_subprocess,
+                estimate=estimate_mission,
             )
         except PluginError as error:
             raise FleetError(f"{fleet.file}: {error}", ()) from error

@@ -15,6 +15,7 @@ from m2pem_plugin_web.problems import handle_problems
 from m2pem_plugin_web.rest import (
     catalogue,
     checks,
+    estimates,
     geometries,
     geometry_files,
     missions,
@@ -33,6 +34,7 @@ from m2pem.fleet.fleet import simulated_fleet
 from m2pem.fleet.fleet_file import load_fleet
 from m2pem.journal import MemoryJournal
 from m2pem.rehearsal.worker import rehearse_in_subprocess
+from m2pem.simulation.estimates import estimate_mission
 
 REPOSITORY = Path(__file__).parents[4]
 VIGNETTE = (REPOSITORY / "missions" / "vignette1.bpmn").read_text(encoding="utf-8")
@@ -62,6 +64,7 @@ def app_of(services: Services, *others: APIRouter) -> FastAPI:
         runs.router(control, folder),
         missions.template_router(),
         checks.router(control, folder),
+        estimates.router(control, folder),
         verifications.router(control, folder, services.verifications),
         rehearsals.router(control, folder, services.rehearsals),
         catalogue.router(control),
@@ -122,6 +125,7 @@ async def rest_world(folder: Path) -> AsyncIterator[Rest]:
         SystemClock(20.0),
         speed=20.0,
         rehearse=rehearse_in_subprocess,
+        estimate=estimate_mission,
     )
     async with executive:
         services = services_of(executive.control, folder)

@@ -25,6 +25,7 @@ from m2pem.executive.executive import Executive
 from m2pem.journal import Journal, MemoryJournal
 from m2pem.plugins import PluginManager
 from m2pem.rehearsal.worker import rehearse_in_subprocess
+from m2pem.simulation.estimates import estimate_mission
 from m2pem.testing import scenarios
 
 WITHIN_S = 10.0
@@ -291,6 +292,7 @@ def executive(journal: Journal, plugins: PluginManager | None = None) -> Executi
         SystemClock(SPEED),
         speed=SPEED,
         rehearse=rehearse_in_subprocess,
+        estimate=estimate_mission,
     )
 
 

@@ -1,0 +1,100 @@
+"""/api/estimates: what a mission takes as it is drawn, of each vehicle."""
+
+import math
+
+from fastapi import APIRouter
+from pydantic import BaseModel
+
+from m2pem.api import MissionControl
+from m2pem_plugin_web.access.permissions import Viewer
+from m2pem_plugin_web.missions.folder import MissionFolder
+from m2pem_plugin_web.problems import RESPONSES
+from m2pem_plugin_web.rest.bounded_threads import BoundedThreads
+from m2pem_plugin_web.rest.drafts import DraftModel, draft_of
+
+
+class TaskEstimateModel(BaseModel):
+    """A task of a vehicle. `battery_left`: after it; below 0 if the battery does not last."""
+
+    element: str
+    label: str
+    vehicle: str
+    begins_s: float
+    distance_m: float
+    time_s: float
+    battery_left: float
+
+
+class VehicleEstimateModel(BaseModel):
+    """A vehicle. `battery_left`: at the mission's end; `stated`: whether the fleet file says its
+    endurance, or the simulation assumes it."""
+
+    vehicle: str
+    distance_m: float
+    time_s: float
+    battery_left: float
+    endurance_s: float | None
+    stated: bool
+
+
+class LeftOutModel(BaseModel):
+    """An element that is not estimated, or in part, and why."""
+
+    element: str
+    label: str
+    reason: str
+
+
+class MissionEstimateModel(BaseModel):
+    """A mission. `reserve`: the part of a full battery that plans leave unused."""
+
+    time_s: float
+    reserve: float
+    vehicles: list[VehicleEstimateModel]
+    tasks: list[TaskEstimateModel]
+    left_out: list[LeftOutModel]
+
+
+def router(control: MissionControl, folder: MissionFolder) -> APIRouter:
+    """The route of estimates."""
+    routes = APIRouter(prefix="/api", tags=["checks"], responses=RESPONSES)
+    threads = BoundedThreads()
+
+    @routes.post("/estimates")
+    async def estimate(_: Viewer, wanted: DraftModel) -> MissionEstimateModel:
+        """Distance, time and battery of each vehicle, and what could not be estimated."""
+        draft = await draft_of(wanted, folder)
+        found = await threads.run(control.estimate, draft, process=wanted.process)
+        return MissionEstimateModel(
+            time_s=found.time_s,
+            reserve=found.reserve,
+            vehicles=[
+                VehicleEstimateModel(
+                    vehicle=each.vehicle,
+                    distance_m=each.distance_m,
+                    time_s=each.time_s,
+                    battery_left=each.battery_left,
+                    endurance_s=None if math.isinf(each.endurance_s) else each.endurance_s,
+                    stated=each.stated,
+                )
+                for each in found.vehicles
+            ],
+            tasks=[
+                TaskEstimateModel(
+                    element=each.element,
+                    label=each.label,
+                    vehicle=each.vehicle,
+                    begins_s=each.begins_s,
+                    distance_m=each.distance_m,
+                    time_s=each.time_s,
+                    battery_left=each.battery_left,
+                )
+                for each in found.tasks
+            ],
+            left_out=[
+                LeftOutModel(element=each.element, label=each.label, reason=each.reason)
+                for each in found.left_out
+            ],
+        )
+
+    return routes
