@@ -49,6 +49,9 @@ async def test_vehicles_of_the_fleet_share_it(tmp_path: Path) -> None:
         wanted = {"area": FIELD, "spacing_m": 10, "vehicles": names, "speed_m_s": 2}
         found = await rest.post("/survey-patterns", wanted)
         assert [each["vehicle"] for each in found["routes"]] == names
+        slow = await rest.post("/survey-patterns", {**wanted, "speed_m_s": None})
+        assert [each["time_s"] for each in slow["routes"]] == [None, None]  # no speed is stated
+        assert slow["routes"][0]["passes"] == found["routes"][0]["passes"]
         unknown = await rest.post("/survey-patterns", {**wanted, "vehicles": ["nobody"]}, 404)
         assert "there is no vehicle 'nobody'" in unknown["detail"]
 

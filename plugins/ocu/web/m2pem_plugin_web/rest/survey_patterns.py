@@ -63,7 +63,8 @@ class PatternModel(Body):
 
     `heading_deg`: of the passes, from true north; null: that with the fewest turns. `margin_m`: how
     far beyond the area is surveyed; below 0, within it. `corner`: where it begins. `vehicles`: who
-    share it by their speeds; `speed_m_s`: of all of them, in place of their cruise speeds.
+    share it by their speeds; `speed_m_s`: of all of them, in place of their cruise speeds. One
+    whose speed is not known gets the share of the slowest.
     """
 
     area: GivenGeometry
@@ -169,13 +170,12 @@ def router(control: MissionControl) -> APIRouter:
             found, best_rad = await threads.run(_survey, pattern, surveyors)
         except GeometryError as error:
             raise ProblemError(422, str(error)) from None
-        timed = bool(wanted.vehicles) or wanted.speed_m_s is not None
         return SurveyRoutesModel(
             spacing_m=pattern.spacing_m,
             best_heading_deg=math.degrees(best_rad),
             trigger_distance_m=None if images is None else images.trigger_distance_m,
             ground_resolution_m=None if images is None else images.ground_resolution_m,
-            routes=[_model(control, each, images, timed) for each in found],
+            routes=[_model(control, each, images, wanted.speed_m_s) for each in found],
             problems=list(_too_long(found)),
         )
 
@@ -213,18 +213,21 @@ def _surveyors(control: MissionControl, wanted: PatternModel) -> Sequence[Survey
     if not wanted.vehicles:
         return (Surveyor("", wanted.speed_m_s or 1.0),)
     vehicles = control.fleet().vehicles
-    surveyors = []
+    chosen = []
     for name in dict.fromkeys(wanted.vehicles):
         vehicle = next((each for each in vehicles.values() if each.id == name), None)
         if vehicle is None:
             raise ProblemError(404, f"vehicles: there is no vehicle {name!r}")
+        chosen.append(vehicle)
+    stated = [each.cruise_speed_m_s for each in chosen if each.cruise_speed_m_s is not None]
+    otherwise = min(stated, default=1.0)
+    surveyors = []
+    for vehicle in chosen:
         speed_m_s = wanted.speed_m_s or vehicle.cruise_speed_m_s
-        if speed_m_s is None:
-            raise ProblemError(
-                422, f"vehicles: the fleet file gives {name} no cruise_speed: send speed_m_s"
-            )
-        lasts = None if vehicle.endurance_s is None else lasts_s(vehicle.endurance_s, None)
-        surveyors.append(Surveyor(name, speed_m_s, lasts))
+        lasts = None
+        if vehicle.endurance_s is not None and speed_m_s is not None:
+            lasts = lasts_s(vehicle.endurance_s, None)
+        surveyors.append(Surveyor(vehicle.id, speed_m_s or otherwise, lasts))
     return surveyors
 
 
@@ -238,11 +241,17 @@ def _too_long(found: Sequence[SurveyRoute]) -> Sequence[str]:
 
 
 def _model(
-    control: MissionControl, found: SurveyRoute, images: ImagePlan | None, timed: bool
+    control: MissionControl,
+    found: SurveyRoute,
+    images: ImagePlan | None,
+    speed_m_s: float | None,
 ) -> SurveyRouteModel:
     vehicles = control.fleet().vehicles.values()
     vehicle = next((each for each in vehicles if each.id == found.surveyor.name), None)
     endurance_s = None if vehicle is None else vehicle.endurance_s
+    time_s: float | None = found.time_s
+    if speed_m_s is None and (vehicle is None or vehicle.cruise_speed_m_s is None):
+        time_s = None
     count = None
     if images is not None:
         count = math.ceil(found.surveyed_m / images.trigger_distance_m) + found.passes
@@ -252,8 +261,8 @@ def _model(
         passes=found.passes,
         length_m=found.length_m,
         surveyed_m=found.surveyed_m,
-        time_s=found.time_s if timed else None,
+        time_s=time_s,
         lasts_s=found.surveyor.lasts_s,
-        battery_fraction=None if endurance_s is None else found.time_s / endurance_s,
+        battery_fraction=None if endurance_s is None or time_s is None else time_s / endurance_s,
         images=count,
     )
