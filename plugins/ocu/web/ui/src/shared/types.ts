@@ -107,6 +107,8 @@ export interface Geometry {
   from: "fleet" | "operator" | "mission";
   by: string;
   at_us: number | null;
+  /** Of the mission's own: the pattern of the survey that it is a part of, and whose part. */
+  survey?: { pattern: string; surveyor: string };
 }
 
 export interface MissionLine {

@@ -15,6 +15,8 @@ import { begin, run } from "./run";
 import { runs } from "./runs";
 import { settings } from "./settings";
 import { shell, signIn } from "./shell";
+import { survey } from "./survey";
+import { estimates, terrain } from "./terrain";
 
 export const english = {
   shell,
@@ -26,6 +28,9 @@ export const english = {
   people,
   editor,
   plan,
+  survey,
+  terrain,
+  estimates,
   control,
   verify,
   requirements,

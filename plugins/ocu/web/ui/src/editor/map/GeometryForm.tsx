@@ -7,6 +7,8 @@ import { VertexList } from "../../map/VertexList";
 import { fill, strings } from "../../strings";
 import type { EditorContext } from "../panels/panel";
 import { sizesOf } from "./DraftForm";
+import { SurveyButton } from "./survey/SurveyButton";
+import { TerrainProfile } from "./terrain/TerrainProfile";
 
 const words = strings.plan;
 const text = strings.operate.map;
@@ -51,6 +53,8 @@ export function GeometryForm({ editor, geometry }: GeometryFormProps) {
         {sizesOf(draft)}
         <Users editor={editor} name={geometry.name} />
       </p>
+      <SurveyButton surveys={plan.surveys} geometry={geometry} />
+      {geometry.kind === "route" && <TerrainProfile editor={editor} geometry={geometry} />}
     </form>
   );
 }

@@ -14,7 +14,10 @@ import { GeometryForm } from "./GeometryForm";
 import { IncomingForm } from "./IncomingForm";
 import { RehearsalPlayer } from "./RehearsalPlayer";
 import { colourOf } from "./colours";
+import { Estimates } from "./estimates/Estimates";
 import { PlanMap } from "./planMap";
+import { middleOfArea } from "./survey/SurveyLayer";
+import { SurveyForm } from "./survey/SurveyForm";
 import "./plan.css";
 
 const words = strings.plan;
@@ -62,11 +65,23 @@ export default function MapPanel({ editor }: { editor: EditorContext }) {
       });
       const own = catalogue.own.value.find(({ name }) => name === plan.selected.value);
       const { value: draft } = plan.draft;
-      made.edit(draft ?? (own ? draftOf(own) : null), draft !== null);
+      const isSurveyed = plan.surveys.open.peek() !== null;
+      made.edit(isSurveyed ? null : (draft ?? (own ? draftOf(own) : null)), draft !== null);
       if (first && catalogue.geometries.value.length > 0) {
         first = false;
         made.fit();
       }
+    };
+    const survey = () => {
+      const { open, preview } = plan.surveys;
+      const area = open.value && plan.find(open.value.pattern.area);
+      if (!open.value || !area) return made.survey.show(null, () => undefined);
+      const { routes } = preview.value;
+      const heading_deg = open.value.pattern.heading_deg ?? routes?.best_heading_deg ?? 0;
+      const middle = middleOfArea(draftOf(area).vertices);
+      made.survey.show({ routes, heading_deg, middle }, (turned) =>
+        plan.surveys.set({ heading_deg: turned }),
+      );
     };
     const looked = () => {
       const [task] = editor.selected.value;
@@ -82,6 +97,8 @@ export default function MapPanel({ editor }: { editor: EditorContext }) {
         show();
         looked();
       }),
+      ...[plan.surveys.open, plan.surveys.preview].map((each) => each.subscribe(survey)),
+      plan.surveys.open.subscribe(show),
       plan.picking.subscribe((now) => made.pickPlace(now?.kind === "position")),
       plan.incoming.subscribe((now) =>
         made.propose((now?.drawings ?? []).filter(({ taken }) => taken).map((each) => each.feature)),
@@ -96,6 +113,7 @@ export default function MapPanel({ editor }: { editor: EditorContext }) {
   const draft = plan.draft.value;
   const incoming = plan.incoming.value;
   const selected = plan.find(plan.selected.value);
+  const isSurveying = !draft && !incoming && plan.surveys.open.value !== null;
   const take = (files: FileList | null | undefined) => {
     const [file] = files ?? [];
     if (file) void readFile(plan, file);
@@ -128,6 +146,7 @@ export default function MapPanel({ editor }: { editor: EditorContext }) {
           map={() => view.current}
         />
       )}
+      <Estimates editor={editor} />
       {isOver.value && <p class="plan-drop">{words.dropHint}</p>}
       {draft && (
         <DraftForm
@@ -140,7 +159,8 @@ export default function MapPanel({ editor }: { editor: EditorContext }) {
         />
       )}
       {!draft && incoming && <IncomingForm plan={plan} incoming={incoming} />}
-      {!draft && !incoming && selected && (
+      {isSurveying && <SurveyForm editor={editor} />}
+      {!draft && !incoming && !isSurveying && selected && (
         <GeometryForm key={selected.name} editor={editor} geometry={selected} />
       )}
     </section>
@@ -164,7 +184,8 @@ function choose(editor: EditorContext, name: string): void {
 /** Keys of the canvas would delete what is selected there. */
 function keyDown({ plan }: EditorContext, event: KeyboardEvent): void {
   if (event.key !== "Escape" || event.shiftKey) return;
-  if (plan.draft.value ?? plan.picking.value ?? plan.incoming.value) plan.cancel();
+  const { draft, picking, incoming, surveys } = plan;
+  if (draft.value ?? picking.value ?? incoming.value ?? surveys.open.value) plan.cancel();
   else plan.selected.value = "";
 }
 

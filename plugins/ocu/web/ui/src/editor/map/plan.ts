@@ -4,12 +4,20 @@ import { computed, signal, type ReadonlySignal } from "@preact/signals";
 import { remember, remembered } from "../../shared/memory";
 import type { Geometry, RunSummary } from "../../shared/types";
 import { draftOf, emptyDraft, featureOf, type Draft, type Kind } from "../../map/draft";
-import { putGeometries, removeGeometry, renameUses, type NamedFeature } from "../moddle/geometries";
+import {
+  putGeometries,
+  removeGeometry,
+  renameUses,
+  surveyChanges,
+  type NamedFeature,
+} from "../moddle/geometries";
 import type { ModdleElement } from "../moddle/moddle";
 import { definitionsOf } from "../panels/drawn";
 import type { EditorContext } from "../panels/panel";
 import type { Element } from "../session/services";
 import { commandsOf, inFlowOrder, type MapCommand } from "./commands";
+import { renamedIn } from "./survey/pattern";
+import { Surveys } from "./survey/surveys";
 
 /** A parameter whose value is chosen on the map. */
 export interface Picking {
@@ -42,12 +50,14 @@ export class MapPlan {
   /** Played on the map. */
   readonly rehearsal = signal<PlayedRehearsal | null>(null);
   readonly commands: ReadonlySignal<readonly MapCommand[]>;
+  readonly surveys: Surveys;
 
   constructor(private readonly editor: EditorContext) {
     this.commands = computed(() => {
       editor.changes.value;
       return commandsOf(definitionsOf(editor), editor.catalogue.geometries.value);
     });
+    this.surveys = new Surveys(editor, this);
   }
 
   show(isShown: boolean): void {
@@ -69,6 +79,7 @@ export class MapPlan {
     this.draft.value = null;
     this.picking.value = null;
     this.incoming.value = null;
+    this.surveys.close();
   }
 
   find(name: string): Geometry | undefined {
@@ -76,6 +87,7 @@ export class MapPlan {
   }
 
   begin(kind: Kind): void {
+    this.surveys.close();
     this.selected.value = "";
     this.incoming.value = null;
     this.draft.value = { ...emptyDraft(kind), name: this.freeName(kind) };
@@ -114,13 +126,18 @@ export class MapPlan {
         const renamed = renameUses(factory, task, before, draft.name);
         changes.push(...renamed.map((each) => ({ ...each, shown })));
       }
+      changes.push(
+        ...surveyChanges(this.definitions(), (text) => renamedIn(text, before, draft.name)),
+      );
     }
     this.apply(changes);
     this.selected.value = draft.name;
+    if (draft.kind === "area" && before === draft.name) this.surveys.areaChanged(draft.name);
   }
 
-  put(features: readonly NamedFeature[]): void {
-    this.apply(putGeometries(this.editor.service("edits").factory, this.definitions(), features));
+  put(features: readonly NamedFeature[], gone: readonly string[] = []): void {
+    const { factory } = this.editor.service("edits");
+    this.apply(putGeometries(factory, this.definitions(), features, gone));
   }
 
   /** The mission gets its own copy of one of the fleet's. */

@@ -17,7 +17,9 @@ import { snapped } from "../../map/snap";
 import { VehicleLayer } from "../../operate/map/vehicleLayer";
 import type { Fleet, Geometry } from "../../shared/types";
 import { strings } from "../../strings";
+import { colourOf } from "./colours";
 import type { MapCommand } from "./commands";
+import { SurveyLayer } from "./survey/SurveyLayer";
 
 const words = strings.plan;
 
@@ -55,6 +57,8 @@ const NEAR_PX = 4;
 export class PlanMap {
   /** Of a rehearsal that is played. */
   readonly vehicles: VehicleLayer;
+  /** Whose form is open. */
+  readonly survey: SurveyLayer;
   private readonly map: L.Map;
   private readonly geometries = L.featureGroup();
   private readonly badges = L.layerGroup();
@@ -80,6 +84,7 @@ export class PlanMap {
       layer.addTo(this.map);
     }
     this.vehicles = new VehicleLayer(this.map, fleet);
+    this.survey = new SurveyLayer(this.map, (who) => colourOf(fleet.vehicles, who));
     const style = { color: DRAFT, weight: 2, dashArray: "2 6", interactive: false };
     this.band = L.polyline([], style).addTo(this.map);
     this.map.on("click", ({ latlng }) => this.click(latlng));

@@ -11,6 +11,8 @@ const TYPE = "m2pem:Geometry";
 export interface NamedFeature {
   name: string;
   feature: GeoJSON.Feature;
+  /** Left out: that of before, if the shape is the same; one that was changed is no part of it. */
+  survey?: Geometry["survey"];
 }
 
 export const processesIn = (definitions: ModdleElement | undefined): ModdleElement[] =>
@@ -20,22 +22,30 @@ export const processesIn = (definitions: ModdleElement | undefined): ModdleEleme
 export function geometriesOf(definitions: ModdleElement | undefined): Geometry[] {
   const found = processesIn(definitions)
     .flatMap((process) => extensions(process, TYPE))
-    .flatMap((each) => ownGeometry(text(each, "name"), text(each, "body")) ?? []);
+    .flatMap((each) => {
+      const read = ownGeometry(text(each, "name"), text(each, "body"));
+      const pattern = text(each, "survey");
+      if (!read || !pattern) return read ?? [];
+      return { ...read, survey: { pattern, surveyor: text(each, "surveyor") } };
+    });
   return found.sort((one, other) => one.name.localeCompare(other.name));
 }
 
-/** Puts geometries into the mission, each in place of the one that was called `before`. */
+/** Puts geometries into the mission, each in place of the one that was called `before`; `gone` are
+ * taken out. */
 export function putGeometries(
   factory: Factory,
   definitions: ModdleElement,
-  put: readonly (NamedFeature & { before?: string })[],
+  puts: readonly (NamedFeature & { before?: string })[],
+  gone: readonly string[] = [],
 ): Change[] {
   const process = holderIn(definitions);
   if (!process) return [];
-  const all = [...extensions(process, TYPE)];
-  for (const { name, feature, before = name } of put) {
+  const all = extensions(process, TYPE).filter((each) => !gone.includes(text(each, "name")));
+  for (const put of puts) {
+    const { name, before = name } = put;
     const at = all.findIndex((each) => text(each, "name") === before);
-    const made = written(factory, name, feature, all[at]);
+    const made = written(factory, put, all[at]);
     if (at < 0) all.push(made);
     else all[at] = made;
   }
@@ -86,8 +96,7 @@ function holderIn(definitions: ModdleElement): ModdleElement | undefined {
 
 function written(
   factory: Factory,
-  name: string,
-  { properties, geometry }: GeoJSON.Feature,
+  { name, feature: { properties, geometry }, survey }: NamedFeature,
   before?: ModdleElement,
 ): ModdleElement {
   const frame = (properties as { altitude_frame?: string } | null)?.altitude_frame ?? "relative";
@@ -95,5 +104,30 @@ function written(
     frame === "relative"
       ? geometry
       : { type: "Feature", properties: { altitude_frame: frame }, geometry };
-  return successor(factory, TYPE, { name, body: JSON.stringify(value) }, before);
+  const body = JSON.stringify(value);
+  const isSame = before && text(before, "body") === body;
+  const kept = (attribute: string) => (isSame && text(before, attribute)) || undefined;
+  return successor(
+    factory,
+    TYPE,
+    {
+      name,
+      survey: survey?.pattern ?? kept("survey"),
+      surveyor: survey ? survey.surveyor || undefined : kept("surveyor"),
+      body,
+    },
+    before,
+  );
+}
+
+/** Another pattern for the routes of surveys; `rewritten` null: it stays as it is. */
+export function surveyChanges(
+  definitions: ModdleElement,
+  rewritten: (survey: string) => string | null,
+): Change[] {
+  const all = processesIn(definitions).flatMap((process) => extensions(process, TYPE));
+  return all.flatMap((target) => {
+    const survey = rewritten(text(target, "survey"));
+    return survey === null ? [] : [{ target, properties: { survey } }];
+  });
 }

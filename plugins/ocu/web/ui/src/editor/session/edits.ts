@@ -7,6 +7,7 @@ import type { BpmnReplace, CommandStack, Element, Modeling } from "./services";
 
 const CHANGE = "m2pem.change";
 const REPLACE = "m2pem.replace";
+const TOGETHER = "m2pem.together";
 
 interface ChangeContext {
   element: Element;
@@ -62,6 +63,12 @@ class ReplaceHandler {
   }
 }
 
+class TogetherHandler {
+  preExecute({ steps }: { steps: () => void }): void {
+    steps();
+  }
+}
+
 export class Edits {
   static readonly $inject = ["commandStack", "bpmnFactory"];
   readonly factory: Factory;
@@ -73,6 +80,7 @@ export class Edits {
     this.factory = bpmnFactory as Factory;
     commandStack.registerHandler(CHANGE, ChangeHandler);
     commandStack.registerHandler(REPLACE, ReplaceHandler);
+    commandStack.registerHandler(TOGETHER, TogetherHandler);
   }
 
   apply(element: Element, changes: readonly Change[]): void {
@@ -82,6 +90,11 @@ export class Edits {
 
   set(element: Element, target: ModdleElement, properties: Record<string, unknown>): void {
     this.apply(element, [{ target, properties }]);
+  }
+
+  /** Several changes that are undone and redone as one. */
+  together(steps: () => void): void {
+    this.commandStack.execute(TOGETHER, { steps });
   }
 
   /** Another type of element in the same place, with changes of its own. */
