@@ -37,11 +37,12 @@ function replay(page = async (number: number) => pageOf(number)) {
 /** What reading in the background has begun is over. */
 const settle = async (scene: ReplayScene) => {
   await scene.settled();
-  for (let turn = 0; turn < 50; turn += 1) await Promise.resolve();
+  await vi.advanceTimersByTimeAsync(1000);
 };
 
 describe("replay scene", () => {
   beforeEach(() => {
+    vi.useFakeTimers();
     vi.stubGlobal("requestAnimationFrame", () => 1);
     vi.stubGlobal("cancelAnimationFrame", () => undefined);
   });
@@ -120,7 +121,6 @@ describe("replay scene", () => {
   });
 
   it("asks for the bars of a window when that rests", async () => {
-    vi.useFakeTimers();
     const { scene, spans } = replay();
     for (const from_s of [100, 200, 300]) scene.lookAt({ from_s, to_s: from_s + 100 });
     await vi.advanceTimersByTimeAsync(1000);

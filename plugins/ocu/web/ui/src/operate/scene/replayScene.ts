@@ -32,7 +32,7 @@ const LOG_PAGES = 2;
 /** More are not kept at once. */
 const MOST_LOG_PAGES = 20;
 
-/** A window that is dragged or zoomed is asked for when it rests. */
+/** What a slider, or a window that is dragged or zoomed, asks for when it rests. */
 const RESTS_MS = 150;
 
 /** `spans`: the bars of the whole run, of which short ones are merged if it is `thinned`. */
@@ -93,7 +93,10 @@ export class ReplayScene implements Scene {
   private frame = 0;
   private before_ms = 0;
   private ticked_ms = 0;
+  /** After how many records the log is as it is shown. */
+  private logged = -1;
   private looking: ReturnType<typeof setTimeout> | undefined;
+  private logging: ReturnType<typeof setTimeout> | undefined;
   private readonly known = signal<{ history: TelemetryHistory } | null>(null);
 
   constructor(
@@ -226,6 +229,7 @@ export class ReplayScene implements Scene {
   dispose(): void {
     this.left = true;
     clearTimeout(this.looking);
+    clearTimeout(this.logging);
     cancelAnimationFrame(this.frame);
   }
 
@@ -294,9 +298,10 @@ export class ReplayScene implements Scene {
     this.showView(reel.after(count, page));
     this.events.value = count;
     if (exact !== null) this.showVehicles();
-    // Where a replay goes to next, and what the log has before it.
-    void reel.read(page + 1).catch(() => undefined);
-    void this.readLog();
+    if (this.playing.peek()) void reel.read(page + 1).catch(() => undefined);
+    // What the log has before it is read when the slider rests: moments come first.
+    clearTimeout(this.logging);
+    this.logging = setTimeout(() => void this.readLog(), RESTS_MS);
   }
 
   private showView(view: RunView): void {
@@ -345,8 +350,6 @@ export class ReplayScene implements Scene {
       this.log.value = this.logPage(count);
     });
   }
-
-  private logged = -1;
 
   private logPage(count: number): LogPage {
     const last = this.reel.pageOf(count);

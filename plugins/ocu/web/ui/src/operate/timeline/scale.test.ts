@@ -17,6 +17,13 @@ describe("time line", () => {
     expect(marks({ from_s: 0, px_per_s: 0.1 }, 200, 60)).toEqual([0, 600, 1200, 1800]);
   });
 
+  it("shows a run of a month whole, with days marked", () => {
+    const [month_s, day_s] = [30 * 86_400, 86_400];
+    const window = whole(month_s, 716);
+    expect(window.px_per_s * month_s).toBeCloseTo(700);
+    expect(marks(window, 716, 70)).toEqual([0, 3, 6, 9, 12, 15, 18, 21, 24, 27, 30].map((day) => day * day_s));
+  });
+
   it("puts what overlaps into lanes", () => {
     const bars = lanes([
       { from: 0, to: 5 },

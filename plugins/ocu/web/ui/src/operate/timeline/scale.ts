@@ -18,7 +18,8 @@ export const windowOf = ({ from_s, to_s }: Range, width_px: number): Window => (
   px_per_s: width_px / (to_s - from_s),
 });
 
-const LEAST_PX_PER_S = 0.002;
+/** A month in 130 pixels. */
+const LEAST_PX_PER_S = 0.00005;
 const MOST_PX_PER_S = 400;
 
 export function whole(end_s: number, width_px: number): Window {
@@ -31,11 +32,13 @@ export function zoomed(window: Window, factor: number, around_px: number): Windo
   return { px_per_s, from_s: Math.max(0, around_s - around_px / px_per_s) };
 }
 
-const STEPS_S = [0.1, 0.5, 1, 2, 5, 10, 30, 60, 120, 300, 600, 1800, 3600, 7200, 21600, 86400];
+const DAY_S = 86_400;
+const DAYS_S = [1, 3, 7, 30].map((days) => days * DAY_S);
+const STEPS_S = [0.1, 0.5, 1, 2, 5, 10, 30, 60, 120, 300, 600, 1800, 3600, 7200, 21600, ...DAYS_S];
 
 /** Times that are marked, not closer than `least_px`. */
 export function marks(window: Window, width_px: number, least_px: number): number[] {
-  const step = STEPS_S.find((each) => each * window.px_per_s >= least_px) ?? 86400;
+  const step = STEPS_S.find((each) => each * window.px_per_s >= least_px) ?? DAYS_S.at(-1)!;
   const last_s = window.from_s + width_px / window.px_per_s;
   const found: number[] = [];
   for (let index = Math.ceil(window.from_s / step); index * step <= last_s; index += 1) {
