@@ -345,6 +345,21 @@ PROGRAMS = (
     _web_map(100, 30),
     _web_map(1000, 10),
     Program(
+        "An ended run of 1.5 million records, at its end and at 20 other moments, in Chromium",
+        ("web_replay", "1500000", "20"),
+        ("web_replay", "10000", "2"),
+        (
+            Goal("open_s", "the page of an ended run, until all is drawn", "s", 2),
+            Goal("seek_p50_ms", "the same, to another moment, p50", "ms"),
+            Goal("seek_max_ms", "the same, the longest", "ms", 500),
+            Goal("open_mb", "the same, sent to open it", "MB"),
+            Goal("seek_mb", "the same, sent for another moment", "MB"),
+            Goal("heap_mb", "the same, the heap of the page", "MB"),
+            Goal("first_s", "the same, opened first: its index is made", "s"),
+            Goal("making_late_ms", "the event loop meanwhile, at most late", "ms"),
+        ),
+    ),
+    Program(
         "a run that never waits, all faces but ros",
         ("faces", "cost", FACES, "3000", "3"),
         ("faces", "cost", "mavlink", "50", "1"),
