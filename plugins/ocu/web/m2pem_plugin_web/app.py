@@ -68,7 +68,7 @@ def routers_of(
     tiles = open_tiles(settings.tiles) if settings.tiles is not None else None
     return [
         session.router(control, settings, entry, tiles.pictured if tiles is not None else None),
-        runs.router(control, folder),
+        runs.router(control, folder, hub),
         run_pages.router(control),
         replays.router(control, replaying, services.rehearsals),
         schedule.router(control, folder),

@@ -11,6 +11,7 @@ import httpx
 from fastapi import APIRouter, FastAPI
 from m2pem_plugin_web.access.permissions import SCOPE_KEY
 from m2pem_plugin_web.access.roles import Person, Role
+from m2pem_plugin_web.live.hub import Hub
 from m2pem_plugin_web.problems import handle_problems
 from m2pem_plugin_web.rest import (
     catalogue,
@@ -61,7 +62,7 @@ def app_of(services: Services, *others: APIRouter) -> FastAPI:
     control, folder = services.control, services.folder
     routers = (
         missions.router(control, folder),
-        runs.router(control, folder),
+        runs.router(control, folder, Hub(control)),
         missions.template_router(),
         checks.router(control, folder),
         estimates.router(control, folder),

@@ -1,7 +1,12 @@
 """What browsers ask of runs over HTTP, and how refusals are told."""
 
+from typing import Any
+
 import msgspec
+import pytest
 from m2pem_plugin_web.access.roles import Role
+from m2pem_plugin_web.rest import runs
+from m2pem_plugin_web.rest.record_pages import RecordPages
 from web_world import VEHICLE, MakeWorld
 
 from m2pem.api import RunStatus
@@ -44,6 +49,34 @@ async def test_records_come_by_pages_in_the_form_of_the_command_line(world: Make
         for record, each in zip(records["records"] or (), kept, strict=True):
             line = record_line(each.run, each.seq, round(each.t_s * US), each.record)
             assert bytes(record).startswith(line[:-1] + b',"sentence":')
+
+
+async def test_the_newest_records_of_a_run_are_worded_without_those_before(
+    world: MakeWorld, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async with world() as here:
+        prompt = await here.asked()
+        browser = await here.browser()
+        path = f"/api/runs/{prompt.run}/records"
+        await (await browser.live()).watch(prompt.run)
+
+        async def read(**wanted: object) -> Any:
+            params = {"limit": 3, "changes": False, **wanted}
+            return (await browser.http.get(path, params=params)).json()
+
+        # Newest ones: as those with changes, but for these.
+        exact = await read(changes=True)
+        monkeypatch.setattr(RecordPages, "read", None)  # it reads those before
+        page = await read()
+        assert page["next"] == exact["next"]
+        assert page["records"]
+        for record, other in zip(page["records"], exact["records"], strict=True):
+            other.pop("changes", None)
+            assert record == other
+        monkeypatch.undo()
+        # Older ones: as before.
+        monkeypatch.setattr(runs, "NAMED", 0)
+        assert await read() == await read(changes=True)
 
 
 async def test_records_say_what_they_change_in_the_view(world: MakeWorld) -> None:

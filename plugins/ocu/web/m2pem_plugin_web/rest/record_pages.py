@@ -22,6 +22,12 @@ KEPT_VIEWS = 8
 
 PAGE = 1000
 
+NAMED = 20_000
+"""The newest records of a run that goes on, which are worded with the names of its view of now."""
+
+AT_ONCE = 100
+"""Records that are encoded before other tasks run."""
+
 _encode = msgspec.json.Encoder().encode
 
 
@@ -43,6 +49,19 @@ class RecordPages:
         while len(self._views) > KEPT_VIEWS:
             self._views.popitem(last=False)
         return content
+
+    async def read_newest(self, view: RunView, after: int, limit: int) -> bytes:
+        """Return records among the newest, worded with the names that their run's view has now.
+
+        They come without what they change in the view: no record before them is read.
+        """
+        page = await self._control.records(view.run, after, limit)
+        records: list[msgspec.Raw] = []
+        for first in range(0, len(page), AT_ONCE):
+            part = page[first : first + AT_ONCE]
+            records += [msgspec.Raw(record_of(each, view)) for each in part]
+            await asyncio.sleep(0)
+        return _page(records, page, limit)
 
     async def _view(self, summary: RunSummary, after: int) -> RunView:
         """Return the view after a record; it is made by reading all records before."""
@@ -73,8 +92,12 @@ def new_view(
 
 def page_of(page: Sequence[StampedRecord], view: RunView, limit: int) -> bytes:
     """Apply the records of a page to the view before it; return them as JSON."""
-    after_next = page[-1].seq if len(page) >= limit else None
     records = [msgspec.Raw(each) for each in with_changes(page, view)]
+    return _page(records, page, limit)
+
+
+def _page(records: Sequence[msgspec.Raw], page: Sequence[StampedRecord], limit: int) -> bytes:
+    after_next = page[-1].seq if len(page) >= limit else None
     return _encode({"records": records, "next": after_next})
 
 

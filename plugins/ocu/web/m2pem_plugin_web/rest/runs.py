@@ -11,11 +11,12 @@ from pydantic import BaseModel
 from m2pem.api import Draft, MissionControl, MissionFile, RunStatus, RunSummary
 from m2pem.errors import M2pemError, MissionError
 from m2pem_plugin_web.access.permissions import Commander, Viewer
+from m2pem_plugin_web.live.hub import Hub
 from m2pem_plugin_web.missions.folder import MissionFolder
 from m2pem_plugin_web.problems import RESPONSES
 from m2pem_plugin_web.rest.drafts import WrittenName, of_folder
 from m2pem_plugin_web.rest.models import Body, Data, Name, RecordPage, RunModel, find_run, run_model
-from m2pem_plugin_web.rest.record_pages import RecordPages
+from m2pem_plugin_web.rest.record_pages import NAMED, RecordPages
 
 
 async def shown(control: MissionControl, source: bytes) -> str:
@@ -70,8 +71,8 @@ class RunMissionModel(BaseModel):
     files: list[FileModel]
 
 
-def router(control: MissionControl, folder: MissionFolder) -> APIRouter:
-    """The routes of runs. `folder`: what missions are started from."""
+def router(control: MissionControl, folder: MissionFolder, hub: Hub) -> APIRouter:
+    """The routes of runs. `folder`: what missions are started from; `hub` follows what goes on."""
     routes = APIRouter(prefix="/api/runs", tags=["runs"], responses=RESPONSES)
     pages = RecordPages(control)
 
@@ -114,12 +115,19 @@ def router(control: MissionControl, folder: MissionFolder) -> APIRouter:
         run: str,
         after: Annotated[int, Query(ge=0, le=LARGEST)] = 0,
         limit: Annotated[int, Query(ge=1, le=MOST_RECORDS)] = 1000,
+        changes: bool = True,
     ) -> Response:
         """Records of a run after one of them: 0, or the `next` of the page before.
 
-        A page ends with all records of an input, so that it may have more than `limit`.
+        A page ends with all records of an input, so that it may have more than `limit`. `changes`:
+        false if what each changes in the view is not needed; the newest records of a run that goes
+        on are then read without all those before.
         """
-        content = await pages.read(await find_run(control, run), after, limit)
+        live = hub.runs.get(run) if not changes else None
+        if live is not None and after >= live.view.seq - NAMED:
+            content = await pages.read_newest(live.view, after, limit)
+        else:
+            content = await pages.read(await find_run(control, run), after, limit)
         return Response(content, media_type="application/json")
 
     @routes.get("/{run}/mission")

@@ -62,7 +62,7 @@ export class LiveScene implements Scene {
   constructor(readonly run: string) {
     const path = `/runs/${encodeURIComponent(run)}/records`;
     this.feed = new RecordFeed((after, limit) =>
-      get<Page>(`${path}?after=${after}&limit=${limit}`),
+      get<Page>(`${path}?after=${after}&limit=${limit}&changes=false`),
     );
     this.stopListening = executive.listen((message) => this.take(message));
     this.ticking = setInterval(() => this.tick(), TICK_MS);
