@@ -16,8 +16,8 @@ from m2pem_plugin_web.access.sign_in import SUBPROTOCOL, Entry, key_of
 from m2pem_plugin_web.live import messages
 from m2pem_plugin_web.live.hub import MOST_VIEWERS, Hub
 from m2pem_plugin_web.live.viewer import HEARTBEAT_S, Viewer
-from m2pem_plugin_web.missions.names import LONGEST
 from m2pem_plugin_web.live.wire import WIRE, Wire
+from m2pem_plugin_web.missions.names import LONGEST
 
 LONGEST_MESSAGE = 4096
 """Most bytes of a message from a browser."""
