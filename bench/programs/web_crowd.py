@@ -84,13 +84,13 @@ async def together(
             await join(ocu, 1, "web_tab", run, str(seconds), cores=crowd.cores)
             for _ in range(crowd.tabs)
         ]
-        for each in tabs:
-            assert each.stdout is not None
-            await each.stdout.readline()
+        for tab in tabs:
+            assert tab.stdout is not None
+            await tab.stdout.readline()
         await asyncio.sleep(WARM_S)
-        for each in tabs:
-            assert each.stdin is not None
-            each.stdin.write(b"count\n")
+        for tab in tabs:
+            assert tab.stdin is not None
+            tab.stdin.write(b"count\n")
         turn = await measured(running, run, seconds)
         await running.control.stop(run)
         await running.control.wait(run)
