@@ -140,7 +140,7 @@ def main() -> None:
     own, *others = sorted(os.sched_getaffinity(0))
     os.sched_setaffinity(0, {own})
     crowd = Crowd(browsers, tabs, others or [own])
-    with tempfile.TemporaryDirectory(dir=Path.cwd()) as scratch:
+    with tempfile.TemporaryDirectory() as scratch:
         print(json.dumps(asyncio.run(measure(float(seconds), turns, Path(scratch), crowd))))
 
 

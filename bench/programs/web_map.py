@@ -141,7 +141,7 @@ def main() -> None:
     """Measure, and print the answer."""
     count, seconds = int(sys.argv[1]), float(sys.argv[2])
     picture = sys.argv[3] if len(sys.argv) > 3 else None
-    with tempfile.TemporaryDirectory(dir=Path.cwd()) as scratch:
+    with tempfile.TemporaryDirectory() as scratch:
         print(json.dumps(asyncio.run(measure(count, seconds, Path(scratch), picture))))
 
 

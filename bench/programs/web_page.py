@@ -45,7 +45,7 @@ async def measure(seconds: float, folder: Path) -> dict[str, Any]:
 
 def main() -> None:
     """Measure, and print the answer."""
-    with tempfile.TemporaryDirectory(dir=Path.cwd()) as scratch:
+    with tempfile.TemporaryDirectory() as scratch:
         print(json.dumps(asyncio.run(measure(float(sys.argv[1]), Path(scratch)))))
 
 

@@ -272,7 +272,7 @@ def main() -> None:
     parser.add_argument("--journal", type=Path)
     parser.add_argument("--run")
     arguments = parser.parse_args()
-    with tempfile.TemporaryDirectory(dir=Path.cwd()) as scratch:
+    with tempfile.TemporaryDirectory() as scratch:
         print(json.dumps(asyncio.run(measure(arguments, Path(scratch)))))
 
 

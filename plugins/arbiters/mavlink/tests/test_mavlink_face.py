@@ -111,10 +111,8 @@ def test_a_vehicle_that_a_mission_has_is_refused_until_the_station_takes_it(tmp_
             holder = (await control.holders())["rover1"]
             assert holder.startswith("mavlink 254/190")
             async with asyncio.timeout(20):  # it is announced each five seconds
-                while (
-                    not [  # noqa: ASYNC110  # what is waited for has no event
-                        each for each in await control.operators() if each.by == holder
-                    ]
+                while all(  # noqa: ASYNC110  # what is waited for has no event
+                    each.by != holder for each in await control.operators()
                 ):
                     await asyncio.sleep(0.05)
             async with ground_station(port, system=253) as other:

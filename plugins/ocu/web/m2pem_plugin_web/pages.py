@@ -29,7 +29,12 @@ ADDRESSES = (
 FOR_EVER = "public, max-age=31536000, immutable"
 """Files below assets/ have a hash of their content in their names."""
 
-TYPES = {".js": "text/javascript", ".mjs": "text/javascript", ".woff2": "font/woff2"}
+TYPES = {
+    ".js": "text/javascript",
+    ".mjs": "text/javascript",
+    ".webmanifest": "application/manifest+json",
+    ".woff2": "font/woff2",
+}
 COMPRESSED = ("text/", "application/json", "image/svg+xml", "application/javascript")
 SMALLEST = 1000
 """Bytes below which compression gains nothing."""

@@ -98,13 +98,21 @@ async def page_at(
     width: int = 1280,
     height: int = 720,
     dark: bool = False,
+    language: str = "en-US",
+    offline: bool = False,
 ) -> AsyncIterator[Watched]:
-    """A page of its own profile, so of its own operator, at an address."""
+    """A page of its own profile, so of its own operator, at an address.
+
+    `offline`: it keeps its own files, which other tests do without: what they do to its requests
+    would pass the service worker by.
+    """
     context = await started.new_context(
         viewport={"width": width, "height": height},
         color_scheme="dark" if dark else "light",
         reduced_motion="reduce",
         accept_downloads=True,
+        locale=language,
+        service_workers="allow" if offline else "block",
         permissions=["clipboard-read", "clipboard-write"],
     )
     context.set_default_timeout(TIMEOUT_MS)

@@ -1,6 +1,7 @@
 import preact from "@preact/preset-vite";
 import type { Plugin } from "vite";
 import { defineConfig } from "vitest/config";
+import { offlineShell } from "./offlineShell.ts";
 import { scaledSheets } from "./scaledSheets.ts";
 
 const NOTHING = "/src/editor/stubs/nothing.ts";
@@ -25,7 +26,7 @@ function leanPropertiesPanel(): Plugin {
 
 // The page is served by m2pem_plugin_web, from the folder that is built here.
 export default defineConfig({
-  plugins: [leanPropertiesPanel(), preact()],
+  plugins: [leanPropertiesPanel(), preact(), offlineShell()],
   css: { postcss: { plugins: [scaledSheets()] } },
   build: {
     outDir: "../m2pem_plugin_web/static",

@@ -1,7 +1,11 @@
 // The frame around every page: where one is, who one is, what moves, and how to stop it.
+import { signal } from "@preact/signals";
 import { render } from "preact";
 import { useEffect } from "preact/hooks";
 import { followAlerts } from "./alerts/alerts";
+import { keepShell } from "./offline/keepShell";
+import { followLastKnown } from "./offline/lastKnown";
+import { NoConnection } from "./offline/NoConnection";
 import { connect } from "./shared/executive";
 import { Header } from "./shared/Header";
 import { loaded } from "./shared/loaded";
@@ -43,8 +47,12 @@ function Page() {
   }
 }
 
+/** false: the executive did not answer when it was asked last. */
+const isAnswered = signal(true);
+
 async function begin(token: string): Promise<void> {
   const answered = token ? await redeem(token) : await loadSession();
+  isAnswered.value = answered;
   if (!answered) setTimeout(() => void begin(token), 2000);
   else if (session.value === null) toSignIn();
   else connect();
@@ -59,6 +67,7 @@ function App() {
       <Header />
       <main id="main" tabIndex={-1}>
         {known && mayLook && <Page />}
+        {!known && !isAnswered.value && <NoConnection />}
       </main>
       <div id="dialogs" />
       <Toasts />
@@ -68,4 +77,6 @@ function App() {
 
 followStandbys();
 followAlerts();
+followLastKnown();
+keepShell();
 render(<App />, document.getElementById("page")!);

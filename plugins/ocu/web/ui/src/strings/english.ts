@@ -7,6 +7,7 @@ import { control } from "./control";
 import { editor } from "./editor";
 import { fleet } from "./fleet";
 import { home } from "./home";
+import { offline } from "./offline";
 import { operate } from "./operate";
 import { people } from "./people";
 import { plan } from "./plan";
@@ -21,6 +22,7 @@ import { estimates, terrain } from "./terrain";
 export const english = {
   shell,
   settings,
+  offline,
   signIn,
   home,
   busy,

@@ -1,4 +1,4 @@
-// Texts of the settings of a browser, and of what the page says while it cannot reach the executive.
+// Texts of the settings of a browser.
 export const settings = {
   title: "Settings",
   hint: "For this browser. They are kept until its data are deleted.",

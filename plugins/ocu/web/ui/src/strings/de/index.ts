@@ -23,6 +23,7 @@ import { control } from "./control";
 import { editor } from "./editor";
 import { fleet } from "./fleet";
 import { home } from "./home";
+import { offline } from "./offline";
 import { operate } from "./operate";
 import { people } from "./people";
 import { plan } from "./plan";
@@ -35,6 +36,7 @@ import { shell, signIn } from "./shell";
 export const german: Translation<English> = {
   shell,
   settings,
+  offline,
   signIn,
   home,
   busy,
