@@ -4,6 +4,7 @@ import asyncio
 import importlib
 import logging
 from collections.abc import Callable
+from dataclasses import replace
 
 import click
 
@@ -12,8 +13,9 @@ from m2pem.api.control import MissionControl
 from m2pem.api.face import Face, FaceSettings
 from m2pem.cli.ocus import NO_UNIT
 from m2pem.cli.options import UnusableError
-from m2pem.errors import PluginError
+from m2pem.errors import M2pemError, PluginError
 from m2pem.fleet.fleet import Fleet
+from m2pem.fleet.fleet_file import load_fleet
 from m2pem.plugins import PluginManager
 
 log = logging.getLogger("m2pem.face")
@@ -33,6 +35,19 @@ def chosen_faces(names: str | None, fleet: Fleet) -> tuple[str, ...]:
     if not wanted or NO_UNIT in wanted:
         raise click.UsageError(f"--face {names!r}: name faces, or `{NO_UNIT}` alone")
     return wanted
+
+
+def with_faces_of_file(fleet: Fleet) -> Fleet:
+    """Return a fleet of a journal with the faces of its file, which journals do not have.
+
+    A file that cannot be read any more, or is that of another fleet, has none.
+    """
+    try:
+        written = load_fleet(fleet.file)
+    except M2pemError as error:
+        log.info("faces: %s", error)
+        return fleet
+    return replace(fleet, faces=written.faces) if written.name == fleet.name else fleet
 
 
 class Faces:

@@ -11,6 +11,7 @@ from m2pem.cli.options import (
     UnusableError,
     answers_option,
     example,
+    face_option,
     format_option,
     journal_option,
     ocu_option,
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 @run_argument
 @journal_option
 @ocu_option
+@face_option
 @answers_option
 @click.option("--stop", is_flag=True, help="Stop the run, and the vehicles, at once.")
 @format_option
@@ -32,20 +34,23 @@ def resume(
     run_id: str,
     journal: str | None,
     ocu_names: str | None,
+    face_names: str | None,
     answers: Path | None,
     stop: bool,
     output: str,
 ) -> int:
     """Take up a run that was interrupted.
 
-    The mission, the fleet, whether it is simulated, and its speed, are in the journal. Ends as
-    `m2pem run` does.
+    The mission, the fleet, whether it is simulated, and its speed, are in the journal; the faces
+    are those of the fleet file. Ends as `m2pem run` does.
     """
     from m2pem.cli.interruption import Interruption
 
     with Interruption() as interruption:
         return asyncio.run(
-            _resume(run_id, journal, ocu_names, answers, output, interruption, stop=stop)
+            _resume(
+                run_id, journal, ocu_names, face_names, answers, output, interruption, stop=stop
+            )
         )
 
 
@@ -53,6 +58,7 @@ async def _resume(
     run_id: str,
     journal_url: str | None,
     ocu_names: str | None,
+    face_names: str | None,
     answers_file: Path | None,
     output: str,
     interruption: "Interruption",
@@ -62,6 +68,7 @@ async def _resume(
     from m2pem.api.clock import SystemClock
     from m2pem.api.operator import operator_name
     from m2pem.cli.arguments import get_answers
+    from m2pem.cli.faces import Faces, with_faces_of_file
     from m2pem.cli.journals import existing_journal, find_run, last_decided_us, url_of
     from m2pem.cli.ocus import Operators, chosen
     from m2pem.cli.output import output_of
@@ -84,15 +91,18 @@ async def _resume(
             raise UnusableError(f"{run_id} is being driven by an executive that is alive")
         mission = mission_of(header)
         answers = get_answers(answers_file, mission)
+        fleet = fleet_of(header)
+        faces = Faces(face_names, with_faces_of_file(fleet), plugins)
         # Simulated time may have run ahead of the wall clock; it never goes back.
         start_us = max(time.time_ns() // 1000, await last_decided_us(journal, line))
         executive = make_executive(
-            fleet_of(header),
+            fleet,
             journal,
             plugins,
             SystemClock(header.speed, start_us),
             answers=answers,
         )
+        faces.make(executive.control)
         executive.expect_interrupted([run_id])
         with output_of(output) as out:
 
@@ -116,6 +126,7 @@ async def _resume(
                 file_of(url_of(journal_url)),
                 interruption,
                 take_up,
+                faces,
             )
         tidy_up(executive, file_of(url_of(journal_url)))
     return status

@@ -88,6 +88,19 @@ def test_the_faces_of_the_fleet_file_are_served_and_may_command(
     assert '"by":"echo"' in m2pem.run("replay", "r2", "--format", "json")[1].replace(" ", "")
 
 
+def test_a_run_that_is_resumed_has_the_faces_of_its_fleet_file(
+    m2pem: CommandLine, tmp_path: Path, words: Words
+) -> None:
+    seen = tmp_path / "noted.txt"
+    program = m2pem.start(*words("{}")[:-1], "20", "--format", "json")
+    program.until_record("EventAwaited")
+    program.kill()
+    words(f"{{echo: {{file: {seen}}}}}")
+    status, _, errors = m2pem.run("resume", "r1", "--ocu", "none")
+    assert status == 0, errors
+    assert seen.read_text() == "goto of ugv2: completed"
+
+
 def test_none_serves_none(m2pem: CommandLine, tmp_path: Path, words: Words) -> None:
     seen = tmp_path / "noted.txt"
     assert m2pem.run(*words(f"{{echo: {{file: {seen}}}}}"), "--face", "none")[0] == 0
