@@ -27,6 +27,8 @@ ON_DEMAND = (
     "SettingsDialog-*.*",
     "hls.light-*.js",
     "de-*.js",
+    "CompareDialog-*.*",
+    "RouteMap-*.*",
 )
 """Loaded by no page, but by a button of one, or for those who chose a language."""
 

@@ -1,5 +1,6 @@
 // The page on which a mission is drawn.
 import { useEffect, useRef, useState } from "preact/hooks";
+import { comparing } from "../compare/comparing";
 import { ApiError } from "../shared/api";
 import { edit } from "../shared/executive";
 import { loaded } from "../shared/loaded";
@@ -30,6 +31,8 @@ const words = strings.editor;
 
 /** Leaflet, and what plays rehearsals: for those who look at the map. */
 const MapPanel = loaded(() => import("./map/MapPanel"));
+
+const CompareDialog = lazy(() => import("../compare/CompareDialog"));
 
 /** Of a tablet held upright: blocks are then in the menus alone, until the user asks for more. */
 const NARROW = 1000;
@@ -96,7 +99,10 @@ function Workplace({ work, fail }: WorkplaceProps) {
   useEffect(() => followKeys(work), [work]);
   useEffect(() => {
     edit(work.mission);
-    return () => edit(null);
+    return () => {
+      edit(null);
+      comparing.value = null;
+    };
   }, [work]);
   useEffect(() => {
     // Somebody may have drawn a route or area on the map in the meantime.
@@ -160,6 +166,11 @@ function Workplace({ work, fail }: WorkplaceProps) {
         {showsPanel && <SidePanel editor={session} />}
       </div>
       <Questions work={work} />
+      {comparing.value && (
+        <Suspense fallback={null}>
+          <CompareDialog editor={session} />
+        </Suspense>
+      )}
     </div>
   );
 }

@@ -9,6 +9,11 @@ declare module "bpmn-moddle" {
   }
 }
 
+declare module "bpmn-js-differ" {
+  type Element = import("./moddle/moddle").ModdleElement;
+  export function diff(before: Element, after: Element): { _layoutChanged: Record<string, Element> };
+}
+
 declare module "@bpmn-io/properties-panel" {
   export const Group: import("preact").ComponentType<Record<string, unknown>>;
 }

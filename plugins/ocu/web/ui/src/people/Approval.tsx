@@ -1,6 +1,7 @@
 // Who has approved the mission, who must, and what has changed since an earlier approval.
 import { useSignal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
+import { comparing } from "../compare/comparing";
 import { get } from "../shared/api";
 import { command } from "../shared/command";
 import { may, session } from "../shared/session";
@@ -25,7 +26,7 @@ interface State {
   editors: string[];
   approvals: Given[];
   not_counted: Given[];
-  earlier: (Given & { changed: string[] })[];
+  earlier: (Given & { changed: string[]; version: number | null })[];
 }
 
 export function Approval({ mission, isDirty }: { mission: string; isDirty: boolean }) {
@@ -73,9 +74,18 @@ export function Approval({ mission, isDirty }: { mission: string; isDirty: boole
         {now.not_counted.map(({ by }) => (
           <li key={by}>{fill(words.notCounted, { by })}</li>
         ))}
-        {now.earlier.map(({ by, at_us, changed }) => (
+        {now.earlier.map(({ by, at_us, changed, version }) => (
           <li key={`${by} ${at_us}`}>
-            {fill(words.earlier, { by, when: when(at_us), changed: changed.join(", ") })}
+            {fill(words.earlier, { by, when: when(at_us), changed: changed.join(", ") })}{" "}
+            {version !== null && (
+              <button
+                type="button"
+                class="secondary"
+                onClick={() => (comparing.value = { before: version, after: "drawn" })}
+              >
+                {strings.compare.since}
+              </button>
+            )}
           </li>
         ))}
       </ul>

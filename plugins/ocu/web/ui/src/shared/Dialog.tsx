@@ -14,6 +14,8 @@ export interface DialogProps {
   /** Buttons at the foot. */
   actions?: ComponentChildren;
   wide?: boolean;
+  /** As large as the page. */
+  full?: boolean;
 }
 
 const FOCUSABLE = "input, select, textarea, button, a[href], [tabindex='0']";
@@ -31,7 +33,7 @@ function keepBehind(): () => void {
   };
 }
 
-export function Dialog({ title, onClose, children, actions, wide = false }: DialogProps) {
+export function Dialog({ title, onClose, children, actions, wide = false, full = false }: DialogProps) {
   const dialog = useRef<HTMLDivElement>(null);
   const heading = useUniqueId();
   useEffect(() => {
@@ -49,7 +51,7 @@ export function Dialog({ title, onClose, children, actions, wide = false }: Dial
     <div class="dialog-layer">
       <div
         ref={dialog}
-        class={wide ? "dialog dialog-wide" : "dialog"}
+        class={`dialog${wide ? " dialog-wide" : ""}${full ? " dialog-full" : ""}`}
         role="dialog"
         tabIndex={-1}
         aria-labelledby={heading}

@@ -89,6 +89,9 @@ export const speed = signal(1);
 /** Rises when it is to be read again who is present, and who asks whom. */
 export const operatorChanges = signal(0);
 
+/** Of which mission the comments are to be read again; "": of all. */
+export const commentChanges = signal<{ mission: string }>({ mission: "" });
+
 /** Rises when the schedule is to be read again. */
 export const scheduleChanges = signal(0);
 
@@ -118,6 +121,7 @@ function take(message: ServerMessage): void {
     case "snapshot":
       alertChanges.value += 1;
       operatorChanges.value += 1;
+      commentChanges.value = { mission: "" };
       scheduleChanges.value += 1;
       spaceChanges.value += 1;
       speed.value = message.speed;
@@ -165,6 +169,9 @@ function take(message: ServerMessage): void {
       break;
     case "operators":
       operatorChanges.value += 1;
+      break;
+    case "comments":
+      commentChanges.value = { mission: message.mission };
       break;
     case "schedule":
       scheduleChanges.value += 1;

@@ -373,6 +373,7 @@ export type ServerMessage =
   | { type: "notice"; seq: number; text: string }
   | { type: "alerts"; seq: number }
   | { type: "operators"; seq: number }
+  | { type: "comments"; seq: number; mission: string }
   | { type: "schedule"; seq: number }
   | { type: "shared_space"; seq: number }
   | { type: "alive"; seq: number }

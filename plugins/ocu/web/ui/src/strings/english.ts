@@ -3,6 +3,8 @@ import { alerts } from "./alerts";
 import { busy } from "./busy";
 import { cameras } from "./cameras";
 import { requirements, verify } from "./checks";
+import { comments } from "./comments";
+import { compare } from "./compare";
 import { control } from "./control";
 import { editor } from "./editor";
 import { fleet } from "./fleet";
@@ -28,6 +30,8 @@ export const english = {
   busy,
   alerts,
   people,
+  comments,
+  compare,
   editor,
   plan,
   survey,

@@ -83,6 +83,13 @@ function Conflict({ work, question, close }: QuestionProps<"conflict">) {
       }
     >
       <p>{text}</p>
+      {current && (
+        <p>
+          <button type="button" class="secondary" onClick={() => void work.compareTheirs()}>
+            {strings.compare.theirs}
+          </button>
+        </p>
+      )}
       <p class="m2-note">{words.conflict.kept}</p>
     </Dialog>
   );

@@ -5,6 +5,7 @@ import { go } from "../../shared/router";
 import { may } from "../../shared/session";
 import { toast } from "../../shared/Toasts";
 import { fill, strings } from "../../strings";
+import { comparing } from "../../compare/comparing";
 import { Autosave } from "./Autosave";
 import type { Catalogue } from "./catalogue";
 import { dropDraft, readDraft, type Draft } from "./drafts";
@@ -14,6 +15,7 @@ import {
   openMission,
   openVersion,
   saveMission,
+  versionsOf,
   type SavedVersion,
 } from "../../missions/files";
 
@@ -33,8 +35,8 @@ export class MissionWork {
   readonly notes = signal<readonly string[]>([]);
   readonly saved = signal<SavedVersion | null>(null);
   readonly isSaving = signal(false);
-  /** Brings back where everything was before it was laid out anew. */
-  readonly putBack = signal<(() => Promise<void>) | null>(null);
+  /** Brings back what was drawn before something else was put in its place; `text` says what. */
+  readonly putBack = signal<{ text: string; act: () => Promise<void> } | null>(null);
   private readonly autosave: Autosave;
 
   constructor(
@@ -86,6 +88,30 @@ export class MissionWork {
     return this.put(this.mission, this.saved.peek()?.version ?? null);
   }
 
+  /** What was saved last beside what is drawn here; if that is the same, beside the one before. */
+  async compare(): Promise<void> {
+    try {
+      const all = await versionsOf(this.mission);
+      const last = all.at(-1)?.number;
+      if (last === undefined) return toast(words.versions.none);
+      const isDirty = this.session.isDirty.peek();
+      const [before, after] = isDirty ? [last, "drawn" as const] : [Math.max(1, last - 1), last];
+      comparing.value = { before, after };
+    } catch {
+      toast(words.versions.failed, "bad");
+    }
+  }
+
+  /** What another user saved meanwhile beside what is drawn here. The question stays open. */
+  async compareTheirs(): Promise<void> {
+    try {
+      const last = (await versionsOf(this.mission)).at(-1)?.number;
+      if (last !== undefined) comparing.value = { before: last, after: "drawn" };
+    } catch {
+      toast(words.versions.failed, "bad");
+    }
+  }
+
   /** Over a version that another user saved: theirs is kept as an older one. */
   async overwrite(current: SavedVersion | null): Promise<boolean> {
     return this.put(this.mission, current?.version ?? null);
@@ -99,12 +125,21 @@ export class MissionWork {
     return true;
   }
 
+  /** What is drawn here can be brought back, and stays a draft of this browser until then. */
   async takeTheirs(): Promise<void> {
+    const mine = await this.session.xml();
+    const base = this.saved.peek();
     const file = await openMission(this.mission);
     this.saved.value = file;
     this.notes.value = file.notes;
     await this.session.open(file.xml, true);
-    this.autosave.drop();
+    this.putBack.value = {
+      text: words.conflict.taken,
+      act: async () => {
+        await this.session.open(mine, false);
+        if (base) this.saved.value = base;
+      },
+    };
   }
 
   async openVersion(number: number): Promise<void> {
@@ -131,7 +166,10 @@ export class MissionWork {
     const before = await this.session.xml();
     const { xml } = await makeEditable(before, true);
     await this.session.open(xml, false);
-    this.putBack.value = () => this.session.open(before, false);
+    this.putBack.value = {
+      text: words.file.laidOut,
+      act: () => this.session.open(before, false),
+    };
   }
 
   end(): void {

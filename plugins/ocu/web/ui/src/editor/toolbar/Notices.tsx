@@ -22,11 +22,11 @@ export function Notices({ work }: { work: MissionWork }) {
       )}
       {undo && (
         <Notice
-          text={words.file.laidOut}
+          text={undo.text}
           action={words.file.putBack}
           act={() => {
             putBack.value = null;
-            void undo();
+            void undo.act();
           }}
           close={() => (putBack.value = null)}
         />

@@ -124,6 +124,10 @@ function FileMenu({ work }: { work: MissionWork }) {
   const items: MenuItem[] = [
     ...(may("commander") ? [{ label: texts.saveAs, act: ask("saveAs") }] : []),
     { label: texts.versions, act: ask("versions") },
+    {
+      label: strings.compare.open,
+      act: () => void work.compare(),
+    },
     { label: texts.upload, act: () => file.current?.click() },
     {
       label: texts.download,

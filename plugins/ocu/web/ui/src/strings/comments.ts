@@ -1,0 +1,22 @@
+// Comments on the elements of a mission.
+export const comments = {
+  title: "Comments",
+  ofElement: "Comment on {element}",
+  ofMission: "Comment on the mission as a whole",
+  hint: "Select an element to comment on it. All who have the mission open see it at once. Comments are kept beside the mission, not in its file: they change no approval.",
+  add: "Add comment",
+  answer: "Answer",
+  answerTo: "Answer to {by}",
+  send: "Send",
+  resolve: "Resolve",
+  reopen: "Open again",
+  remove: "Delete",
+  none: "No comments yet.",
+  show: "Show {element}",
+  whole: "The mission",
+  gone: "{label} (not in this version)",
+  resolved: "resolved by {by}",
+  said: "{by}, {at}",
+  badge: { one: "{count} open comment on {element}", many: "{count} open comments on {element}" },
+  viewer: "Operators and commanders comment.",
+} as const;
