@@ -29,6 +29,10 @@ async function give<T>(limit_ms: number, send: (options: Options) => Promise<T>)
 export const start = <T>(path: string, body: unknown): Promise<T> =>
   give(START_MS, (options) => post<T>(path, body, options));
 
+/** Give a command that may be refused for a reason that the page asks about. */
+export const order = <T>(path: string, body: unknown): Promise<T> =>
+  give(ANSWER_MS, (options) => post<T>(path, body, options));
+
 /** Put something in place of what is there. */
 export const replace = (path: string, body: unknown): Promise<unknown> =>
   give(ANSWER_MS, (options) => put(path, body, options));

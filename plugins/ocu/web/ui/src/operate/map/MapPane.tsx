@@ -1,5 +1,6 @@
 // Where everybody is; and routes, areas and points, which operators draw for the mission.
 import { useComputed, useSignal } from "@preact/signals";
+import { lazy, Suspense } from "preact/compat";
 import { useEffect, useRef } from "preact/hooks";
 import { clock, STALE_S } from "../../shared/format";
 import { unknownSince } from "../../shared/executive";
@@ -20,6 +21,9 @@ import "./map.css";
 
 const text = strings.operate.map;
 
+/** Few operators look at it in a run. */
+const VersionsPanel = lazy(() => import("./VersionsPanel"));
+
 const SHOWS: MapShows = { trails: true, names: true, footprints: true, geometries: true };
 const AGES_MS = 500;
 
@@ -29,6 +33,8 @@ export function MapPane({ formInside }: { formInside: boolean }) {
   const host = useRef<HTMLDivElement>(null);
   const view = useRef<MapView>();
   const listed = useSignal<readonly VehicleMark[]>([]);
+  const versionsOf = useSignal("");
+  const compared = useSignal<GeoJSON.Geometry | null>(null);
   const shows = useSignal<MapShows>({ ...SHOWS, ...remembered<Partial<MapShows>>("map", {}) });
 
   useEffect(() => {
@@ -71,6 +77,7 @@ export function MapPane({ formInside }: { formInside: boolean }) {
       }),
       centred.subscribe((wanted) => wanted && made.centre(wanted.resource)),
       draft.subscribe((now) => made.draw(now)),
+      compared.subscribe((now) => made.compare(now)),
       shows.subscribe((now) => {
         made.vehicles.show(now);
         made.turnGeometries(now.geometries);
@@ -104,6 +111,7 @@ export function MapPane({ formInside }: { formInside: boolean }) {
           onFit={() => view.current?.fitAll()}
           onDraw={(kind: Kind) => (draft.value = emptyDraft(kind))}
           onEdit={(geometry) => (draft.value = draftOf(geometry))}
+          onVersions={(name) => (versionsOf.value = name)}
         />
       }
     >
@@ -119,6 +127,11 @@ export function MapPane({ formInside }: { formInside: boolean }) {
       />
       <VehicleList vehicles={listed} />
       {formInside && draft.value && <DrawForm draft={draft.value} />}
+      {!draft.value && versionsOf.value && (
+        <Suspense fallback={<p class="nothing">{strings.operate.run.loading}</p>}>
+          <VersionsPanel name={versionsOf} compared={compared} />
+        </Suspense>
+      )}
       <Nobody />
     </Pane>
   );

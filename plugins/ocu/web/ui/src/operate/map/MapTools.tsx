@@ -1,7 +1,7 @@
 // What the map shows, whom it follows, and what is drawn on it.
 import type { Signal } from "@preact/signals";
 import { Menu } from "../../shared/Menu";
-import { strings } from "../../strings";
+import { fill, strings } from "../../strings";
 import type { Fleet, Geometry } from "../../shared/types";
 import type { Kind } from "../../map/draft";
 
@@ -23,6 +23,7 @@ export interface MapToolsProps {
   onFit: () => void;
   onDraw: (kind: Kind) => void;
   onEdit: (geometry: Geometry) => void;
+  onVersions: (name: string) => void;
 }
 
 const DRAWN: [Kind, string][] = [
@@ -34,7 +35,7 @@ const DRAWN: [Kind, string][] = [
 const SHOWN = ["trails", "names", "footprints", "geometries"] as const;
 
 export function MapTools(props: MapToolsProps) {
-  const { fleet, followed, shows, geometries, mayDraw, onFit, onDraw, onEdit } = props;
+  const { fleet, followed, shows, geometries, mayDraw, onFit, onDraw, onEdit, onVersions } = props;
   return (
     <div class="tools">
       <select
@@ -80,6 +81,12 @@ export function MapTools(props: MapToolsProps) {
             disabled: !mayDraw,
             act: () => onEdit(geometry),
           })),
+          ...geometries
+            .filter(({ from }) => from !== "mission")
+            .map(({ name }) => ({
+              label: fill(text.versions.open, { name }),
+              act: () => onVersions(name),
+            })),
         ]}
       >
         {text.draw} ▾

@@ -38,6 +38,7 @@ export class MapView {
   private readonly geometries = L.layerGroup();
   private readonly spaces = L.layerGroup();
   private readonly drafted = L.layerGroup();
+  private readonly compared = L.layerGroup();
   private readonly observer: ResizeObserver;
   private readonly corridors = new WeakMap<L.Layer, number | null>();
   private isDrawing = false;
@@ -56,6 +57,7 @@ export class MapView {
       this.widenCorridors();
     });
     this.drafted.addTo(this.map);
+    this.compared.addTo(this.map);
     this.vehicles = new VehicleLayer(this.map, fleet);
     this.map.on("click", ({ latlng, containerPoint }) => {
       if (this.isDrawing) return listener.clicked(vertexOf(latlng));
@@ -157,6 +159,22 @@ export class MapView {
       if (size < Infinity) element.classList.toggle("map-unnamed", !hasRoom);
       if (hasRoom) kept.push(box);
     });
+  }
+
+  /** A former version beside what is there now, which stays as it is. */
+  compare(geometry: GeoJSON.Geometry | null): void {
+    this.compared.clearLayers();
+    if (!geometry) return;
+    const style = { color: DRAFT, weight: 4, dashArray: "2 8", fill: false, interactive: false };
+    const layer = L.geoJSON(geometry, {
+      style,
+      pointToLayer: (_, at) => L.circleMarker(at, { ...style, radius: 10 }),
+    });
+    layer.addTo(this.compared);
+    const bounds = layer.getBounds();
+    if (bounds.isValid() && !this.map.getBounds().contains(bounds)) {
+      this.map.fitBounds(bounds.extend(this.map.getBounds()), { animate: false });
+    }
   }
 
   turnGeometries(on: boolean): void {
