@@ -20,6 +20,8 @@ export const alerts: Translation<typeof english.alerts> = {
   disown: "Abgeben",
   disownLabel: "Sich nicht mehr um {alert} kümmern: {text}",
   owner: "{who} kümmert sich",
+  earlier: "Frühere Meldungen dieser Seite",
+  clearEarlier: "Leeren",
   all: "Alle Alarme und ihr Verlauf",
   open: "Offen",
   history: "Vorbei",
@@ -49,11 +51,14 @@ export const alerts: Translation<typeof english.alerts> = {
   settings: "Ton und Mitteilungen",
   settingsHint: "Für diesen Browser. Was zusammen eintrifft, wird einmal gemeldet.",
   sound: "Ton",
+  sounds: "Ton: {which}. Die Einstellungen sind auf der Seite aller Alarme.",
+  silent: "Der Browser lässt diese Seite stumm, bis Sie sie anklicken oder eine Taste drücken.",
   soundFrom: {
     off: "aus",
     critical: "bei kritischen",
     error: "ab Fehlern",
     warning: "ab Warnungen",
+    notice: "bei allen",
   },
   repeated:
     "Kritische Alarme ertönen alle fünf Sekunden erneut, bis ein Operator sie quittiert.",

@@ -11,7 +11,8 @@ export const busy: Translation<typeof english.busy> = {
   nothing: "von der Mission genannt, derzeit von keiner Aufgabe belegt",
   free: "jetzt frei",
   wait: "In die Warteschlange",
-  waitHint: "Sie startet, sobald alle ihre Fahrzeuge frei sind.",
+  waitHint:
+    "„In die Warteschlange“ startet sie, sobald alle ihre Fahrzeuge frei sind.",
   queued: "{mission} wartet als {entry}, bis ihre Fahrzeuge frei sind.",
   choose: "Andere Fahrzeuge wählen",
   chooseHint:
@@ -20,6 +21,8 @@ export const busy: Translation<typeof english.busy> = {
   stopSure: "{run} stoppen: Die Mission endet",
   stopping: "{run} wird gestoppt. Seine Fahrzeuge sind frei, wenn sie angehalten haben.",
   start: "Jetzt starten",
+  startHint:
+    "„Trotzdem starten“ startet sie sofort. Eine Aufgabe, deren Fahrzeug belegt ist, wartet dann, schlägt fehl oder nimmt es nach ihrer Priorität, wie Mission und Flotte es bestimmen.",
   yes: "Trotzdem starten",
   no: "Nicht starten",
 };

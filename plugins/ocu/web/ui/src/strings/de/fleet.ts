@@ -51,6 +51,8 @@ export const fleet: Translation<typeof english.fleet> = {
     failsafe: "Failsafe",
     position: "Position",
   },
+  showCameras: "Zeigen, was seine Kameras sehen",
+  hideCameras: "Verbergen, was seine Kameras sehen",
   sorted: { ascending: "aufsteigend sortiert", descending: "absteigend sortiert" },
   health: {
     ok: "In Ordnung",
@@ -58,6 +60,7 @@ export const fleet: Translation<typeof english.fleet> = {
     lowBattery: "Akku schwach",
     notReady: "Nicht bereit",
     unheard: "Noch kein Zustand",
+    unknown: "Nicht bekannt",
     lost: "Verloren",
   },
   links: { connected: "verbunden", degraded: "schwach", lost: "VERLOREN", unknown: "–" },
@@ -106,6 +109,8 @@ export const fleet: Translation<typeof english.fleet> = {
     title: "Befehle",
     take: "Übernehmen",
     giveBack: "Zurückgeben",
+    request: "Darum bitten",
+    requestMany: "Um sie bitten",
     hold: "Anhalten",
     resume: "Fortsetzen",
     other: "Anderes Verhalten",
@@ -124,6 +129,7 @@ export const fleet: Translation<typeof english.fleet> = {
     verbs: {
       take: "{names} übernehmen",
       "give-back": "{names} zurückgeben",
+      request: "Um {names} bitten",
       hold: "{names} anhalten",
       resume: "{names} fortsetzen",
       execute: "{behavior}: {names}",
@@ -136,6 +142,7 @@ export const fleet: Translation<typeof english.fleet> = {
     confirm: {
       take: "Übernehmen",
       "give-back": "Zurückgeben",
+      request: "Bitten",
       hold: "Anhalten",
       resume: "Fortsetzen",
       execute: "Befehl geben",
@@ -151,6 +158,7 @@ export const fleet: Translation<typeof english.fleet> = {
     done: {
       take: "Sie haben {names}.",
       "give-back": "{names}: an die Missionen zurückgegeben.",
+      request: "{names}: Übergabe erbeten.",
       hold: "{names}: angehalten.",
       resume: "{names}: geht weiter.",
       execute: "{names}: {behavior} wurde befohlen.",

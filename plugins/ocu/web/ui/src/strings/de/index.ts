@@ -6,7 +6,7 @@
 // hold / resume = anhalten / fortsetzen, link = Verbindung, alert = Alarm, acknowledge = quittieren,
 // incident = Störung, rehearsal = Probelauf, verification = Verifikation, check = Prüfung,
 // replay = Wiedergabe, schedule = Zeitplan, draft = Entwurf, route / area / point = Route / Gebiet /
-// Punkt, vertex = Stützpunkt, footprint = Sichtfeld, log = Protokoll, time line = Zeitleiste.
+// Punkt, survey = Vermessung, pass = Bahn, ground / terrain = Gelände, vertex = Stützpunkt, footprint = Sichtfeld, log = Protokoll, time line = Zeitleiste.
 // STOP has one name on every device, and keeps it.
 //
 // BPMN: task = Aufgabe, gateway = Gateway, sequence flow = Sequenzfluss, start / end / boundary event =
@@ -32,6 +32,8 @@ import { begin, run } from "./run";
 import { runs } from "./runs";
 import { settings } from "./settings";
 import { shell, signIn } from "./shell";
+import { survey } from "./survey";
+import { estimates, terrain } from "./terrain";
 
 export const german: Translation<English> = {
   shell,
@@ -44,6 +46,9 @@ export const german: Translation<English> = {
   people,
   editor,
   plan,
+  survey,
+  terrain,
+  estimates,
   control,
   verify,
   requirements,

@@ -170,7 +170,6 @@ export const operate: Translation<typeof english.operate> = {
   },
   incidents: {
     title: "{task} ist gestoppt (Lauf {run})",
-    held: "dafür festgehalten: {resources}",
     decides: "für {role}",
     choice: "Was zu tun ist",
     choices: {
@@ -189,6 +188,7 @@ export const operate: Translation<typeof english.operate> = {
     preview: "Was folgt daraus?",
     decide: "Entscheiden",
     anyway: "Trotzdem entscheiden",
+    next: "Nächste Störung ({number} von {count})",
   },
   signals: {
     title: "Signal senden",
@@ -222,7 +222,10 @@ export const operate: Translation<typeof english.operate> = {
     does: "tut",
     idle: "nichts",
     heldBy: "bei {by}",
-    heldByRun: "gesteuert von Lauf {run}",
+    vehicleOfRun: "Fahrzeug eines anderen Laufs: {task}",
+    payloadOfRun: "Nutzlast eines anderen Laufs: {task}",
+    waitedFor: "erwartet von {tasks}",
+    moreWait: "{count} weitere",
     keptByRun: "von Lauf {run} zwischen Aufgaben behalten",
     heldForIncident: "festgehalten für Störung {incident}",
     take: "Übernehmen",
@@ -268,6 +271,8 @@ export const operate: Translation<typeof english.operate> = {
     none: "Nichts passt dazu",
     skipped: "{count} Ereignisse werden hier nicht gezeigt",
     newest: "Neueste",
+    covers: "Gefiltert: die letzten {count} Ereignisse bis hier",
+    cut: "Ältere Ereignisse: gehen Sie zu einer früheren Zeit",
   },
   timeline: {
     label: "Zeitleiste",
@@ -279,7 +284,8 @@ export const operate: Translation<typeof english.operate> = {
     all: "Alles",
     now: "Jetzt",
     none: "Es wurde noch nichts befohlen",
-    goesOn: "geht weiter",
+    goesOn: "nicht zu Ende",
+    merged: "{count} × {what}",
     ends: {
       succeeded: "gelungen",
       failed: "fehlgeschlagen",
@@ -298,7 +304,10 @@ export const operate: Translation<typeof english.operate> = {
     end: "Zum Ende",
     position: "Position",
     speed: "Tempo",
-    loading: "Ereignisse werden gelesen… {count}",
+    making: "Die Wiedergabe wird vorbereitet",
+    made: "{done} von {records} Ereignissen",
+    reading: "Ereignisse werden gelesen…",
+    failed: "Dieser Zeitpunkt kann nicht gezeigt werden: {problem}",
     of: "von",
   },
 };

@@ -4,10 +4,27 @@ import type { Translation } from "../texts";
 export const people: Translation<typeof english.people> = {
   present: { one: "{count} Person ist anwesend", many: "{count} Personen sind anwesend" },
   title: "Wer anwesend ist",
-  nobody: "Sonst keine Person.",
   you: "Sie",
-  watches: "beobachtet {run}",
-  at: "an {unit}, seit {since}",
+  since: "{where}, seit {since}",
+  units: {
+    page: {
+      run: "Beobachtet Lauf {run}",
+      editing: "Bearbeitet {mission}",
+      none: "Hat die Seite offen",
+    },
+    terminal: {
+      run: "Beobachtet Lauf {run} an einem Terminal",
+      editing: "",
+      none: "An einem Terminal",
+    },
+    plain: { run: "", editing: "", none: "An einem Terminal" },
+    mavlink: { run: "", editing: "", none: "An einer MAVLink-Bodenstation" },
+    other: { run: "Beobachtet Lauf {run} an {unit}", editing: "", none: "An {unit}" },
+  },
+  alsoEdits:
+    "{names} bearbeitet diese Mission auch. Wer als Zweites speichert, wird zuvor gefragt.",
+  alsoEditMany:
+    "{names} bearbeiten diese Mission auch. Wer später speichert, wird zuvor gefragt.",
   asks: "{by} bittet Sie um {resource}.",
   asksOther: "{by} bittet {holder} um {resource}.",
   youAsk: "Sie bitten {holder} um {resource}.",
@@ -19,6 +36,17 @@ export const people: Translation<typeof english.people> = {
   withdraw: "Bitte zurückziehen",
   ask: "Darum bitten",
   askHint: "{holder} hat es. Bitten Sie um die Übergabe.",
+  force: {
+    open: "Für {holder} zurückgeben…",
+    openMany: "Für andere zurückgeben…",
+    title: "{names} für {holder} zurückgeben?",
+    titleMany: "{names} für andere Operatoren zurückgeben?",
+    hint: "Missionen können es sofort wieder steuern: Es kann sich bewegen. Das geschieht nur, wenn der Operator, der es hat, weg ist oder eine Bitte darum unbeantwortet ließ, oder wenn Sie Aufsicht über die Flotte führen. Alle Operatoren sehen es, und das Journal bewahrt den Grund.",
+    reason: "Grund",
+    act: "Zurückgeben",
+    cancel: "Abbrechen",
+    done: "{names}: an die Missionen zurückgegeben.",
+  },
   note: "Notiz für das Protokoll",
   noteAdd: "Notiz hinzufügen",
   approval: {

@@ -10,7 +10,11 @@ export const runs: Translation<typeof english.runs> = {
   anyStatus: "jeder Status",
   goingOn: "im Gang",
   ended: "vorbei",
-  vehicle: "Hat jetzt",
+  vehicle: "Fahrzeug, das er nutzt oder nutzte",
+  unread: {
+    one: "Die Ereignisse von 1 weiteren Lauf werden gelesen.",
+    many: "Die Ereignisse von {count} weiteren Läufen werden gelesen.",
+  },
   anyVehicle: "jedes Fahrzeug",
   began: "Begonnen",
   anyTime: "zu beliebiger Zeit",
@@ -43,5 +47,7 @@ export const runs: Translation<typeof english.runs> = {
   close: "Schließen",
   cancel: "Abbrechen",
   incidents: { one: "{count} Störung", many: "{count} Störungen" },
-  incidentHint: "{task}: {code}",
+  holds: "hält {resources} fest",
+  blocks: "blockiert {tasks}",
+  blockedBy: "{task} wartet auf eine Störung von {run}",
 };

@@ -39,6 +39,7 @@ export const shell: Translation<typeof english.shell> = {
   connected: "Mit der Missionssteuerung verbunden.",
   connecting: "Verbindung zur Missionssteuerung wird hergestellt…",
   offline: "Keine Verbindung zur Missionssteuerung. Die Anzeige kann veraltet sein.",
+  unknownSince: "unbekannt seit {time}",
   offlineShort: "Nicht verbunden",
   retry: "Jetzt versuchen",
   standby: "Bereitschaft:",
@@ -46,6 +47,13 @@ export const shell: Translation<typeof english.shell> = {
   noStandby: "Keine in Bereitschaft.",
   questions: "offene Fragen",
   question: "offene Frage",
+  loading: "Wird geladen…",
+  notLoaded:
+    "Dieser Teil der Seite konnte nicht geladen werden. Er wird geladen, sobald die Missionssteuerung wieder antwortet.",
+  earlierMessages: {
+    one: "1 frühere Meldung steht in der Liste der Alarme",
+    many: "{count} frühere Meldungen stehen in der Liste der Alarme",
+  },
   dismiss: "Ausblenden",
   close: "Schließen",
   fault: "Fehler",
