@@ -4,7 +4,7 @@
 // commander = Einsatzleiter, viewer = Beobachter, vehicle = Fahrzeug, payload = Nutzlast,
 // fleet = Flotte, team = Team, arbiter = Arbiter, take over / give back = übernehmen / zurückgeben,
 // hold / resume = anhalten / fortsetzen, link = Verbindung, alert = Alarm, acknowledge = quittieren,
-// incident = Störung, rehearsal = Probelauf, verification = Verifikation, check = Prüfung,
+// incident = Störung, survey = Vermessung, pass = Bahn, rehearsal = Probelauf, verification = Verifikation, check = Prüfung,
 // replay = Wiedergabe, schedule = Zeitplan, draft = Entwurf, route / area / point = Route / Gebiet /
 // Punkt, survey = Vermessung, pass = Bahn, ground / terrain = Gelände, vertex = Stützpunkt, footprint = Sichtfeld, log = Protokoll, time line = Zeitleiste.
 // STOP has one name on every device, and keeps it.
