@@ -15,12 +15,13 @@ NORTH = {"type": "LineString", "coordinates": [[-77.3192, 38.1075], [-77.3192, 3
 
 
 async def open_versions(page: Page) -> None:
-    await page.get_by_role("button", name=re.compile("^Draw")).click()
-    await page.get_by_role("menuitem", name=f"Versions of {NAME}", exact=True).click()
+    await page.get_by_role("button", name=re.compile("^Draw")).press("Enter")
+    await page.get_by_role("menuitem", name=f"Versions of {NAME}", exact=True).press("Enter")
 
 
 async def test_a_version_is_looked_at_restored_for_runs_that_use_it_and_deleted(desk: Desk) -> None:
     page = await desk.driving()
+    desk.refusals.append(409)
     for geometry in (EAST, NORTH):
         body = {"geometry": geometry, "force": True}
         await desk.ask("PUT", f"/api/geometries/{NAME}", body)

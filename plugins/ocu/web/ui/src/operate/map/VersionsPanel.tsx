@@ -105,9 +105,9 @@ export default function VersionsPanel({
       }}
     >
       <div class="versions-head">
-        <h3 ref={title} tabIndex={-1}>
+        <h2 ref={title} tabIndex={-1}>
           {fill(words.title, { name: of })}
-        </h3>
+        </h2>
         {isDrawn && may("operator") && (
           <button
             type="button"
