@@ -93,7 +93,25 @@ async def fixture() -> str:
             "head": json.loads(msgspec.json.encode(replay.head())),
             "pages": [json.loads(await replay.page(number)) for number in numbers],
         }
-    return json.dumps(runs, indent=1, ensure_ascii=False) + "\n"
+    return _laid_out(runs) + "\n"
+
+
+def _laid_out(value: Any, indent: str = "\n") -> str:
+    """Write `value` as JSON: a line for each record, span and view."""
+    if not _has_rows(value):
+        return json.dumps(value, ensure_ascii=False)
+    inner = indent + " "
+    if isinstance(value, dict):
+        parts = [f"{json.dumps(key)}: {_laid_out(part, inner)}" for key, part in value.items()]
+        return "{" + inner + f",{inner}".join(parts) + indent + "}"
+    return "[" + inner + f",{inner}".join(_laid_out(part, inner) for part in value) + indent + "]"
+
+
+def _has_rows(value: Any) -> bool:
+    """Tell whether `value` has lists of records or of spans in it."""
+    if isinstance(value, dict):
+        return "seq" not in value and any(_has_rows(part) for part in value.values())
+    return isinstance(value, list) and any(isinstance(part, dict) for part in value)
 
 
 if __name__ == "__main__":
