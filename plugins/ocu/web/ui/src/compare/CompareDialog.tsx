@@ -1,12 +1,13 @@
 // Two versions of a mission side by side: what was added, removed, changed and moved, on the
 // diagrams, on the map, and in words.
 import { useSignal } from "@preact/signals";
-import { lazy, Suspense } from "preact/compat";
 import { useEffect, useRef, useState } from "preact/hooks";
 import type { EditorSession } from "../editor/session/EditorSession";
+import { IconButton } from "../editor/toolbar/icons";
 import { openVersion, versionsOf, type Version } from "../missions/files";
 import { geometriesInFile } from "../map/ownGeometry";
 import { Dialog } from "../shared/Dialog";
+import { loaded } from "../shared/loaded";
 import { moment } from "../shared/moments";
 import { fill, strings } from "../strings";
 import type { ChangeKind } from "./changes";
@@ -17,7 +18,9 @@ import "./compare.css";
 
 const words = strings.compare;
 
-const RouteMap = lazy(() => import("./RouteMap"));
+const ZOOM = 1.25;
+
+const RouteMap = loaded(() => import("./RouteMap"));
 
 interface Line {
   kind: ChangeKind;
@@ -123,6 +126,15 @@ export default function CompareDialog({ editor }: { editor: EditorSession }) {
               </select>
             </label>
           )}
+          <span class="cmp-zoom">
+            <IconButton
+              icon="minus"
+              label={words.zoomOut}
+              act={() => sides.current?.zoom(1 / ZOOM)}
+            />
+            <IconButton icon="plus" label={words.zoomIn} act={() => sides.current?.zoom(ZOOM)} />
+            <IconButton icon="fit" label={words.fit} act={() => sides.current?.fit()} />
+          </span>
         </div>
         {problem.value && (
           <p role="alert" class="bad">
@@ -137,13 +149,11 @@ export default function CompareDialog({ editor }: { editor: EditorSession }) {
             </section>
           ))}
           {changed && compared && (
-            <Suspense fallback={<p>{words.loading}</p>}>
-              <RouteMap
-                fleet={editor.catalogue.fleet}
-                changes={compared.geometries}
-                selected={chosen.value && !chosen.value.id ? chosen.value.label : ""}
-              />
-            </Suspense>
+            <RouteMap
+              fleet={editor.catalogue.fleet}
+              changes={compared.geometries}
+              selected={chosen.value && !chosen.value.id ? chosen.value.label : ""}
+            />
           )}
           <section class="cmp-list" aria-label={words.list}>
             <p role="status">{compared ? summary(compared.lines) : words.loading}</p>

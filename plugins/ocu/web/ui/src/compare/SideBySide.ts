@@ -168,8 +168,9 @@ export class SideBySide {
     if (now || old) half.canvas.scrollToElement(id, 80);
   }
 
+  /** Both, about the middle of what is seen. */
   zoom(factor: number): void {
-    const { canvas } = this.halves.after.definitions ? this.halves.after : this.halves.before;
+    const { canvas } = this.halves.after;
     canvas.zoom(canvas.zoom() * factor);
   }
 

@@ -32,7 +32,8 @@ const words = strings.editor;
 /** Leaflet, and what plays rehearsals: for those who look at the map. */
 const MapPanel = loaded(() => import("./map/MapPanel"));
 
-const CompareDialog = lazy(() => import("../compare/CompareDialog"));
+/** The viewer of diagrams and the differ: for those who compare versions. */
+const CompareDialog = loaded(() => import("../compare/CompareDialog"));
 
 /** Of a tablet held upright: blocks are then in the menus alone, until the user asks for more. */
 const NARROW = 1000;
@@ -166,11 +167,7 @@ function Workplace({ work, fail }: WorkplaceProps) {
         {showsPanel && <SidePanel editor={session} />}
       </div>
       <Questions work={work} />
-      {comparing.value && (
-        <Suspense fallback={null}>
-          <CompareDialog editor={session} />
-        </Suspense>
-      )}
+      {comparing.value && <CompareDialog editor={session} />}
     </div>
   );
 }

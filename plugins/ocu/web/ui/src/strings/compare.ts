@@ -16,6 +16,9 @@ export const compare = {
   absent: "This version has no such diagram.",
   map: "Routes, areas and points",
   mapHint: "Dashed: before. Solid: after. A dot is a vertex that was moved, added or removed.",
+  zoomIn: "Enlarge both",
+  zoomOut: "Make both smaller",
+  fit: "Fit both into the window",
   kinds: { added: "Added", removed: "Removed", changed: "Changed", moved: "Moved" },
   signs: { added: "+", removed: "−", changed: "≠", moved: "↔" },
   row: "{label}: {before} → {after}",
@@ -29,7 +32,6 @@ export const compare = {
   frame: "heights: {before} → {after}",
   altitudes: "heights of vertices are others",
   length: "length: {before} → {after}",
-  close: "Close",
   since: "Compare with what was approved",
   theirs: "Compare mine with theirs",
   /** Of properties, by the name that they have in the file. */

@@ -19,6 +19,8 @@ import { alerts } from "./alerts";
 import { busy } from "./busy";
 import { cameras } from "./cameras";
 import { requirements, verify } from "./checks";
+import { comments } from "./comments";
+import { compare } from "./compare";
 import { control } from "./control";
 import { editor } from "./editor";
 import { fleet } from "./fleet";
@@ -44,6 +46,8 @@ export const german: Translation<English> = {
   busy,
   alerts,
   people,
+  comments,
+  compare,
   editor,
   plan,
   survey,
