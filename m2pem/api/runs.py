@@ -177,12 +177,13 @@ CONTROL_REQUEST = "CONTROL_REQUEST"
 CONTROL_FORCED = "CONTROL_FORCED"
 """The code of the alert of a vehicle that an operator gave back to the missions though another one
 had it."""
-NEWS = frozenset({SCHEDULE, APPROVAL, CONTROL_REQUEST})
-"""The codes of alerts that tell what operators have done: nothing is wrong."""
 FACE = "FACE"
 """The code of the alert that says that a face does not serve any more."""
 STARTS_SOON = "STARTS_SOON"
 """The code of the alert before each start of a scheduled mission."""
+NEWS = frozenset({SCHEDULE, STARTS_SOON, APPROVAL, CONTROL_REQUEST})
+"""The codes of alerts that say what operators have done, or what they have scheduled and comes now:
+nothing is wrong."""
 NOT_STARTED = "NOT_STARTED"
 """The code of alerts about scheduled missions that did not start: missed, refused or held."""
 

@@ -262,7 +262,7 @@ class ScheduleEntries:
             self.add(entry)
             self.looks[entry.id].resources = resources
             await self._forget_old()
-        what = f"{plan.mission_name} {times.described(plan.when)}"
+        what = f"{plan.title} {times.described(plan.when)}"
         self.say(f"{entry.id} is scheduled by {plan.by or 'an operator'}: {what}")
         self.changed.set()
         return entry.id
@@ -285,7 +285,7 @@ class ScheduleEntries:
             async with self.lock:
                 found = self.active_entry(number)
                 await self.write(found, found.state.cancelled(by))
-        self.say(f"{number} is cancelled by {who}: {entry.plan.mission_name} is not started")
+        self.say(f"{number} is cancelled by {who}: {entry.plan.title} is not started")
 
     @contextmanager
     def _stopping(self, number: EntryId) -> Iterator[None]:

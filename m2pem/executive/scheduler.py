@@ -163,7 +163,7 @@ class Scheduler:
                 if look.reason != str(error):
                     look.reason = str(error)
                     self._entries.say(
-                        f"{entry.id} cannot start {entry.plan.mission_name}: {error}", NOT_STARTED
+                        f"{entry.id} cannot start {entry.plan.title}: {error}", NOT_STARTED
                     )
                 again_us = self._in(ASK_AGAIN_S)
             if again_us is not None:
@@ -292,7 +292,7 @@ class Scheduler:
         left_s = (starts_us - self._starter.clock.now_us()) / US_PER_S
         who = f"{entry.id}, scheduled by {entry.plan.by or 'an operator'}"
         self._entries.say(
-            f"{entry.plan.mission_name} starts in {left_s:.0f} s ({who}); "
+            f"{entry.plan.title} starts in {left_s:.0f} s ({who}); "
             f"`m2pem schedule cancel {entry.id}` or hold keeps it from that",
             STARTS_SOON,
         )
@@ -304,7 +304,7 @@ class Scheduler:
         if look.starts_us is not None and not wait.reason.startswith(STARTING):
             look.starts_us = look.warned_due_us = None
             self._entries.say(
-                f"{entry.id} does not start {entry.plan.mission_name} yet: {wait.reason}",
+                f"{entry.id} does not start {entry.plan.title} yet: {wait.reason}",
                 NOT_STARTED,
             )
         self._entries.note(entry.id, wait.reason)
@@ -329,7 +329,7 @@ class Scheduler:
         many = f"{least}{number} starts, the last at" if number > 1 else "the start at"
         then = "; it starts once as soon as it can" if changed.state.owed_us else ""
         self._entries.say(
-            f"{entry.id} missed {many} {at} of {plan.mission_name}: {why}{then}", NOT_STARTED
+            f"{entry.id} missed {many} {at} of {plan.title}: {why}{then}", NOT_STARTED
         )
         return changed
 
@@ -435,7 +435,7 @@ class Scheduler:
         self._entries.add(msgspec.structs.replace(entry, state=change.with_run(run).state))
         look.reason, look.starts_us, look.warned_due_us = "", None, None
         look.true_since_us = None
-        self._entries.say(f"{entry.id} has started {plan.mission_name} as {run}")
+        self._entries.say(f"{entry.id} has started {plan.title} as {run}")
         return run
 
     @staticmethod

@@ -7,6 +7,7 @@ CronJob, hold and release of batch queues.
 """
 
 from enum import StrEnum
+from pathlib import PurePath
 from typing import Any, TypeAlias
 
 import msgspec
@@ -78,6 +79,11 @@ class SchedulePlan(msgspec.Struct, frozen=True):
     simulated: bool = True
     priority: int = 0
     by: str = ""
+
+    @property
+    def title(self) -> str:
+        """What operators call the mission: its file's name, without folder and suffix."""
+        return PurePath(self.mission_name).stem
 
 
 class Settlement(StrEnum):

@@ -82,7 +82,7 @@ def test_operators_are_warned_before_a_start_and_can_cancel_it():
     assert (warned.status, warned.starts_us) == (ScheduledStatus.STARTING, START_US + 60_000_000)
     assert begun == {}
     assert (entry.status, entry.reason) == (ScheduledStatus.CANCELLED, "cancelled by bob")
-    assert (50.0, alerts[1][1][:28]) == (alerts[1][0], "mission.bpmn starts in 10 s ")
+    assert (50.0, alerts[1][1][:23]) == (alerts[1][0], "mission starts in 10 s ")
     assert "cancelled by bob" in alerts[-1][1]
 
 
@@ -265,7 +265,7 @@ def test_resources_that_stay_busy_until_the_deadline_are_missed_and_said():
     assert (entry.status, entry.reason) == (ScheduledStatus.ENDED, "for ugv1: r1 uses it")
     assert [each.settlement for each in entry.times] == [Settlement.MISSED]
     assert told[-1] == (
-        "s1 missed the start at 2026-01-01T00:01:00+00:00 of mission.bpmn: for ugv1: r1 uses it"
+        "s1 missed the start at 2026-01-01T00:01:00+00:00 of mission: for ugv1: r1 uses it"
     )
 
 
@@ -619,7 +619,7 @@ def test_times_that_came_while_nothing_served_are_said_and_skipped_or_run_once(m
     assert begun == begins
     assert entry.status is ScheduledStatus.SCHEDULED
     assert told[0] == (
-        "s1 missed 3 starts, the last at 2026-01-01T00:30:00+00:00 of mission.bpmn: "
+        "s1 missed 3 starts, the last at 2026-01-01T00:30:00+00:00 of mission: "
         "it was not served at that time"
     ) + ("; it starts once as soon as it can" if missed is Missed.RUN_ONCE else "")
 

@@ -226,3 +226,8 @@ def test_the_state_ends_with_the_last_time() -> None:
         time = SettledTime(NOW + minute * MINUTE_US, NOW, Settlement.STARTED, "r1")
         state = settle(each, state, time)
     assert state.status is EntryStatus.ENDED
+
+
+def test_a_plan_is_called_as_the_file_of_its_mission_without_folder_and_suffix():
+    plan = SchedulePlan("/srv/missions/night watch.bpmn", b"", "P", "north", NOW)
+    assert plan.title == "night watch"
