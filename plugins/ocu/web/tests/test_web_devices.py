@@ -151,7 +151,7 @@ async def test_without_the_executive_the_page_says_what_it_saw_last(
         await expect(page.locator(".link-open")).to_have_count(1)
         await page.evaluate("navigator.serviceWorker.ready.then(() => true)")
         await page.wait_for_function(
-            "JSON.parse(localStorage.getItem('m2pem.last-known'))?.runs.length > 0"
+            "() => JSON.parse(localStorage.getItem('m2pem.last-known'))?.runs.length > 0"
         )
         kept = await page.evaluate(KEPT)
         assert kept
