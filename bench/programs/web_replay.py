@@ -29,7 +29,7 @@ from playwright.async_api import CDPSession, Page, async_playwright
 
 import m2pem
 from bench.programs.stage import executive
-from bench.programs.web_page import ARGUMENTS
+from bench.programs.web_chromium import ARGUMENTS
 from m2pem.engine.inputs import Continue
 from m2pem.engine.records import Record, RunEnded, RunOutcome, RunStarted
 from m2pem.fleet.fleet import dump
