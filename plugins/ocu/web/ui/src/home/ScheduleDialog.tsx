@@ -31,7 +31,8 @@ export function ScheduleDialog({ close }: { close(): void }) {
   const [refusal, setRefusal] = useState("");
   const [isSending, setSending] = useState(false);
   useEffect(() => {
-    if (missions[0]) setForm((last) => ({ ...last, mission: missions[0]!.name }));
+    // The first one, unless another was chosen before this runs.
+    if (missions[0]) setForm((last) => ({ ...last, mission: last.mission || missions[0]!.name }));
   }, [missions]);
   const { check, setCheck } = useCheck(form);
   const change = (fields: Partial<Form>) => {
