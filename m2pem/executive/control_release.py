@@ -6,6 +6,7 @@ and all operators get, and must be a supervisor of the fleet, or the one who has
 must have left a request for it unanswered.
 """
 
+import math
 from collections.abc import Callable, Iterable
 
 from m2pem.api.alerts import AlertSeverity
@@ -85,5 +86,11 @@ class ControlRelease:
                 others += ", or leaves a request for it unanswered"
             raise OperatorError(f"{has}. Ask for it; another operator gives it back only {others}")
         if not reason:
-            where = f"{holder} is at no page or terminal for {gone_s:.0f} s: " if is_gone else ""
+            where = f"{_gone(holder, gone_s)}: " if is_gone else ""
             raise OperatorError(f"{has}. {where}say why you give it back; all operators see it")
+
+
+def _gone(holder: str, gone_s: float) -> str:
+    if math.isinf(gone_s):  # one who gave no name, or of very many the one seen the longest ago
+        return "it is not known when this operator was last at a page or terminal"
+    return f"{holder} is at no page or terminal for {gone_s:.0f} s"

@@ -78,7 +78,7 @@ class Presence:
 
     def gone_s(self, by: str) -> float:
         """Return for how long an operator is at no unit and has commanded nothing, in seconds; 0
-        while one announces it."""
+        while one announces it, infinite if that is not known."""
         if not self.is_gone(by):
             return 0.0
         now_s = asyncio.get_running_loop().time()

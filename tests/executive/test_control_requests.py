@@ -238,6 +238,21 @@ def test_a_page_whose_machine_dies_does_not_keep_a_vehicle(play):
     assert play(story, "ugv1") == ""
 
 
+def test_of_an_operator_without_a_name_it_is_not_known_when_they_were_there(play):
+    async def story(world: World):
+        control = world.executive.control
+        await control.start(ASKS)
+        await control.take("ugv1")
+        with pytest.raises(OperatorError) as refused:
+            await control.give_back("ugv1", by="otto")
+        await forced(world)
+        return str(refused.value), (await control.holders())["ugv1"]
+
+    why, holder = play(story, "ugv1")
+    assert "it is not known when this operator was last at a page or terminal: say why" in why
+    assert holder == ""
+
+
 def test_one_who_is_there_and_does_not_answer_is_asked_first(play):
     """A page may be open, and nobody before it."""
 
