@@ -15,7 +15,6 @@ from m2pem.cli.ocus import NO_UNIT
 from m2pem.cli.options import UnusableError
 from m2pem.errors import M2pemError, PluginError
 from m2pem.fleet.fleet import Fleet
-from m2pem.fleet.fleet_file import load_fleet
 from m2pem.plugins import PluginManager
 
 log = logging.getLogger("m2pem.face")
@@ -42,6 +41,8 @@ def with_faces_of_file(fleet: Fleet) -> Fleet:
 
     A file that cannot be read any more, or is that of another fleet, has none.
     """
+    from m2pem.fleet.fleet_file import load_fleet  # slow, and only a resumed run needs it
+
     try:
         written = load_fleet(fleet.file)
     except M2pemError as error:
