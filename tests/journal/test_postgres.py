@@ -81,7 +81,7 @@ async def test_a_server_that_starts_again_within_the_lease_interrupts_nothing(
 async def test_a_server_that_is_gone_is_told_of_and_its_return_is_noticed(
     postgres, postgres_url, monkeypatch
 ):
-    monkeypatch.setenv("M2PEM_LEASE_S", "0.5")
+    monkeypatch.setenv("M2PEM_LEASE_S", "1.5")
     async with opened(lambda: open_journal(postgres_url)) as journal:
         run = await journal.create(HEADER)
         postgres.stop()
