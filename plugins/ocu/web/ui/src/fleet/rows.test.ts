@@ -47,6 +47,17 @@ describe("rows", () => {
     expect(found.map(({ flags }) => flags.lost)).toEqual([false, true]);
   });
 
+  it("are free when their link is back and they are held, not while they are lost", () => {
+    const found = rows({
+      vehicles: [vehicle("v1"), vehicle("v2")],
+      status: {
+        v1: had({ unavailable: "returned: held" }),
+        v2: had({ unavailable: "lost: its link" }),
+      },
+    });
+    expect(found.map(({ flags }) => flags.free)).toEqual([true, false]);
+  });
+
   it("say who has a vehicle", () => {
     const found = rows({
       vehicles: [vehicle("v1"), vehicle("v2"), vehicle("v3"), vehicle("m", { manned: true })],

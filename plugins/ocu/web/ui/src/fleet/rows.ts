@@ -37,6 +37,9 @@ export const GROUPINGS: readonly Grouping[] = [
   "health",
   "holder",
 ];
+/** `unavailable` of a resource that was lost, is free again, and has done nothing since. */
+const RETURNED = "returned: held";
+
 /** What the executive says of a resource that is not just free: `GET /api/fleet/status`. */
 export interface ResourceStatus {
   holder: string;
@@ -162,12 +165,15 @@ function rowOf(
       lost: isLost || state === undefined,
       notReady: row.ready === false,
       lowBattery: isLow(battery),
-      free: !manned && !(now && (now.holder || now.run || now.unavailable)),
+      free: !manned && (!now || isFree(now)),
       taken: operator !== "",
       inRun: now !== null && now.run !== "" && !now.direct,
     },
   };
 }
+
+const isFree = ({ holder, run, unavailable }: ResourceStatus) =>
+  !holder && !run && (!unavailable || unavailable === RETURNED);
 
 /** The values by which a column sorts; null and "" come last, whichever way it sorts. */
 export function keyOf(row: Row, column: Column): string | number | null {
