@@ -178,9 +178,10 @@ def test_a_kmz_is_read_and_a_bomb_is_not_unpacked() -> None:
 
 
 def test_the_members_of_an_archive_are_bounded_together() -> None:
-    layers = {f"{name}.shp": b"\0" * 20_000_000 for name in "abc"}
+    shapes = {f"{name}.shp": b"\0" for name in "abc"}
+    layers = shapes | {f"{name}.prj": b"\0" * 20_000_000 for name in "abc"}
     assert str(read("a.zip", archive(layers)).problems[-1]) == (
-        "c.shp: c.shp is larger than 50 MB unpacked with what was read before it; split it"
+        "c.shp: c.prj is larger than 50 MB unpacked with what was read before it; split it"
     )
 
 
