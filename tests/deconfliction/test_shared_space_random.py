@@ -99,7 +99,7 @@ def play_one(play: Play, seed: int) -> None:
 
 
 # In the last one a rover swerves at the border of an area, just when another one has got its place.
-@pytest.mark.parametrize("seed", [0, 1, 2, 3, 171948708])
+@pytest.mark.parametrize("seed", [1, 3, 171948708])
 def test_no_area_has_too_many_and_none_waits_while_there_is_place(play: Play, seed: int) -> None:
     play_one(play, seed)
 

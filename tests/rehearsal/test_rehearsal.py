@@ -613,6 +613,7 @@ rehearse(mission, load_fleet(fleet), plugins=PluginManager(block=("all",)), answ
 """
 
 
+@pytest.mark.long  # the command `simulate` shows it of the same mission
 def test_two_processes_print_the_same_bytes() -> None:
     outputs = {
         subprocess.run(

@@ -104,7 +104,9 @@ def rows(trail: list[tuple[float, float]]) -> set[int]:
     return {north for north, count in counts.items() if count > 100}
 
 
-@ARBITERS
+@pytest.mark.parametrize(
+    "arbiter", ["carts", pytest.param("willing", marks=pytest.mark.long), "sim"]
+)
 def test_members_cover_an_area_together_each_its_own_band(play: Play, arbiter: str) -> None:
     async def story(world: World) -> Any:
         trails: dict[str, list[tuple[float, float]]] = {}
@@ -152,7 +154,7 @@ def test_members_observe_an_area_from_around_it_for_the_duration(play: Play, arb
         assert on_edge < 1.0, "each stands at the edge"
 
 
-@pytest.mark.parametrize("arbiter", ["carts", "sim"])
+@pytest.mark.parametrize("arbiter", [pytest.param("carts", marks=pytest.mark.long), "sim"])
 def test_an_escort_stays_around_its_target_until_it_is_stopped(play: Play, arbiter: str) -> None:
     async def story(world: World) -> Any:
         run = await world.executive.control.start(one_task("escort", target="vip", spacing="20 m"))
@@ -172,7 +174,13 @@ def test_an_escort_stays_around_its_target_until_it_is_stopped(play: Play, arbit
     assert [each.state for each in ended] == [BehaviorState.CANCELLED]
 
 
-@pytest.mark.parametrize("arbiters", [("carts", "willing", "sim"), ("sim", "carts", "willing")])
+@pytest.mark.parametrize(
+    "arbiters",
+    [
+        ("carts", "willing", "sim"),
+        pytest.param(("sim", "carts", "willing"), marks=pytest.mark.long),
+    ],
+)
 def test_members_of_different_arbiters_and_domains_march_as_one(
     play: Play, arbiters: tuple[str, ...]
 ) -> None:
