@@ -43,6 +43,7 @@ async def records_of(run: str, after: int, limit: int) -> list[StampedRecord]:
 def control() -> Mock:
     control = Mock(spec=MissionControl)
     control.runs = AsyncMock(return_value=[run_of(number) for number in range(1, MANY + 1)])
+    control.fleet.return_value = Mock(vehicles={}, payloads={})
     control.mission_time_s = AsyncMock(return_value=4.0)
     control.holders = AsyncMock(
         return_value={"uav1": "", "uav1/camera": "r9999.b3", "uav2": "r10000.b1", "uav3": "anna"}
