@@ -63,7 +63,8 @@ class WebOcu:
             self._replays = Replays(control)
             self.hub = Hub(control, self._replays.recordings)
             store = store_beside(control.journal_file())
-            self._recorder = Recorder(control, self.hub.follower.views, self.hub.fleet, store)
+            views = self.hub.follower.views
+            self._recorder = Recorder(control, views, self.hub.fleet, store, self.hub.detected)
             self._services = services_of(control, settings.missions)
 
             def app() -> "ASGIApp":

@@ -9,7 +9,7 @@ pace.
 import asyncio
 import logging
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict
 from typing import Any
@@ -46,6 +46,7 @@ from m2pem_plugin_web.live.messages import Message
 from m2pem_plugin_web.live.standbys import Standbys
 from m2pem_plugin_web.live.viewer import Unsent, Viewer
 from m2pem_plugin_web.replay.replays import Recordings
+from m2pem_plugin_web.tracks.detections import DetectionEntry
 
 FRAME_S = 0.04
 
@@ -206,6 +207,13 @@ class Hub(Listener):
     def announce(self, text: str) -> None:
         """Send a text to all operators."""
         self._send_to_all(messages.fault(text))
+
+    def detected(self, run: RunId, entries: Sequence[DetectionEntry], more: int) -> None:
+        """Send new detections to those who watch the run."""
+        message = messages.detections(run, entries, more)
+        for viewer in self.viewers:
+            if viewer.live is not None and viewer.live.view.run == run:
+                viewer.send_soon(message)
 
     def _lost(self, resource: ResourceId) -> None:
         self._send_to_all(messages.fault(f"{resource}: its link is lost"))

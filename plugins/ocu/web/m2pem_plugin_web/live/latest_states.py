@@ -5,6 +5,7 @@ from collections.abc import Callable
 import msgspec
 
 from m2pem.api import (
+    Detection,
     LinkState,
     MissionControl,
     PayloadState,
@@ -49,13 +50,15 @@ class LatestStates:
 
 
 class FleetStates:
-    """The latest states of a fleet. `lost` is called with each resource whose link is lost."""
+    """The latest states of a fleet. `lost` is called with each resource whose link is lost, and
+    each of `detected` with each detection."""
 
     def __init__(self, control: MissionControl, lost: Callable[[ResourceId], None]) -> None:
         self.vehicles = LatestStates()
         self.payloads = LatestStates()
         self.teams = LatestStates()
         """By the id of the team's behavior."""
+        self.detected: list[Callable[[Detection], None]] = []
         self._lost = lost
         fleet = control.fleet()
         size = max(BACKLOG, 2 * (len(fleet.vehicles) + len(fleet.payloads)))
@@ -69,6 +72,9 @@ class FleetStates:
                     self._take(self.vehicles, state)
                 case PayloadState():
                     self._take(self.payloads, state)
+                    for detection in state.detections:
+                        for detected in self.detected:
+                            detected(detection)
                 case TeamState():
                     self.teams.put(state.behavior, state)
 

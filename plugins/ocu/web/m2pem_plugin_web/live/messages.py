@@ -1,6 +1,6 @@
 """Messages over the WebSocket: one function for each. They are encoded once for all browsers."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from typing import Any, NamedTuple, TypeVar
 
@@ -9,6 +9,7 @@ import msgspec
 from m2pem.api import OpenPrompt, PromptClosed, RunId, RunSummary, RunView, StampedRecord, describe
 from m2pem.api.records import PromptOpened
 from m2pem.api.run_view import ElementState, Place
+from m2pem_plugin_web.tracks.detections import DetectionEntry
 
 _encode = msgspec.json.Encoder().encode
 
@@ -85,6 +86,11 @@ def prompt_closed(closed: PromptClosed) -> Message:
 def run(summary: RunSummary) -> Message:
     """Return the message of a run's new status."""
     return message("run", run=asdict(summary))
+
+
+def detections(run: RunId, entries: Sequence[DetectionEntry], more: int) -> Message:
+    """Return the message of new detections of a run. `more`: how many it has without an entry."""
+    return message("detections", run=run, detections=entries, more=more)
 
 
 def fault(text: str) -> Message:

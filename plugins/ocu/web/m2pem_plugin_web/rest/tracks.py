@@ -21,11 +21,30 @@ MOST_SAMPLES = 5000
 _encode = msgspec.json.Encoder().encode
 
 
+class DetectionModel(BaseModel):
+    """A detection. `t_s`: mission time; `time_us`: since the Unix epoch, as the device says."""
+
+    number: int
+    t_s: float
+    type: str
+    source: str
+    position: dict[str, float | None]
+    time_us: int
+
+
+class TrackSampleModel(SampleModel):
+    """Also what was detected since the sample before. A later entry of the same `number` replaces
+    the one before. `more_detections`: how many there are that the track has no entry of."""
+
+    detections: tuple[DetectionModel, ...] = ()
+    more_detections: int = 0
+
+
 class TelemetryPage(BaseModel):
     """`samples`: each with those alone that say something new. `next`: what to ask for `after`
     next; null: there are no more now. `problem`: why there are gaps, null if nothing went wrong."""
 
-    samples: list[SampleModel]
+    samples: list[TrackSampleModel]
     next: float | None
     problem: str | None
 

@@ -6,14 +6,24 @@ of mission time; a thread writes the new ones once a second.
 
 import asyncio
 import logging
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TypeAlias
 
 import msgspec
 
-from m2pem.api import MissionControl, PayloadState, RunId, RunStatus, RunView, VehicleState
+from m2pem.api import (
+    Detection,
+    MissionControl,
+    PayloadState,
+    RunId,
+    RunStatus,
+    RunView,
+    VehicleState,
+)
 from m2pem.errors import M2pemError
 from m2pem_plugin_web.live.latest_states import FleetStates
+from m2pem_plugin_web.tracks.detections import DetectionEntry, Found
 from m2pem_plugin_web.tracks.stores import HeldError, TrackStore
 from m2pem_plugin_web.tracks.thinning import SPACING_S, Sample, State
 from m2pem_plugin_web.tracks.track import Head, Track, head_of
@@ -35,6 +45,9 @@ LONGEST_HEAD = 1000
 
 GOES_ON = (RunStatus.RUNNING, RunStatus.PAUSED)
 
+Announce: TypeAlias = Callable[[RunId, Sequence[DetectionEntry], int], None]
+"""Is called with new entries of a run, and how many detections it has without an entry."""
+
 _encode = msgspec.json.Encoder().encode
 log = logging.getLogger("m2pem.ocu.web")
 
@@ -45,11 +58,16 @@ class _Writing:
 
     track: Track
     waiting: list[Sample] = field(default_factory=list)
+    last_s: float = 0.0
+    """The mission time of the last sample."""
     turn: asyncio.Lock = field(default_factory=asyncio.Lock)
 
 
 class Recorder:
-    """Records tracks. `views`: the runs; `fleet`: the latest states of vehicles and payloads."""
+    """Records tracks. `views`: the runs; `fleet`: the latest states of vehicles and payloads.
+
+    `announce`: sends new detections of a run to those who watch it.
+    """
 
     def __init__(
         self,
@@ -57,8 +75,12 @@ class Recorder:
         views: Mapping[RunId, RunView],
         fleet: FleetStates,
         store: TrackStore,
+        announce: Announce = lambda _run, _entries, _more: None,
     ) -> None:
         self.store = store
+        self._announce = announce
+        self._found: dict[RunId, Found] = {}
+        fleet.detected.append(self._detected)
         self.problems: dict[RunId, str] = {}
         """Why tracks of runs have gaps, as text."""
         self._control = control
@@ -114,6 +136,8 @@ class Recorder:
                         await self._look_at(run, view)
                 elif run in self._writing:
                     await self._close(run)
+            for run in self._found.keys() - self._writing.keys() - self._going_on():
+                del self._found[run]
             for run in self._writing.keys() - self._views.keys():
                 await self._close(run)
             self._before = self._states()
@@ -127,7 +151,7 @@ class Recorder:
                 writing = await self._open(run, view.summary.started_us, t_s)
                 t_s = await self._control.mission_time_s(run)
                 if writing is not None and writing.track.is_new and t_s <= self._soon_s:
-                    self._take(writing, 0.0, self._before)
+                    self._take(writing, 0.0, self._before, with_detections=False)
         except M2pemError:
             self._leave_alone(run)  # another executive executes the run, or it has just ended
             return
@@ -139,8 +163,15 @@ class Recorder:
         latest = (*self._fleet.vehicles.states.values(), *self._fleet.payloads.states.values())
         return [each for each in latest if isinstance(each, VehicleState | PayloadState)]
 
-    def _take(self, writing: _Writing, t_s: float, states: Iterable[State]) -> None:
-        """Add the states that are new to the samples of a run."""
+    def _take(
+        self,
+        writing: _Writing,
+        t_s: float,
+        states: Iterable[State],
+        *,
+        with_detections: bool = True,
+    ) -> None:
+        """Add the states that are new, and detections, to the samples of a run."""
         thinner = writing.track.thinner
         fresh: dict[str, dict[str, msgspec.Raw]] = {"vehicles": {}, "payloads": {}}
         for state in states:
@@ -148,8 +179,27 @@ class Recorder:
                 thinner.keep(t_s, state)
                 kind = "vehicles" if isinstance(state, VehicleState) else "payloads"
                 fresh[kind][state.resource] = msgspec.Raw(_encode(state))
-        if any(fresh.values()):
-            writing.waiting.append(Sample(t_s, **fresh))
+        run = writing.track.run
+        found = self._found.pop(run, None) if with_detections else None
+        entries, more = writing.track.numbering.enter(t_s, found) if found else ((), 0)
+        if any(fresh.values()) or entries or more:
+            writing.waiting.append(Sample(t_s, **fresh, detections=entries, more_detections=more))
+            writing.last_s = t_s
+        if entries or more:
+            self._announce(run, entries, writing.track.numbering.more)
+
+    def _detected(self, detection: Detection) -> None:
+        """Note a detection for each run that goes on at that time."""
+        for run in self._going_on():
+            self._found.setdefault(run, Found()).add(detection)
+
+    def _going_on(self) -> set[RunId]:
+        """Return the runs that go on."""
+        return {
+            run
+            for run, view in self._views.items()
+            if view.status in GOES_ON and view.summary.started_us
+        }
 
     async def _open(self, run: RunId, started_us: int, t_s: float) -> _Writing | None:
         try:
@@ -161,7 +211,7 @@ class Recorder:
             self._log_once(run, error)
             self._leave_alone(run)
             return None
-        self._writing[run] = _Writing(track)
+        self._writing[run] = _Writing(track, last_s=track.last_s)
         return self._writing[run]
 
     def _leave_alone(self, run: RunId) -> None:
@@ -176,6 +226,10 @@ class Recorder:
                 await self.flush(run)
 
     async def _close(self, run: RunId) -> None:
+        if (writing := self._writing.get(run)) is not None:
+            # A detection may end a run at once.
+            view = self._views.get(run)
+            self._take(writing, max(view.t_s if view is not None else 0.0, writing.last_s), ())
         await self.flush(run)
         writing = self._writing.pop(run, None)
         if writing is not None:

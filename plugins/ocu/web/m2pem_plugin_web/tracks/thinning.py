@@ -1,12 +1,13 @@
 """Thinning of tracks: selects the states of vehicles and payloads to keep."""
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TypeAlias
 
 import msgspec
 
 from m2pem.api import GeoPosition, PayloadState, VehicleState, distance_m
+from m2pem_plugin_web.tracks.detections import DetectionEntry
 
 SPACING_S = 1.0
 """Least seconds of mission time between two states of a resource; more in long runs."""
@@ -19,12 +20,15 @@ FASTER_M_S = 0.3
 State: TypeAlias = VehicleState | PayloadState
 
 
-class Sample(msgspec.Struct, frozen=True):
-    """The states at a mission time, in seconds, that differ from the ones before."""
+class Sample(msgspec.Struct, frozen=True, omit_defaults=True):
+    """The states at a mission time, in seconds, that differ from the ones before, and what was
+    detected since then. `more_detections`: how many the track has no entry of."""
 
     t: float
     vehicles: dict[str, msgspec.Raw]
     payloads: dict[str, msgspec.Raw]
+    detections: Sequence[DetectionEntry] = ()
+    more_detections: int = 0
 
     def kinds(self) -> Iterator[tuple[str, dict[str, msgspec.Raw]]]:
         """Yield the kinds of states, each with the states by resource."""
@@ -133,8 +137,11 @@ def _known_place(place: GeoPosition | None) -> GeoPosition | None:
 def thinned(samples: Iterable[Sample], spacing_s: float) -> list[Sample]:
     """Return fewer samples: of each resource the last state within each `spacing_s`.
 
-    So a resource stays where it came to rest. There are at most two in any `spacing_s`.
+    So a resource stays where it came to rest. There are at most two in any `spacing_s`. All
+    detections are kept.
     """
+    detections: dict[float, list[DetectionEntry]] = {}
+    more, more_s = 0, 0.0
     kept: dict[float, Mapping[str, dict[str, msgspec.Raw]]] = {}
     base: dict[tuple[str, str], float] = {}
     waiting: dict[tuple[str, str], tuple[float, msgspec.Raw]] = {}
@@ -144,6 +151,10 @@ def thinned(samples: Iterable[Sample], spacing_s: float) -> list[Sample]:
         base[key] = t_s
 
     for sample in samples:
+        if sample.detections:
+            detections.setdefault(sample.t, []).extend(sample.detections)
+        if sample.more_detections:
+            more, more_s = more + sample.more_detections, sample.t
         for kind, states in sample.kinds():
             for name, state in states.items():
                 key = (kind, name)
@@ -155,4 +166,13 @@ def thinned(samples: Iterable[Sample], spacing_s: float) -> list[Sample]:
                 waiting[key] = (sample.t, state)
     for key, (t_s, state) in waiting.items():
         keep(key, t_s, state)
-    return [Sample(t_s, **kept[t_s]) for t_s in sorted(kept)]
+    nothing: Mapping[str, dict[str, msgspec.Raw]] = {"vehicles": {}, "payloads": {}}
+    return [
+        Sample(
+            t_s,
+            **kept.get(t_s, nothing),
+            detections=detections.get(t_s, ()),
+            more_detections=more if more and t_s == more_s else 0,
+        )
+        for t_s in sorted({*kept, *detections, *([more_s] if more else [])})
+    ]

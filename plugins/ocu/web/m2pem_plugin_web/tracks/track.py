@@ -8,6 +8,7 @@ from typing import Any
 import msgspec
 
 from m2pem.api import PayloadState, RunId, VehicleState
+from m2pem_plugin_web.tracks.detections import Numbering
 from m2pem_plugin_web.tracks.stores import TrackStore, TrackText
 from m2pem_plugin_web.tracks.thinning import SPACING_S, Sample, Thinner, thinned
 
@@ -51,7 +52,7 @@ def samples_of(text: bytes) -> Iterator[Sample]:
 class Track:
     """A track open for writing; samples must be later than the last one.
 
-    `thinner` knows the kept states.
+    `thinner` knows the kept states, `numbering` the detections.
 
     `t_s`: the present mission time. Later samples are dropped: the run was resumed from a journal
     that ends before them.
@@ -62,6 +63,7 @@ class Track:
     """
 
     def __init__(self, store: TrackStore, head: Head, t_s: float) -> None:
+        self.run = head.run
         self._most = store.most_bytes
         self._head = head
         self._kept: TrackText = store.open(head.run)
@@ -88,7 +90,13 @@ class Track:
         self.thinner = Thinner(self._head.spacing_s)
         self.is_new = not samples
         """Whether the track was empty."""
+        self.last_s = samples[-1].t if samples else 0.0
+        """The mission time of the last sample that was there."""
         self._remember(samples)
+        self.numbering = Numbering(
+            (entry for sample in samples for entry in sample.detections),
+            sum(sample.more_detections for sample in samples),
+        )
 
     def append(self, samples: Sequence[Sample]) -> None:
         """Write samples.
