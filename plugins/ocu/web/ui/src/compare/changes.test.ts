@@ -61,6 +61,13 @@ describe("changes of a mission", () => {
     ]);
   });
 
+  it("are none of what refers to an element that has another name", async () => {
+    const flow = '<bpmn:sequenceFlow id="F" sourceRef="Start" targetRef="Drive"/>';
+    const after = DRIVE.replace('name="Drive"', 'name="To the gate"');
+    const changes = await compared(mission(DRIVE + flow), mission(after + flow));
+    expect(changes.map(({ id }) => id)).toEqual(["Drive"]);
+  });
+
   it("say that another behavior is commanded, and what of it is left out", async () => {
     const after = DRIVE.replace('name="drive_route"', 'name="hold"').replace(
       '<m2pem:property name="route" value="alpha"/>',

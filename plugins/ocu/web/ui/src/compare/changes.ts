@@ -70,13 +70,15 @@ function detailsOf(before: ModdleElement, after: ModdleElement): string[] {
   const old = propertiesOf(before);
   const now = propertiesOf(after);
   if (before.$type !== after.$type) {
-    old.set("type", before.$type.split(":").at(-1)!);
-    now.set("type", after.$type.split(":").at(-1)!);
+    for (const [found, { $type }] of [[old, before], [now, after]] as const) {
+      const type = $type.split(":").at(-1)!;
+      found.set("type", { text: type, compared: type });
+    }
   }
   return [...new Set([...old.keys(), ...now.keys()])].flatMap((label) => {
     const [one, other] = [old.get(label), now.get(label)];
-    if (one === other) return [];
-    const values = { label, before: one ?? words.empty, after: other ?? words.empty };
+    if (one?.compared === other?.compared) return [];
+    const values = { label, before: one?.text ?? words.empty, after: other?.text ?? words.empty };
     if (one === undefined) return [fill(words.rowAdded, values)];
     return [fill(other === undefined ? words.rowRemoved : words.row, values)];
   });

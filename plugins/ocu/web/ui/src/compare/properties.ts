@@ -26,21 +26,29 @@ const WRAPPERS = new Set(["extensionElements", "values", "parameters", "allocati
 const propertiesOfType = (element: ModdleElement): Property[] =>
   (element.$descriptor as unknown as { properties: Property[] }).properties ?? [];
 
+export interface PropertyValue {
+  text: string;
+  /** Of a reference the id of its target, which stays when that gets another name. */
+  compared: string;
+}
+
+export type Properties = Map<string, PropertyValue>;
+
 /** Names of properties, with all of what is inside the element, and their values. */
-export function propertiesOf(element: ModdleElement): Map<string, string> {
-  const found = new Map<string, string>();
+export function propertiesOf(element: ModdleElement): Properties {
+  const found: Properties = new Map();
   collect(element, [], found);
   return found;
 }
 
-function collect(element: ModdleElement, path: readonly string[], found: Map<string, string>) {
+function collect(element: ModdleElement, path: readonly string[], found: Properties) {
   for (const property of propertiesOfType(element)) {
     const local = property.ns.localName;
     if (property.isVirtual || property.isId || STRUCTURE.has(local)) continue;
     const value = element.get(property.name);
     const values = property.isMany ? ((value as unknown[] | undefined) ?? []) : [value];
     if (property.isReference) {
-      put(found, [...path, labelOf(local)], values.map(nameOf).filter(Boolean).join(", "));
+      for (const each of values) put(found, [...path, labelOf(local)], nameOf(each), idOf(each));
     } else if (property.isBody) {
       put(found, path, String(value ?? "").trim());
     } else {
@@ -52,7 +60,7 @@ function collect(element: ModdleElement, path: readonly string[], found: Map<str
   }
 }
 
-function add(value: unknown, local: string, path: readonly string[], found: Map<string, string>) {
+function add(value: unknown, local: string, path: readonly string[], found: Properties) {
   if (value === undefined || value === null) return;
   if (!isModdle(value)) {
     // The name of a behavior is what it does; that of an element is its name.
@@ -88,12 +96,20 @@ const isModdle = (value: unknown): value is ModdleElement =>
   typeof value === "object" && value !== null && "$type" in value;
 
 /** Values of one name are together, in the order of the file. */
-function put(found: Map<string, string>, path: readonly string[], value: string) {
-  if (value === "") return;
+function put(found: Properties, path: readonly string[], text: string, compared = text) {
+  if (text === "") return;
   const name = path.join(", ");
   const known = found.get(name);
-  found.set(name, known === undefined ? value : `${known}, ${value}`);
+  found.set(
+    name,
+    known === undefined
+      ? { text, compared }
+      : { text: `${known.text}, ${text}`, compared: `${known.compared}, ${compared}` },
+  );
 }
+
+const idOf = (value: unknown): string =>
+  (isModdle(value) && String(value.get("id") ?? "")) || nameOf(value);
 
 function nameOf(value: unknown): string {
   if (!isModdle(value)) return value === undefined ? "" : String(value);
