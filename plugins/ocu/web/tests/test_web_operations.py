@@ -60,7 +60,7 @@ COMMANDS: dict[str, tuple[str, str, Any]] = {
     "answer_control": ("POST", "/api/resources/ugv1/camera/hand-over", {"give": True}),
     "add_note": ("POST", "/api/runs/r1/notes", {"text": "windy"}),
     "take": ("POST", "/api/resources/ugv1/camera/take", None),
-    "give_back": ("POST", "/api/resources/ugv1/camera/give-back", None),
+    "give_back": ("POST", "/api/resources/ugv1/camera/give-back", {"reason": "rain"}),
 }
 SENT = {
     "run": "r1",
@@ -142,6 +142,7 @@ def control() -> Mock:
     for name in COMMANDS:
         setattr(control, name, AsyncMock(spec=getattr(MissionControl, name), return_value=[]))
     control.start_scheduled.return_value = "r1"
+    control.fleet = Mock(return_value=Mock(vehicles={}, payloads={}))
     control.waiting = AsyncMock(return_value=[])
     entry = ScheduledMission(SENT["entry"], "M", "P", When(), "", ScheduledStatus.SCHEDULED)
     control.scheduled = AsyncMock(return_value=Schedule((entry,)))
