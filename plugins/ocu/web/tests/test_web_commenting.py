@@ -23,7 +23,7 @@ async def test_a_comment_on_an_element_is_seen_answered_and_resolved(
         await expect(badge).to_be_visible()
         await expect(other.locator(".comments")).to_contain_text("10 m is too far here")
         await badge.press("Enter")
-        await expect(other.get_by_label("Comment on REVERSE")).to_be_visible()
+        await expect(other.get_by_role("textbox", name="Comment on REVERSE")).to_be_visible()
         await expect(other.get_by_role("button", name="Delete: 10 m")).to_have_count(0)
         await other.get_by_role("button", name="Answer", exact=True).click()
         await other.get_by_label("Answer to anna").fill("5 m, then")

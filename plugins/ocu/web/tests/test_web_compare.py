@@ -69,8 +69,10 @@ async def test_versions_are_compared_on_diagrams_on_the_map_and_in_words(desk: D
 
 async def moved_together(page: Page) -> None:
     """What is dragged in one diagram is dragged in the other."""
-    places = "() => [...document.querySelectorAll('.cmp-sheet .viewport')].map(TRANSFORM)"
-    read = places.replace("TRANSFORM", "(each) => each.getAttribute('transform')")
+    read = """() => [...document.querySelectorAll('.cmp-sheet .viewport')].map((each) => {
+      const { a, e, f } = each.getCTM();
+      return [a, e, f].map((number) => Math.round(number * 100));
+    })"""
     before = await page.evaluate(read)
     box = await page.get_by_role("region", name="Before").bounding_box()
     assert box is not None

@@ -61,7 +61,7 @@ async def test_a_vehicle_whose_link_is_lost_is_gray_and_comes_back(
         card = page.locator(".card", has_text=VEHICLE)
         listed = vehicles_on(page)
         await expect(card).not_to_contain_class("card-stale")
-        await expect(listed).to_contain_text(f"{VEHICLE}: Well")
+        await expect(listed).to_contain_text(f"{VEHICLE}: OK")
         assert LOST not in await colours(page)
         await page.mouse.move(*await middle_drawn(page))
         await expect(page.locator(".map-over-vehicle")).to_be_attached()
@@ -73,7 +73,7 @@ async def test_a_vehicle_whose_link_is_lost_is_gray_and_comes_back(
         plugins.made.restore_link(ResourceId(VEHICLE))
         await expect(card).not_to_contain_class("card-stale")
         await expect(card).not_to_contain_text("silent for")
-        await expect(listed).to_contain_text(f"{VEHICLE}: Well")
+        await expect(listed).to_contain_text(f"{VEHICLE}: OK")
         assert LOST not in await colours(page)
         it.assert_well()
 

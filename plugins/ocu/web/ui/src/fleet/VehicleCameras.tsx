@@ -1,10 +1,10 @@
 // What the cameras of a vehicle see, or a camera itself, once that is asked for.
 import { signal } from "@preact/signals";
-import { lazy, Suspense } from "preact/compat";
+import { loaded } from "../shared/loaded";
 import type { Fleet } from "../shared/types";
 import { strings } from "../strings";
 
-const CameraList = lazy(() => import("../operate/cameras/CameraList"));
+const CameraList = loaded(() => import("../operate/cameras/CameraList"));
 
 /** Whether they are shown, of whichever vehicle is chosen. */
 const areShown = signal(false);
@@ -24,11 +24,7 @@ export function VehicleCameras({ fleet, resource }: { fleet: Fleet; resource: st
       >
         {areShown.value ? strings.fleet.hideCameras : strings.fleet.showCameras}
       </button>
-      {areShown.value && (
-        <Suspense fallback={<p class="nothing">{strings.cameras.connecting}</p>}>
-          <CameraList payloads={cameras} />
-        </Suspense>
-      )}
+      {areShown.value && <CameraList payloads={cameras} />}
     </div>
   );
 }

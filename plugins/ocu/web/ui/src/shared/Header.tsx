@@ -1,6 +1,5 @@
 // On every page: which fleet, who looks, whether what moves is real, and how to stop it.
 import { effect, signal } from "@preact/signals";
-import { lazy, Suspense } from "preact/compat";
 import { useEffect, useRef } from "preact/hooks";
 import { ControlRequests } from "../people/ControlRequests";
 import { Present } from "../people/Present";
@@ -8,6 +7,7 @@ import { fill, strings } from "../strings";
 import { AlertBell } from "../alerts/AlertBell";
 import { calling } from "../alerts/alerts";
 import { connect, connection, prompts } from "./executive";
+import { loaded } from "./loaded";
 import { go, route } from "./router";
 import { may, session, signOut } from "./session";
 import { standbys } from "./standbys";
@@ -19,7 +19,7 @@ import "./theme";
 import { attempt } from "./Toasts";
 import "./header.css";
 
-const SettingsDialog = lazy(() => import("../settings/SettingsDialog"));
+const SettingsDialog = loaded(() => import("../settings/SettingsDialog"));
 
 const text = strings.shell;
 
@@ -119,9 +119,7 @@ export function Header() {
         )}
       </header>
       {isSetting.value && (
-        <Suspense fallback={null}>
-          <SettingsDialog onClose={() => (isSetting.value = false)} />
-        </Suspense>
+        <SettingsDialog onClose={() => (isSetting.value = false)} />
       )}
       {who && <StopAlert />}
       {who && <ControlRequests />}

@@ -1,11 +1,11 @@
 // Where everybody is; and routes, areas and points, which operators draw for the mission.
 import { useComputed, useSignal } from "@preact/signals";
-import { lazy, Suspense } from "preact/compat";
 import { useEffect, useRef } from "preact/hooks";
 import { clock, STALE_S } from "../../shared/format";
 import { unknownSince } from "../../shared/executive";
 import { remember, remembered } from "../../shared/memory";
 import { may, session } from "../../shared/session";
+import { loaded } from "../../shared/loaded";
 import { fill, strings } from "../../strings";
 import { useOperating } from "../context";
 import { Pane } from "../layout/Pane";
@@ -22,7 +22,7 @@ import "./map.css";
 const text = strings.operate.map;
 
 /** Few operators look at it in a run. */
-const VersionsPanel = lazy(() => import("./VersionsPanel"));
+const VersionsPanel = loaded(() => import("./VersionsPanel"));
 
 const SHOWS: MapShows = { trails: true, names: true, footprints: true, geometries: true };
 const AGES_MS = 500;
@@ -128,9 +128,7 @@ export function MapPane({ formInside }: { formInside: boolean }) {
       <VehicleList vehicles={listed} />
       {formInside && draft.value && <DrawForm draft={draft.value} />}
       {!draft.value && versionsOf.value && (
-        <Suspense fallback={<p class="nothing">{strings.operate.run.loading}</p>}>
-          <VersionsPanel name={versionsOf} compared={compared} />
-        </Suspense>
+        <VersionsPanel name={versionsOf} compared={compared} />
       )}
       <Nobody />
     </Pane>
