@@ -224,7 +224,8 @@ async def test_another_mission_by_another_ground_station_is_noticed(
 async def test_failsafes_are_read_and_compared() -> None:
     async with flying() as (truth, vehicle):
         truth.autopilot.parameters["FS_GCS_ENABLE"] = 0.0
-        found = await failsafe.check(vehicle, "return_to_launch", OWN.system)
+        monitor = failsafe.FailsafeMonitor(vehicle, "return_to_launch", OWN.system)
+        found = await monitor.findings()
         texts = [str(each) for each in found]
         assert (
             "uav1: fleet says return_to_launch on loss of link, FS_GCS_ENABLE is 0 (disabled): "
@@ -232,7 +233,7 @@ async def test_failsafes_are_read_and_compared() -> None:
         ) in texts
         assert any("monitors the ground station with system id 255" in text for text in texts)
         truth.autopilot.parameters["FS_GCS_ENABLE"] = 1.0
-        found = await failsafe.check(vehicle, "return_to_launch", OWN.system)
+        found = await monitor.findings()
         assert "FS_GCS_ENABLE" not in [each.parameter for each in found]
 
 

@@ -49,7 +49,7 @@ async def test_a_mission_is_overwritten_deliberately_and_theirs_is_kept(desk: De
     await expect(page.locator(SAVED)).to_have_text("Saved")
     assert "MINE" in (missions / "vignette1.bpmn").read_text()
     await page.get_by_role("button", name="More").click()
-    await page.get_by_role("menuitem", name="Versions").click()
+    await page.get_by_role("menuitem", name="Versions…", exact=True).click()
     await page.locator("tbody tr").nth(1).get_by_role("button").click()
     await expect(page.locator("[data-element-id=Reverse]").first).to_contain_text("THEIRS")
 

@@ -88,6 +88,7 @@ async def test_what_calls_is_seen_on_every_page_of_a_phone(
         await expect(page.get_by_role("link", name="question open")).to_be_in_viewport(ratio=1)
         await assert_calls_are_seen(page, where)
     await page.goto(run)
+    await expect(answer(page, "Continue")).to_be_enabled()  # it takes the focus when it appears
     await page.get_by_role("button", name=BELL).click()
     await expect(page.get_by_role("dialog", name="Alerts")).to_be_in_viewport(ratio=1)
     await assert_calls_are_seen(page, "panel of alerts")
