@@ -59,7 +59,7 @@ async def measured(running: Executive, run: str, seconds: float) -> Turn:
 
 
 async def alone(running: Executive, seconds: float) -> Turn:
-    """A run that nobody watches; no page is served."""
+    """A run without a browser; no page is served."""
     run = await running.control.start(MISSION)
     await asyncio.sleep(WARM_S)
     turn = await measured(running, run, seconds)

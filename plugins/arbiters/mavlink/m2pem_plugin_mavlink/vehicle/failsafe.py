@@ -290,7 +290,7 @@ class FailsafeMonitor:
 
     async def findings(self) -> tuple[FailsafeFinding, ...]:
         """Read the parameters of an identified vehicle, and compare; an unanswered one is among the
-        findings. A value that was read before stands in for an answer that does not come."""
+        findings. A value that was read before is used where no answer comes."""
         vehicle, identity = self._vehicle, self._vehicle.identity
         if not self._word or identity is None:
             return ()
@@ -310,7 +310,7 @@ class FailsafeMonitor:
 
     async def wait_for_change(self, within_s: float = AGAIN_S) -> None:
         """Wait until the vehicle reports another value of one of the parameters, as it does when
-        somebody sets one, or `within_s`, by the arbiter's clock."""
+        a person or program sets one, or `within_s`, by the arbiter's clock."""
         vehicle, identity = self._vehicle, self._vehicle.identity
         if identity is None:
             return

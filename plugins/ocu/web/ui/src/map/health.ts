@@ -19,7 +19,7 @@ const HEALTHS: readonly Health[] = [
 export const rankOf = (health: Health): number => HEALTHS.indexOf(health);
 
 export interface Condition {
-  /** Whether it was ever heard. */
+  /** Whether it has ever reported. */
   isKnown: boolean;
   /** The executive is not connected: what was received before may be over. */
   isUnknown?: boolean;

@@ -1,4 +1,4 @@
-// Trails on a canvas that is larger than the map. What is new is added to it; all is drawn anew only
+// Trails on a canvas that is larger than the map. What is new is added to it; all is drawn again only
 // where the map goes beyond it, or zooms.
 import L from "leaflet";
 import { MapCanvas } from "./mapCanvas";
@@ -31,7 +31,7 @@ export class TrailLayer extends MapCanvas {
     super("overlayPane", "trail-canvas");
   }
 
-  /** Where a vehicle has been, anew. */
+  /** Where a vehicle has been, drawn again. */
   replace(resource: string, pieces: readonly (readonly L.LatLngTuple[])[]): void {
     this.trailOf(resource).replace(pieces.map((piece) => piece.map(worldOf)));
     this.reset();
@@ -67,7 +67,7 @@ export class TrailLayer extends MapCanvas {
     this.ask();
   }
 
-  /** Draw anew if the map shows what the canvas does not have. */
+  /** Draw again if the map shows what the canvas does not have. */
   protected moved(): void {
     const { map } = this;
     if (!map) return;

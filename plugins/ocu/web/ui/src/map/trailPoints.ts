@@ -14,7 +14,7 @@ export class TrailPoints {
 
   constructor(private readonly most: number) {}
 
-  /** All of it, anew. */
+  /** All of it, drawn again. */
   replace(pieces: readonly (readonly WorldPoint[])[]): void {
     this.pieces.length = 0;
     this.count = 0;

@@ -29,10 +29,10 @@ const SYMBOL_PX = 26;
 /** A picture of a symbol has room for its badge. */
 const PICTURE_PX = 44;
 const CLUSTER_PX = 17;
-/** Pictures are kept for so many headings of a turn: nobody sees less. */
+/** Pictures are kept for so many headings of a turn: no person sees a difference. */
 const HEADINGS = 72;
 
-/** What is told apart by its shape too. */
+/** What differs by its shape too. */
 const BADGES: Partial<Record<Health, string>> = {
   lost: "✕",
   unheard: "?",

@@ -17,7 +17,7 @@ export interface Span {
   to: number | null;
   end: SpanEnd;
   reason: string;
-  /** How many bars of the row it stands for, which are too short to be seen each; 1 if missing. */
+  /** How many bars of the row it replaces, which are too short to be seen each; 1 if missing. */
   count?: number;
 }
 

@@ -43,7 +43,7 @@ export class MapPlan {
   readonly isShown = signal(remembered("editor-map", false));
   /** The geometry that is looked at, by its name. */
   readonly selected = signal("");
-  /** What is being drawn anew. */
+  /** What is being drawn. */
   readonly draft = signal<Draft | null>(null);
   readonly picking = signal<Picking | null>(null);
   readonly incoming = signal<Incoming | null>(null);

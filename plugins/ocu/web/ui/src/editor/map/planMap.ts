@@ -127,7 +127,7 @@ export class PlanMap {
     this.nameGeometries();
   }
 
-  /** Handles at the vertices of what is changed, or drawn anew; null: of nothing. */
+  /** Handles at the vertices of what is changed, or drawn; null: of nothing. */
   edit(draft: Draft | null, isNew: boolean): void {
     this.draft = draft;
     this.isNew = isNew && draft !== null;

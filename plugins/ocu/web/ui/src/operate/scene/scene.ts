@@ -58,7 +58,7 @@ export interface Scene {
   readonly telemetryProblem: string;
   /** Where a vehicle has been up to now, the newest last; cut where nothing is known of it. */
   trail(resource: string): GeoPosition[][];
-  /** Rises when trails are to be drawn anew: time has jumped, or more is known of before. */
+  /** Rises when trails are to be drawn again: time has jumped, or more is known of before. */
   readonly jumps: ReadonlySignal<number>;
   /** Seconds since the last state of a resource; null: there was none. */
   silentFor_s(resource: string): number | null;

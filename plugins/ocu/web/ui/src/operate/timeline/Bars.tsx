@@ -92,7 +92,7 @@ export function Bars({ rows, window, width, now, lane_px, onSeek }: BarsProps) {
   );
 }
 
-/** `label`: of its element. A bar that stands for many says how many, of what they share. */
+/** `label`: of its element. A bar that replaces many says how many, of what they share. */
 function shownOf(span: Span, label: string): string {
   const both = span.kind === "behavior" ? [label, span.label] : [label];
   const said = both.filter(Boolean).join(" · ");

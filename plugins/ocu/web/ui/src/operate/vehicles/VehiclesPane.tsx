@@ -66,7 +66,7 @@ interface CardProps {
   silent_s: number | null;
 }
 
-/** Drawn anew when it has its turn; at once when what it does or who has it changes. */
+/** Drawn again when it has its turn; at once when what it does or who has it changes. */
 class CardInTurn extends Component<CardProps & { hasTurn: boolean }> {
   override shouldComponentUpdate({ hasTurn }: { hasTurn: boolean }): boolean {
     return hasTurn;

@@ -1,4 +1,4 @@
-// Which cards are drawn anew: of many, those in view each time, and the others in turn.
+// Which cards are drawn again: of many, those in view each time, and the others in turn.
 import type { RefObject } from "preact";
 import { useEffect, useRef } from "preact/hooks";
 
