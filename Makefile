@@ -207,11 +207,11 @@ UNITS := $(addprefix tests/,api bpmn control_socket deconfliction diagram editin
 check: lint ## check style, types, layers and the core's unit tests: two minutes
 	@$(BIN)/pytest -n 2 -m "not long" $(UNITS)
 
-# What the tests leave of the processors, the others use; each of these is printed when it has ended.
-ASIDE := lint bench-quick page-test test-ros
+# What the tests leave of the processors, the others use, one after the other; each is printed when it has ended.
+ASIDE := test-ros lint page-test bench-quick
 
 test: setup ## check all but the long tests
-	@$(MAKE) --silent --jobs 5 $(ASIDE:%=%-aside) test-core
+	@$(MAKE) --silent --jobs 2 test-core $(ASIDE:%=%-aside)
 
 .PHONY: test-core $(ASIDE:%=%-aside)
 
