@@ -25,6 +25,10 @@ AMPLE_S = 800.0
 PATIENT = {"lost_after_s": 40.0}
 """Two seconds of the wall clock, at twenty times its speed: tests share their processors."""
 
+MAVSDK_SPEED = 5.0
+"""Its threads keep to the wall clock, also while the processors are busy: an exchange, which gives
+up after 5 s of its own clock, has a second."""
+
 DOMAINS = {Kind.COPTER: "air", Kind.ROVER: "ground", Kind.PLANE: "air", Kind.BOAT: "surface"}
 
 

@@ -26,10 +26,12 @@ class _Simulated(ArbiterContract):
 
     kind = Kind.ROVER
     firmware = "ardupilot"
+    speed = SPEED
 
     @pytest.fixture
     def simulator(self):
-        return Simulator(specs(self.kind, self.kind, firmware=self.firmware), speed=SPEED, to=None)
+        pair = specs(self.kind, self.kind, firmware=self.firmware)
+        return Simulator(pair, speed=self.speed, to=None)
 
     @pytest.fixture
     def run(self, simulator):
@@ -44,7 +46,7 @@ class _Simulated(ArbiterContract):
         return run
 
     def play(self, main) -> None:
-        run_on_loopback(main, SPEED)
+        run_on_loopback(main, self.speed)
 
     async def prepare(self, simulator, clock) -> None:
         """Have the vehicles ready to move."""

@@ -4,13 +4,13 @@ import math
 
 import pytest
 from m2pem_plugin_mavlink.simulator.specification import Kind
-from mavlink_simulated import at, fly
+from mavlink_simulated import MAVSDK_SPEED, at, fly
 
 from m2pem.api import Area, Point, Route
 
 
 def by_mavsdk(main, *kinds):
-    fly(main, *kinds, driver="mavsdk")
+    fly(main, *kinds, speed=MAVSDK_SPEED, driver="mavsdk")
 
 
 def test_a_copter_takes_off_flies_a_route_circles_and_returns():

@@ -7,17 +7,17 @@ import pytest
 import test_mavlink_contract_udp as over_udp
 from m2pem_plugin_mavlink.arbiter import MavlinkArbiter
 from mavlink_mavsdk_world import native_threads, threads_fall_to
-from mavlink_simulated import connections
+from mavlink_simulated import MAVSDK_SPEED, connections
 
 from m2pem.api.clock import SystemClock
 
 
 class _Mavsdk:
     unsupported: ClassVar = {"virtual clock": "threads of MAVSDK wait for real time to pass"}
-    speed = over_udp.SPEED
+    speed = MAVSDK_SPEED
 
     def play(self, main) -> None:
-        asyncio.run(main(SystemClock(over_udp.SPEED)))
+        asyncio.run(main(SystemClock(self.speed)))
 
     @pytest.fixture(autouse=True)
     def nothing_is_left_of_mavsdk(self, simulator):

@@ -14,6 +14,7 @@ from m2pem_plugin_ros.frames import to_geodetic
 from m2pem_plugin_ros.host_checks import check_host
 from m2pem_plugin_ros.runtime import RosRuntime, qos
 from m2pem_plugin_ros.testing import Peer, reserved_domain
+from ros_base_bench import until
 from std_msgs.msg import String
 
 from m2pem.api import (
@@ -112,11 +113,12 @@ def arbiter_for(settings: Mapping[str, Any]) -> RosArbiter:
 
 @asynccontextmanager
 async def connected(
-    domain: int, settings: Mapping[str, Any]
+    domain: int, settings: Mapping[str, Any], vehicles: int = 1
 ) -> AsyncIterator[tuple[ArbiterHarness, Truth]]:
-    """`domain` is that of the vehicles."""
+    """`domain` is that of the vehicles, so many, which are discovered before the arbiter begins."""
     async with RosRuntime("watcher", domain_id=domain) as ros:
         truth = Truth(ros)
+        await until(lambda: ros.node.count_publishers("/truth") == vehicles)
         async with ArbiterHarness(arbiter_for(settings), SystemClock()) as bench:
             yield bench, truth
 
@@ -154,7 +156,8 @@ async def test_it_is_named_in_the_first_state_and_nothing_moves(
     vehicles, settings, *says = PROBLEMS[name]
     for arguments in vehicles:
         peers.enter_context(Peer(PEER, ros_domain, arguments))
-    async with connected(ros_domain, {**settings, "domain_id": ros_domain}) as (bench, truth):
+    settings = {**settings, "domain_id": ros_domain}
+    async with connected(ros_domain, settings, len(vehicles)) as (bench, truth):
         first, reason = await first_reasons(bench), await rejected(bench)
         for text in says:
             assert text in first
@@ -186,7 +189,7 @@ async def test_a_vehicle_in_another_domain_is_named_with_it(
 async def test_operators_are_alerted_and_told_when_it_is_right(
     ros_domain: int, peers: ExitStack, caplog: pytest.LogCaptureFixture
 ) -> None:
-    async with connected(ros_domain, {**BASE, "domain_id": ros_domain}) as (bench, _):
+    async with connected(ros_domain, {**BASE, "domain_id": ros_domain}, 0) as (bench, _):
         assert "there is no other ROS node in domain" in await first_reasons(bench)
         assert "rover1: no message from the vehicle yet: /rover1/odom" in caplog.text
         peers.enter_context(Peer(PEER, ros_domain, ["/rover1", "base", "map"]))

@@ -12,7 +12,7 @@ from playwright.async_api import TimeoutError as PlaywrightTimeoutError
 SAVED = ".m2-saved-state"
 SELECTED = ".djs-element.selected[data-element-id]"
 MENU = ".djs-popup"
-WITHIN_S = 15.0
+WITHIN_S = 40.0
 TRAP_MS = 500
 
 

@@ -28,7 +28,7 @@ from m2pem.rehearsal.worker import rehearse_in_subprocess
 from m2pem.simulation.estimates import estimate_mission
 from m2pem.testing import scenarios
 
-WITHIN_S = 10.0
+WITHIN_S = 60.0
 VEHICLE = "ugv1"
 SPEED = 20.0
 SLOW_S = 60.0
