@@ -272,6 +272,8 @@ def encode_parameters(
             case Route() if len(value.waypoints) <= longest_route:
                 route = [list(each) for each in value.waypoints]
                 encoded[name] = {"route": route, "frame": value.altitude_frame}
+                if value.speeds_m_s:
+                    encoded[name]["speeds"] = list(value.speeds_m_s)
             case VehiclePosition():
                 encoded[name] = {"vehicle": value.vehicle}
             case bool() | int() | float() | str():
@@ -294,7 +296,8 @@ def _decoded(value: Any) -> ResolvedValue:
     if "vehicle" in value:
         return VehiclePosition(str(value["vehicle"]))
     if "route" in value:
-        return Route(tuple(map(_coordinate, value["route"])), str(value["frame"]))
+        speeds = tuple(None if each is None else float(each) for each in value.get("speeds", ()))
+        return Route(tuple(map(_coordinate, value["route"])), str(value["frame"]), speeds)
     return Point(_coordinate(value["point"]), str(value["frame"]))
 
 

@@ -195,15 +195,20 @@ def part_of_route(
 ) -> Route:
     """Return the part of a route between two distances along it. `line`: the route in `frame`."""
     to_m = min(to_m, line.length_m)
-    waypoints = [
-        waypoint
-        for waypoint, mark_m in zip(route.waypoints, line.marks_m, strict=True)
-        if from_m - 1e-6 <= mark_m <= to_m + 1e-6
+    kept = [
+        index for index, mark_m in enumerate(line.marks_m) if from_m - 1e-6 <= mark_m <= to_m + 1e-6
     ]
+    waypoints = [route.waypoints[index] for index in kept]
+    speeds = [route.speeds_m_s[index] if route.speeds_m_s else None for index in kept]
     for end_m, place in ((from_m, 0), (to_m, len(waypoints) + 1)):
         if all(abs(end_m - mark_m) >= 1e-6 for mark_m in line.marks_m):
             waypoints.insert(place, _between(route, line, frame, end_m))
-    return Route(tuple(waypoints), route.altitude_frame)
+            speeds.insert(place, None)
+    before = sum(mark_m <= from_m + 1e-6 for mark_m in line.marks_m)
+    if speeds:
+        speeds[0] = route.speed_from(before - 1)
+    given = tuple(speeds) if any(speed is not None for speed in speeds) else ()
+    return Route(tuple(waypoints), route.altitude_frame, given)
 
 
 def _between(route: Route, line: Polyline, frame: LocalFrame, along_m: float) -> Coordinate:

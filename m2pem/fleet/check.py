@@ -14,6 +14,7 @@ from m2pem.fleet.parameters import ParameterProblem, examine
 from m2pem.fleet.same_vehicle import check_same_vehicle
 from m2pem.fleet.shortage import Demand, check_shortages
 from m2pem.fleet.space_check import check_space
+from m2pem.fleet.speed_check import check_speeds
 from m2pem.fleet.task_findings import TaskFindings
 from m2pem.fleet.terrain_check import GroundCheck
 from m2pem.geo.positions import NO_ORIGIN, geometry_out_of_reach
@@ -443,6 +444,7 @@ class _Check:
                 findings.add(problem.rule, message, problem.remedy, line=line, role=taker.role)
         if not problems:
             self.ground.check(acting, values, lines, findings)
+            check_speeds(behavior, self.fleet, acting, values, findings)
 
     def _unknown_geometry(
         self, problem: ParameterProblem, name: str, line: int, taker: _Taker, findings: TaskFindings

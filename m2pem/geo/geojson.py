@@ -1,7 +1,8 @@
 """Geometries as GeoJSON (RFC 7946): how fleets, editors and operators name places.
 
 Positions are WGS-84 `[longitude, latitude, altitude]`, in degrees and metres. Altitudes are
-relative to home unless a Feature's properties say `"altitude_frame": "amsl"` or `"terrain"`.
+relative to home unless a Feature's properties say `"altitude_frame": "amsl"` or `"terrain"`. A
+route's property `"speeds_m_s"` has a speed or null for each position (`Route.speeds_m_s`).
 """
 
 import math
@@ -15,6 +16,7 @@ from m2pem.suggestions import suggest
 
 ALTITUDE_FRAMES = ("relative", "amsl", "terrain")
 
+_SPEEDS = "speeds_m_s"
 _TYPES = ("LineString", "MultiPoint", "Polygon", "Point", "Feature", "FeatureCollection")
 
 
@@ -32,7 +34,7 @@ def parse_geojson(value: Mapping[str, Any]) -> Point | Route | Area:
     Raises:
         GeometryError: not GeoJSON, another type, a position out of range, a ring not closed.
     """
-    return _parse(value, "relative", depth=0)
+    return _parse(value, {}, depth=0)
 
 
 def as_geojson(geometry: Point | Route | Area) -> dict[str, Any]:
@@ -45,9 +47,12 @@ def as_geojson(geometry: Point | Route | Area) -> dict[str, Any]:
     else:
         kind = "Polygon"
         coordinates = [[_written(each) for each in ring] for ring in geometry.rings]
+    properties: dict[str, Any] = {"altitude_frame": geometry.altitude_frame}
+    if isinstance(geometry, Route) and geometry.speeds_m_s:
+        properties[_SPEEDS] = list(geometry.speeds_m_s)
     return {
         "type": "Feature",
-        "properties": {"altitude_frame": geometry.altitude_frame},
+        "properties": properties,
         "geometry": {"type": kind, "coordinates": coordinates},
     }
 
@@ -58,7 +63,7 @@ def _written(place: Coordinate) -> list[Any]:
     return level if altitude_m is None else [*level, altitude_m]
 
 
-def _parse(value: object, altitude_frame: str, depth: int) -> Point | Route | Area:
+def _parse(value: object, properties: Mapping[str, Any], depth: int) -> Point | Route | Area:
     if not isinstance(value, Mapping):
         raise GeometryError("is not GeoJSON: an object with 'type' is expected")
     check_crs(value)
@@ -68,15 +73,19 @@ def _parse(value: object, altitude_frame: str, depth: int) -> Point | Route | Ar
         if not isinstance(features, list) or len(features) != 1:
             count = len(features) if isinstance(features, list) else "no"
             raise GeometryError(f"has {count} features; one geometry is expected")
-        return _parse(features[0], altitude_frame, depth=1)
+        return _parse(features[0], properties, depth=1)
     if kind == "Feature" and depth <= 1:
-        return _parse(value.get("geometry"), _frame(value.get("properties")), depth=2)
+        own = value.get("properties")
+        return _parse(value.get("geometry"), own if isinstance(own, Mapping) else {}, depth=2)
     coordinates = value.get("coordinates")
+    altitude_frame, speeds = _frame(properties), properties.get(_SPEEDS)
+    if speeds is not None and kind in ("Point", "Polygon"):
+        raise GeometryError(f"{_SPEEDS}: only a route has speeds, and this is a {kind}")
     if kind == "Point":
         return Point(position(coordinates, "coordinates"), altitude_frame)
     if kind in ("LineString", "MultiPoint"):
         waypoints = _positions(coordinates, "coordinates", 2 if kind == "LineString" else 1)
-        return Route(waypoints, altitude_frame)
+        return Route(waypoints, altitude_frame, _speeds(speeds, len(waypoints)))
     if kind == "Polygon":
         if not isinstance(coordinates, list | tuple) or not coordinates:
             raise GeometryError("coordinates: a Polygon is a list of rings")
@@ -97,8 +106,23 @@ def check_crs(value: Mapping[str, Any]) -> None:
         raise GeometryError("its 'crs' is not WGS-84; export it as WGS-84 longitude and latitude")
 
 
-def _frame(properties: object) -> str:
-    frame = properties.get("altitude_frame") if isinstance(properties, Mapping) else None
+def _speeds(value: object, count: int) -> tuple[float | None, ...]:
+    if value is None:
+        return ()
+    if not isinstance(value, list | tuple) or len(value) != count:
+        raise GeometryError(f"{_SPEEDS}: a list of {count} is expected, a speed or null a position")
+    speeds = tuple(
+        None if each is None else _number(each, "speed", f"{_SPEEDS}[{index}]")
+        for index, each in enumerate(value)
+    )
+    for index, speed in enumerate(speeds):
+        if speed is not None and speed <= 0:
+            raise GeometryError(f"{_SPEEDS}[{index}]: speed {speed:g} m/s is not above 0")
+    return speeds if any(speed is not None for speed in speeds) else ()
+
+
+def _frame(properties: Mapping[str, Any]) -> str:
+    frame = properties.get("altitude_frame")
     if frame is None:
         return "relative"
     if frame not in ALTITUDE_FRAMES:

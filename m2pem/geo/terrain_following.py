@@ -29,7 +29,7 @@ def follow_terrain(
 
     `height_m`: above the ground, everywhere; None: the altitude of each waypoint counts as its
     height above ground, in whatever frame it is, and changes evenly in between. The ground is
-    looked up every `step_m`. Waypoints of the route stay.
+    looked up every `step_m`. Waypoints of the route stay, with their speeds.
 
     Raises:
         GeometryError: a waypoint has no altitude and `height_m` is None, or it needs more than
@@ -62,7 +62,8 @@ def follow_terrain(
             "allow a greater tolerance, or follow shorter routes"
         )
     waypoints: list[Coordinate] = [(*places[at], round(wanted[at], 1)) for at in kept]
-    return Route(tuple(waypoints), "amsl")
+    own = dict(zip(corners, route.speeds_m_s, strict=False))
+    return Route(tuple(waypoints), "amsl", tuple(own.get(at) for at in kept) if own else ())
 
 
 def not_covered(place: LatLon) -> str:

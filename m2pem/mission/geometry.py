@@ -17,10 +17,20 @@ class Point:
 
 @dataclass(frozen=True, slots=True)
 class Route:
-    """Waypoints in order (a GeoJSON LineString)."""
+    """Waypoints in order (a GeoJSON LineString).
+
+    `speeds_m_s`: of each waypoint, how fast the vehicle goes from there on, until another waypoint
+    has a speed; None: it has none. Empty: no waypoint has one.
+    """
 
     waypoints: tuple[Coordinate, ...]
     altitude_frame: str = "relative"
+    speeds_m_s: tuple[float | None, ...] = ()
+
+    def speed_from(self, index: int) -> float | None:
+        """Return how fast a vehicle leaves a waypoint, in m/s; None: as fast as it does anyway."""
+        given = (speed for speed in self.speeds_m_s[index::-1] if speed is not None)
+        return next(given, None) if index >= 0 else None
 
 
 @dataclass(frozen=True, slots=True)

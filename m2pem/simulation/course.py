@@ -1,7 +1,8 @@
 """Building a vehicle's plan step by step, with rounded turning points."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Self, TypeAlias, Union
 
@@ -32,10 +33,11 @@ _NOTHING_M = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A straight piece."""
+    """A straight piece. `leg`: which one it is on, from 0."""
 
     start: Vector
     end: Vector
+    leg: int = field(default=0, compare=False)
 
     @property
     def level_m(self) -> float:
@@ -69,7 +71,7 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class Bend:
-    """An arc around `centre`; `sweep_rad` is counter-clockwise."""
+    """An arc around `centre`; `sweep_rad` is counter-clockwise. `leg`: that which it leads to."""
 
     centre: tuple[float, float]
     radius_m: float
@@ -77,6 +79,7 @@ class Bend:
     sweep_rad: float
     up_m: float
     climb_m: float
+    leg: int = field(default=0, compare=False)
 
     @property
     def level_m(self) -> float:
@@ -103,7 +106,11 @@ def rounded(points: list[Vector], radius_m: float) -> list[list[Piece]]:
     A corner gets a bend of `radius_m`, smaller where the legs are short. Between two runs the
     vehicle stops and turns: at sharp corners, and where a leg goes straight up or down.
     """
-    legs = [Line(a, b) for a, b in pairwise(points) if math.dist(a, b) > _NOTHING_M]
+    legs = [
+        Line(a, b, leg)
+        for leg, (a, b) in enumerate(pairwise(points))
+        if math.dist(a, b) > _NOTHING_M
+    ]
     runs: list[list[Piece]] = [[]]
     for index, leg in enumerate(legs):
         start = leg.start
@@ -120,7 +127,7 @@ def rounded(points: list[Vector], radius_m: float) -> list[list[Piece]]:
             if bend is not None:
                 end = leg.point(leg.level_m - cut_m)
         if math.dist(start, end) > _NOTHING_M:
-            runs[-1].append(Line(start, end))
+            runs[-1].append(Line(start, end, leg.leg))
     return [run for run in runs if run]
 
 
@@ -140,7 +147,9 @@ def _bend(before: Line, after: Line, radius_m: float) -> tuple[Bend | None, floa
     start, end = before.point(before.level_m - cut_m), after.point(cut_m)
     aside = before.yaw_rad + math.copysign(math.pi / 2, sweep)
     centre = (start[0] + radius_m * math.cos(aside), start[1] + radius_m * math.sin(aside))
-    return Bend(centre, radius_m, aside + math.pi, sweep, start[2], end[2] - start[2]), cut_m
+    climb_m = end[2] - start[2]
+    bend = Bend(centre, radius_m, aside + math.pi, sweep, start[2], climb_m, after.leg)
+    return bend, cut_m
 
 
 ALOFT_M = 0.5
@@ -221,17 +230,28 @@ class Course:
         return self.through([(self.place[0], self.place[1], up_m)])
 
     def through(
-        self, points: list[Vector], speed_m_s: float | None = None, radius_m: float | None = None
+        self,
+        points: list[Vector],
+        speed_m_s: float | None = None,
+        radius_m: float | None = None,
+        leg_speeds_m_s: Sequence[float | None] = (),
     ) -> Self:
-        """Along straight legs, round corners (`radius_m` 0: stop and turn), to the last point."""
+        """Along straight legs, round corners (`radius_m` 0: stop and turn), to the last point.
+
+        `leg_speeds_m_s`: to each of the points, in place of `speed_m_s`; None: that.
+        """
         kinematics = self._craft.kinematics
         limit = min(speed_m_s or self._craft.cruise_m_s, kinematics.max_speed_m_s)
+        limits = [min(each or limit, kinematics.max_speed_m_s) for each in leg_speeds_m_s]
         radius = kinematics.turn_radius_m if radius_m is None else radius_m
         for run in rounded([self.place, *points], radius):
             first = run[0]
             if isinstance(first, Line) and first.level_m > 1e-6:
                 self.turn_to(first.yaw_rad)
-            pieces = [(piece.length_m, self._limit(piece, limit)) for piece in run]
+            pieces = [
+                (piece.length_m, self._limit(piece, limits[piece.leg] if limits else limit))
+                for piece in run
+            ]
             profiles = chain(pieces, kinematics.acceleration_m_s2, kinematics.deceleration_m_s2)
             for piece, profile in zip(run, profiles, strict=True):
                 self._add(piece, profile)

@@ -74,17 +74,20 @@ def _route(craft: Craft, parameters: LocalParameters) -> Manoeuvre:
     up = flying_height(craft, parameters)
     places = parameters.places(craft, route, up)
     speed = parameters.speed_m_s
-    course = under_way(craft, places[0][2]).through(places, speed)
+    own = route.speeds_m_s and speed is None
+    lap_speeds = [route.speed_from(index) for index in range(len(places))] if own else []
+    course = under_way(craft, places[0][2])
+    course.through(places, speed, leg_speeds_m_s=[None, *lap_speeds[:-1]] if own else ())
     if not parameters.loop:
         work = RemainingRoute(raw_parameters(parameters.given), route, parameters.frame)
         return Manoeuvre(course.plan(), work=work)
     first_leg = next((p for p in places if math.dist(p[:2], places[0][:2]) > 0.1), None)
     if first_leg is None:
         raise RefusedError("parameter 'loop': a route of one place cannot be repeated")
-    course.through([places[0]], speed)
+    course.through([places[0]], speed, leg_speeds_m_s=lap_speeds[-1:])
     course.turn_to(math.atan2(first_leg[1] - places[0][1], first_leg[0] - places[0][0]))
     lap = course.steps
-    course.through([*places[1:], places[0]], speed)
+    course.through([*places[1:], places[0]], speed, leg_speeds_m_s=lap_speeds)
     course.turn_to(math.atan2(first_leg[1] - places[0][1], first_leg[0] - places[0][0]))
     return Manoeuvre(course.plan(cycle_from=lap))
 

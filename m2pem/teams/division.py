@@ -52,7 +52,9 @@ def work_of(
     """Return the way of a part of a team behavior; None: it is neither a route nor a survey."""
     raw, given = raw_parameters(parameters), BehaviorParameters(parameters)
     if behavior == "single_vehicle_routing" and given.route is not None:
-        return RemainingRoute(raw, given.route, frame)
+        # A team goes at its own speed: `m2pem check` says that it ignores those of waypoints.
+        route = Route(given.route.waypoints, given.route.altitude_frame)
+        return RemainingRoute(raw, route, frame)
     if behavior != "area_survey" or given.area is None:
         return None
     area = given.area

@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import pytest
@@ -69,6 +70,21 @@ def test_the_rest_begins_where_the_vehicle_is_on_its_leg() -> None:
     assert rest.waypoints[1:] == ROUTE.waypoints[1:]
     work.moved((100.0, 20.0), 2)
     assert left(work).waypoints[0][2] is None, "the next waypoint has no altitude"
+
+
+def test_the_rest_goes_on_at_the_speed_of_the_waypoint_before() -> None:
+    route = replace(ROUTE, speeds_m_s=(2.0, None, 8.0, None))
+    work = RemainingRoute(raw_parameters({**PARAMETERS, "route": route}), route, FRAME)
+    work.moved((0.0, 0.0), 0)
+    assert left(work).speeds_m_s == (2.0, None, 8.0, None)
+    work.moved((25.0, 3.0), 1)
+    assert left(work).speeds_m_s == (2.0, None, 8.0, None)
+    work.reached(1)
+    assert left(work).speeds_m_s == (2.0, 8.0, None)
+    work.moved((60.0, 50.0), 3)
+    assert left(work).speeds_m_s == (8.0, None)
+    again = restored_work(json.loads(json.dumps(work.state())), FRAME)
+    assert left(again).speeds_m_s == (8.0, None)
 
 
 def test_a_waypoint_that_was_reached_is_where_the_rest_begins() -> None:

@@ -148,3 +148,38 @@ def test_kinds_have_the_names_that_people_use() -> None:
 )
 def test_a_geometry_is_read_back_as_it_was_written(geometry: Point | Route | Area) -> None:
     assert parse_geojson(as_geojson(geometry)) == geometry
+
+
+LANE = {"type": "LineString", "coordinates": [[10, 50], [10.1, 50], [10.2, 50]]}
+
+
+def with_speeds(speeds: object, geometry: object = LANE) -> dict[str, object]:
+    return {"type": "Feature", "properties": {"speeds_m_s": speeds}, "geometry": geometry}
+
+
+def test_the_speeds_of_waypoints_hold_until_another_one() -> None:
+    route = parse_geojson(with_speeds([None, 2.5, None]))
+    assert isinstance(route, Route)
+    assert [route.speed_from(index) for index in (-1, 0, 1, 2)] == [None, None, 2.5, 2.5]
+    assert parse_geojson(as_geojson(route)) == route
+    assert parse_geojson(with_speeds([None, None, None])) == parse_geojson(LANE)
+    assert "speeds_m_s" not in as_geojson(parse_geojson(LANE))["properties"]
+
+
+@pytest.mark.parametrize(
+    ("feature", "says"),
+    [
+        (with_speeds([1, 2]), "speeds_m_s: a list of 3 is expected"),
+        (with_speeds(4), "speeds_m_s: a list of 3 is expected"),
+        (with_speeds([1, 0, 2]), r"speeds_m_s\[1\]: speed 0 m/s is not above 0"),
+        (with_speeds([1, "fast", 2]), r"speeds_m_s\[1\]: speed 'fast' is not a number"),
+        (with_speeds([1, float("nan"), 2]), r"speeds_m_s\[1\]: speed nan is not finite"),
+        (
+            with_speeds([1], {"type": "Point", "coordinates": [10, 50]}),
+            "only a route has speeds, and this is a Point",
+        ),
+    ],
+)
+def test_speeds_that_cannot_be_meant_are_refused(feature: dict[str, object], says: str) -> None:
+    with pytest.raises(GeometryError, match=says):
+        parse_geojson(feature)

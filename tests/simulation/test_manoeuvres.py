@@ -258,6 +258,43 @@ def test_set_speed_is_the_speed_of_what_follows(simulate: Simulate) -> None:
     simulate(UGV, main)
 
 
+def test_waypoints_have_speeds_unless_the_task_has_one(simulate: Simulate) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
+        waypoints = tuple(place(0, north) for north in (100, 300, 500))
+        with_speeds = Route(waypoints, speeds_m_s=(2.0, 10.0, None))
+        slow_s = await do(bench, "r1.b1", "single_vehicle_routing", "ugv", route=with_speeds)
+        # 100 m at the usual 5 m/s, 200 m at 2, 200 m at 10; the ramps between take 4 s at most.
+        assert slow_s == pytest.approx(20 + 100 + 20, abs=6)
+        await do(bench, "r1.b2", "goto", "ugv", target=Point(place(0, 0)))
+        usual_s = await do(
+            bench, "r1.b3", "single_vehicle_routing", "ugv", route=with_speeds, speed=5.0
+        )
+        assert usual_s == pytest.approx(500 / 5 + math.pi / 0.5, abs=4)
+
+    simulate(UGV, main)
+
+
+def test_a_loop_keeps_the_speeds_of_its_waypoints(simulate: Simulate) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
+        corners = (place(0, 0), place(200, 0), place(200, 200))
+        route = Route(corners, speeds_m_s=(None, 2.0, 8.0))
+        await bench.start("r1.b1", "single_vehicle_routing", "ugv", route=route, loop=True)
+        await bench.clock.sleep(600.0)
+        fastest = {"first": 0.0, "second": 0.0, "third": 0.0}
+        for state in bench.states:
+            if not isinstance(state, VehicleState) or not state.velocity_enu_m_s:
+                continue
+            east, north = local(state.position)
+            leg = "first" if abs(north) < 1 else "second" if abs(east - 200) < 1 else "third"
+            speed = math.hypot(*state.velocity_enu_m_s)
+            fastest[leg] = max(fastest[leg], speed)
+        assert 1.9 < fastest["second"] < 5.1
+        assert fastest["third"] == pytest.approx(8.0)
+        assert fastest["first"] < 8.0
+
+    simulate(UGV, main, telemetry_hz=5.0)
+
+
 def test_a_wished_speed_beyond_the_vehicles_own_is_its_own(simulate: Simulate) -> None:
     async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
         await do(bench, "r1.b1", "goto", "ugv", target=Point(place(0, 500)), speed=99.0)

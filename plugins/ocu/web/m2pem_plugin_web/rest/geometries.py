@@ -29,7 +29,11 @@ GeometryName = Annotated[str, InPath(min_length=1, max_length=LONGEST, pattern=P
 
 
 class GeometryModel(BaseModel):
-    """A route, area or point (GeoJSON). `altitude_frame`: what its altitudes are above."""
+    """A route, area or point (GeoJSON). `altitude_frame`: what its altitudes are above.
+
+    `speeds_m_s`: of a route, how fast vehicles leave each waypoint, null: as fast as before; []:
+    no waypoint has a speed.
+    """
 
     model_config = ConfigDict(populate_by_name=True)
 
@@ -42,6 +46,7 @@ class GeometryModel(BaseModel):
     )
     by: str
     at_us: int | None
+    speeds_m_s: list[float | None] = []
 
 
 class HandOverModel(Body):
@@ -176,6 +181,7 @@ def _model(
         source="fleet" if at_us is None else "operator",
         by=by,
         at_us=at_us,
+        speeds_m_s=list(geometry.speeds_m_s) if isinstance(geometry, Route) else [],
     )
 
 

@@ -100,3 +100,32 @@ describe("draft", () => {
     expect(problemOf(route())).toBeNull();
   });
 });
+
+it("the speeds of a route's waypoints go along with them", () => {
+  const lane = draftOf({
+    name: "lane",
+    kind: "route",
+    geometry: {
+      type: "LineString",
+      coordinates: [
+        [10, 50],
+        [10.1, 50],
+        [10.2, 50],
+      ],
+    },
+    altitude_frame: "relative",
+    speeds_m_s: [null, 2.5, 8],
+    from: "mission",
+    by: "",
+    at_us: null,
+  });
+  expect(featureOf(lane).properties).toEqual({
+    altitude_frame: "relative",
+    speeds_m_s: [null, 2.5, 8],
+  });
+  const changed = moved(removed(lane, 0), 0, { latitude: 51 });
+  expect(featureOf(changed).properties?.speeds_m_s).toEqual([2.5, 8]);
+  expect(featureOf(removed(removed(lane, 1), 1)).properties).toEqual({
+    altitude_frame: "relative",
+  });
+});

@@ -8,6 +8,8 @@ export interface Vertex {
   latitude: number;
   longitude: number;
   altitude: number | null;
+  /** Of a route: how fast vehicles go from here on, in m/s; left out: as fast as before. */
+  speed?: number | null;
 }
 
 export interface Draft {
@@ -30,9 +32,14 @@ export const emptyDraft = (kind: Kind): Draft => ({
   before: [],
 });
 
-export function draftOf({ kind, name, geometry, altitude_frame: frame }: Geometry): Draft {
+export function draftOf(of: Geometry): Draft {
+  const { kind, name, geometry, altitude_frame: frame, speeds_m_s: speeds } = of;
   const holes = geometry.type === "Polygon" ? geometry.coordinates.slice(1) : [];
-  return { kind, name, frame, vertices: verticesOf(geometry), holes, before: [] };
+  const vertices = verticesOf(geometry).map((vertex, index) => {
+    const speed = speeds?.[index];
+    return speed ? { ...vertex, speed } : vertex;
+  });
+  return { kind, name, frame, vertices, holes, before: [] };
 }
 
 const changed = (draft: Draft, vertices: readonly Vertex[]): Draft => ({
@@ -93,12 +100,17 @@ export function problemOf({ kind, name, vertices }: Draft): Problem | null {
   return /^[\w.-]{1,100}$/.test(name) ? null : "name";
 }
 
-/** As the server takes it: a Feature, which says what its altitudes are above. */
-export const featureOf = (draft: Draft): GeoJSON.Feature => ({
-  type: "Feature",
-  properties: { altitude_frame: draft.frame },
-  geometry: geometryOf(draft),
-});
+/** As the server takes it: a Feature, which says what its altitudes are above, and the speeds of a
+ * route's waypoints, if any has one. */
+export function featureOf(draft: Draft): GeoJSON.Feature {
+  const speeds_m_s = draft.vertices.map(({ speed }) => speed ?? null);
+  const hasSpeeds = draft.kind === "route" && speeds_m_s.some((speed) => speed !== null);
+  return {
+    type: "Feature",
+    properties: { altitude_frame: draft.frame, ...(hasSpeeds && { speeds_m_s }) },
+    geometry: geometryOf(draft),
+  };
+}
 
 export function geometryOf({ kind, vertices, holes }: Draft): GeoJSON.Geometry {
   const positions = vertices.map(({ latitude, longitude, altitude }) => {

@@ -21,7 +21,17 @@ export function ownGeometry(name: string, text: string): Geometry | undefined {
     if (!kind || !name || !FRAMES.includes(frame)) return undefined;
     if (!("coordinates" in geometry) || !isPlaced(geometry.coordinates)) return undefined;
     const altitude_frame = frame as AltitudeFrame;
-    return { name, kind, geometry, altitude_frame, from: "mission", by: "", at_us: null };
+    const own: Geometry = {
+      name,
+      kind,
+      geometry,
+      altitude_frame,
+      from: "mission",
+      by: "",
+      at_us: null,
+    };
+    const speeds: unknown = feature?.properties?.speeds_m_s;
+    return Array.isArray(speeds) ? { ...own, speeds_m_s: speeds as (number | null)[] } : own;
   } catch {
     return undefined;
   }

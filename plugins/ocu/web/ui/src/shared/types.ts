@@ -104,6 +104,8 @@ export interface Geometry {
   kind: "route" | "area" | "point";
   geometry: GeoJSON.Geometry;
   altitude_frame: AltitudeFrame;
+  /** Of a route with speeds: one for each waypoint. */
+  speeds_m_s?: readonly (number | null)[];
   from: "fleet" | "operator" | "mission";
   by: string;
   at_us: number | null;

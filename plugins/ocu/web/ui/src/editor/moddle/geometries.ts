@@ -99,11 +99,14 @@ function written(
   { name, feature: { properties, geometry }, survey }: NamedFeature,
   before?: ModdleElement,
 ): ModdleElement {
-  const frame = (properties as { altitude_frame?: string } | null)?.altitude_frame ?? "relative";
+  const { altitude_frame = "relative", speeds_m_s } = (properties ?? {}) as {
+    altitude_frame?: string;
+    speeds_m_s?: readonly (number | null)[];
+  };
   const value =
-    frame === "relative"
+    altitude_frame === "relative" && !speeds_m_s
       ? geometry
-      : { type: "Feature", properties: { altitude_frame: frame }, geometry };
+      : { type: "Feature", properties: { altitude_frame, ...(speeds_m_s && { speeds_m_s }) }, geometry };
   const body = JSON.stringify(value);
   const isSame = before && text(before, "body") === body;
   const kept = (attribute: string) => (isSame && text(before, attribute)) || undefined;
