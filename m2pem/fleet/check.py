@@ -444,7 +444,7 @@ class _Check:
                 findings.add(problem.rule, message, problem.remedy, line=line, role=taker.role)
         if not problems:
             self.ground.check(acting, values, lines, findings)
-            check_speeds(behavior, self.fleet, acting, values, findings)
+            check_speeds(behavior, taker.spec, taker.place, values, findings)
 
     def _unknown_geometry(
         self, problem: ParameterProblem, name: str, line: int, taker: _Taker, findings: TaskFindings

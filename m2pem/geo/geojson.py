@@ -7,16 +7,20 @@ route's property `"speeds_m_s"` has a speed or null for each position (`Route.sp
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from m2pem.errors import M2pemError
 from m2pem.geo.polygon import ring_problem
 from m2pem.mission.geometry import Area, Coordinate, Geometry, Point, Route
 from m2pem.suggestions import suggest
+from m2pem.units import article
 
 ALTITUDE_FRAMES = ("relative", "amsl", "terrain")
 
-_SPEEDS = "speeds_m_s"
+SPEEDS = "speeds_m_s"
+"""The property, and the extended data of KML, with the speeds of a route's waypoints."""
+
 _TYPES = ("LineString", "MultiPoint", "Polygon", "Point", "Feature", "FeatureCollection")
 
 
@@ -34,7 +38,7 @@ def parse_geojson(value: Mapping[str, Any]) -> Point | Route | Area:
     Raises:
         GeometryError: not GeoJSON, another type, a position out of range, a ring not closed.
     """
-    return _parse(value, {}, depth=0)
+    return _parse(value, "relative", depth=0)
 
 
 def as_geojson(geometry: Point | Route | Area) -> dict[str, Any]:
@@ -49,7 +53,7 @@ def as_geojson(geometry: Point | Route | Area) -> dict[str, Any]:
         coordinates = [[_written(each) for each in ring] for ring in geometry.rings]
     properties: dict[str, Any] = {"altitude_frame": geometry.altitude_frame}
     if isinstance(geometry, Route) and geometry.speeds_m_s:
-        properties[_SPEEDS] = list(geometry.speeds_m_s)
+        properties[SPEEDS] = list(geometry.speeds_m_s)
     return {
         "type": "Feature",
         "properties": properties,
@@ -63,7 +67,7 @@ def _written(place: Coordinate) -> list[Any]:
     return level if altitude_m is None else [*level, altitude_m]
 
 
-def _parse(value: object, properties: Mapping[str, Any], depth: int) -> Point | Route | Area:
+def _parse(value: object, altitude_frame: str, depth: int) -> Point | Route | Area:
     if not isinstance(value, Mapping):
         raise GeometryError("is not GeoJSON: an object with 'type' is expected")
     check_crs(value)
@@ -73,19 +77,18 @@ def _parse(value: object, properties: Mapping[str, Any], depth: int) -> Point | 
         if not isinstance(features, list) or len(features) != 1:
             count = len(features) if isinstance(features, list) else "no"
             raise GeometryError(f"has {count} features; one geometry is expected")
-        return _parse(features[0], properties, depth=1)
+        return _parse(features[0], altitude_frame, depth=1)
     if kind == "Feature" and depth <= 1:
-        own = value.get("properties")
-        return _parse(value.get("geometry"), own if isinstance(own, Mapping) else {}, depth=2)
+        given = value.get("properties")
+        properties: Mapping[str, Any] = given if isinstance(given, Mapping) else {}
+        geometry = _parse(value.get("geometry"), _frame(properties), depth=2)
+        return with_speeds(geometry, properties.get(SPEEDS))
     coordinates = value.get("coordinates")
-    altitude_frame, speeds = _frame(properties), properties.get(_SPEEDS)
-    if speeds is not None and kind in ("Point", "Polygon"):
-        raise GeometryError(f"{_SPEEDS}: only a route has speeds, and this is a {kind}")
     if kind == "Point":
         return Point(position(coordinates, "coordinates"), altitude_frame)
     if kind in ("LineString", "MultiPoint"):
         waypoints = _positions(coordinates, "coordinates", 2 if kind == "LineString" else 1)
-        return Route(waypoints, altitude_frame, _speeds(speeds, len(waypoints)))
+        return Route(waypoints, altitude_frame)
     if kind == "Polygon":
         if not isinstance(coordinates, list | tuple) or not coordinates:
             raise GeometryError("coordinates: a Polygon is a list of rings")
@@ -106,19 +109,28 @@ def check_crs(value: Mapping[str, Any]) -> None:
         raise GeometryError("its 'crs' is not WGS-84; export it as WGS-84 longitude and latitude")
 
 
-def _speeds(value: object, count: int) -> tuple[float | None, ...]:
+def with_speeds(geometry: Point | Route | Area, value: object) -> Point | Route | Area:
+    """Return a route with the speeds of its waypoints: a list of numbers and nulls; None: no list.
+
+    Raises:
+        GeometryError: it is no route, or the list does not fit it.
+    """
     if value is None:
-        return ()
+        return geometry
+    if not isinstance(geometry, Route):
+        raise GeometryError(f"{SPEEDS}: only a route has speeds, not {article(kind_of(geometry))}")
+    count = len(geometry.waypoints)
     if not isinstance(value, list | tuple) or len(value) != count:
-        raise GeometryError(f"{_SPEEDS}: a list of {count} is expected, a speed or null a position")
+        raise GeometryError(f"{SPEEDS}: a list of {count} is expected, a speed or null a position")
     speeds = tuple(
-        None if each is None else _number(each, "speed", f"{_SPEEDS}[{index}]")
+        None if each is None else _number(each, "speed", f"{SPEEDS}[{index}]")
         for index, each in enumerate(value)
     )
     for index, speed in enumerate(speeds):
         if speed is not None and speed <= 0:
-            raise GeometryError(f"{_SPEEDS}[{index}]: speed {speed:g} m/s is not above 0")
-    return speeds if any(speed is not None for speed in speeds) else ()
+            raise GeometryError(f"{SPEEDS}[{index}]: speed {speed:g} m/s is not above 0")
+    is_given = any(speed is not None for speed in speeds)
+    return replace(geometry, speeds_m_s=speeds if is_given else ())
 
 
 def _frame(properties: Mapping[str, Any]) -> str:

@@ -1,10 +1,12 @@
 """Routes and areas from ground-control files: `.plan`, and `.waypoints` (QGC WPL 110).
 
-Only places are read. What else such a file commands (camera triggers, speed changes) belongs into
-the mission. MAVLink's MAV_CMD and MAV_FRAME numbers: https://mavlink.io/en/messages/common.html.
+Places, and speeds between them, are read. What else such a file commands (camera triggers) belongs
+into the mission. MAVLink's MAV_CMD and MAV_FRAME numbers:
+https://mavlink.io/en/messages/common.html.
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 from m2pem.geo.geojson import GeometryError, checked, coordinate
@@ -15,6 +17,13 @@ PLACE_COMMANDS = frozenset({16, 17, 18, 19, 21, 22, 31, 82, 84, 85})
 
 _GROUND_COMMANDS = frozenset({21, 22, 84, 85})
 """Take-off and landing: (0, 0) means "here", and is no place on the route."""
+
+CHANGE_SPEED = 178
+"""MAV_CMD_DO_CHANGE_SPEED: param 1 is the type of the speed, param 2 the speed in m/s, or -1 for no
+change."""
+
+_SPEED_TYPES = (0, 1)
+"""Of air and ground; the others are of climbing and descending."""
 
 _FRAMES = {0: "amsl", 5: "amsl", 3: "relative", 6: "relative", 10: "terrain", 11: "terrain"}
 
@@ -48,29 +57,71 @@ def plan_items(plan: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
 
 
 def _plan_route(items: Sequence[Mapping[str, Any]]) -> Route:
-    places: list[tuple[int, Coordinate]] = []
+    read = RouteItems()
     for index, item in enumerate(items):
         where = f"mission.items[{index}]"
         if item.get("type") != "SimpleItem":
             kind = item.get("complexItemType", item.get("type"))
             raise GeometryError(f"{where}: a {kind!r} item is no waypoint; use it as an area")
-        place = simple_item_place(item, where)
-        if place is not None:
-            places.append(place)
-    return route_of_items(places)
+        read.add(item, where)
+    return read.route()
 
 
-def simple_item_place(item: Mapping[str, Any], where: str) -> tuple[int, Coordinate] | None:
-    """Return the MAV_FRAME and the place of a simple item; None if it commands no place.
+@dataclass(slots=True)
+class RouteItems:
+    """The items of a mission that make a route, one after the other."""
 
-    Raises:
-        GeometryError: it has not seven numbers, or an unknown frame.
-    """
-    params = item.get("params")
-    if not isinstance(params, list) or len(params) != 7:
-        raise GeometryError(f"{where}.params: seven numbers are expected")
-    place = _place(item.get("command"), params[4], params[5], params[6], where)
-    return None if place is None else (_frame(item.get("frame"), where), place)
+    places: list[tuple[int, Coordinate]] = field(default_factory=list)
+    """With their MAV_FRAMEs."""
+
+    speeds_m_s: dict[int, float] = field(default_factory=dict)
+    """By the place from which on the vehicle is as fast; one that is set earlier: by the first."""
+
+    def add(self, item: Mapping[str, Any], where: str) -> bool:
+        """Add a simple item of a `.plan`; return whether it is a place or a speed.
+
+        Raises:
+            GeometryError: it has not seven numbers, or an unknown frame.
+        """
+        params = item.get("params")
+        if not isinstance(params, list) or len(params) != 7:
+            raise GeometryError(f"{where}.params: seven numbers are expected")
+        return self.add_command(item.get("command"), item.get("frame"), params, where)
+
+    def add_command(
+        self, command: object, frame: object, params: Sequence[object], where: str
+    ) -> bool:
+        """Add an item of any file; return whether it is a place or a speed.
+
+        Raises:
+            GeometryError: it has an unknown frame, or a place out of range.
+        """
+        if command == CHANGE_SPEED:
+            type_, speed = params[0], params[1]
+            if type_ in _SPEED_TYPES and isinstance(speed, int | float) and speed > 0:
+                self.speeds_m_s[max(len(self.places) - 1, 0)] = float(speed)
+                return True
+            return False
+        place = _place(command, params[4], params[5], params[6], where)
+        if place is None:
+            return False
+        self.places.append((_frame(frame, where), place))
+        return True
+
+    def route(self) -> Route:
+        """Return the route.
+
+        Raises:
+            GeometryError: there is no place, or their altitude frames differ.
+        """
+        if not self.places:
+            raise GeometryError("has no waypoint")
+        frames = sorted({_FRAMES[frame] for frame, _ in self.places})
+        if len(frames) > 1:
+            raise GeometryError(f"mixes altitude frames ({', '.join(frames)}); one is expected")
+        speeds = tuple(self.speeds_m_s.get(index) for index in range(len(self.places)))
+        waypoints = tuple(place for _, place in self.places)
+        return Route(waypoints, frames[0], speeds if self.speeds_m_s else ())
 
 
 def _plan_area(plan: Mapping[str, Any], items: Sequence[Mapping[str, Any]]) -> Area:
@@ -121,7 +172,7 @@ def parse_waypoints(text: str) -> Route:
     lines = text.splitlines()
     if not lines or lines[0].strip() != WPL_HEADER:
         raise GeometryError(f"is not a waypoint file: line 1 is not '{WPL_HEADER}'")
-    places: list[tuple[int, Coordinate]] = []
+    read = RouteItems()
     for number, line in enumerate(lines[1:], start=2):
         if not line.strip():
             continue
@@ -131,14 +182,13 @@ def parse_waypoints(text: str) -> Route:
             raise GeometryError(f"{where}: has {len(columns)} columns, not {_WPL_COLUMNS}")
         try:
             index, frame, command = int(columns[0]), int(columns[2]), int(float(columns[3]))
-            latitude, longitude, altitude = (float(column) for column in columns[8:11])
+            params = [float(column) for column in columns[4:11]]
         except (ValueError, OverflowError):
             raise GeometryError(f"{where}: a number is expected in every column") from None
         home = index == 0 and frame == 0 and command == 16
-        place = None if home else _place(command, latitude, longitude, altitude, where)
-        if place is not None:
-            places.append((_frame(frame, where), place))
-    return route_of_items(places)
+        if not home:
+            read.add_command(command, frame, params, where)
+    return read.route()
 
 
 def _place(
@@ -155,17 +205,3 @@ def _frame(frame: object, where: str) -> int:
     if not isinstance(frame, int) or frame not in _FRAMES:
         raise GeometryError(f"{where}: MAV_FRAME {frame!r} is not global, relative or terrain")
     return frame
-
-
-def route_of_items(places: Sequence[tuple[int, Coordinate]]) -> Route:
-    """Return places with their MAV_FRAMEs as a route.
-
-    Raises:
-        GeometryError: there is none, or their altitude frames differ.
-    """
-    if not places:
-        raise GeometryError("has no waypoint")
-    frames = sorted({_FRAMES[frame] for frame, _ in places})
-    if len(frames) > 1:
-        raise GeometryError(f"mixes altitude frames ({', '.join(frames)}); one is expected")
-    return Route(tuple(place for _, place in places), frames[0])

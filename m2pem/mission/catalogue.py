@@ -78,6 +78,7 @@ class BehaviorSpec:
     `required_one_of`: groups of parameter names of which at least one group must be given whole
     (`ptz_point_at`: target, or bearing and elevation). `ends`: whether it ends by itself when
     no parameter says so. `writes`: dotted names of the data store that it writes when it ends.
+    `keeps_speeds`: whether it keeps the speeds of a route's waypoints (`Route.speeds_m_s`).
     """
 
     name: str
@@ -88,6 +89,7 @@ class BehaviorSpec:
     ends: bool = True
     doc: str = ""
     writes: tuple[str, ...] = ()
+    keeps_speeds: bool = False
     by_name: Mapping[str, ParameterSpec] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:

@@ -1,5 +1,6 @@
 """From a request to plans: which manoeuvre each resource does, or why it is refused."""
 
+import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -58,7 +59,7 @@ def vehicle_behaviors(domain: str) -> tuple[BehaviorSpec, ...]:
     """What a vehicle of the domain can do alone. Teams are made of that, as everywhere."""
     alone = _BY_DOMAIN.get(domain, _BY_DOMAIN["ground"])
     return tuple(
-        spec
+        dataclasses.replace(spec, keeps_speeds=name == "single_vehicle_routing")
         for (name, type_), spec in SHARED.items()
         if type_ is BehaviorType.VEHICLE and name in alone
     )

@@ -176,7 +176,7 @@ def test_the_speeds_of_waypoints_hold_until_another_one() -> None:
         (with_speeds([1, float("nan"), 2]), r"speeds_m_s\[1\]: speed nan is not finite"),
         (
             with_speeds([1], {"type": "Point", "coordinates": [10, 50]}),
-            "only a route has speeds, and this is a Point",
+            "only a route has speeds, not a point",
         ),
     ],
 )

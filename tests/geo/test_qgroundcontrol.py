@@ -91,7 +91,30 @@ QGC WPL 110
 
 
 def test_the_places_of_a_waypoint_file_are_a_route_without_its_home() -> None:
-    assert parse_waypoints(WAYPOINTS) == Route(((38.1, -77.1, 30.0), (38.2, -77.2, 40.0)))
+    places = ((38.1, -77.1, 30.0), (38.2, -77.2, 40.0))
+    assert parse_waypoints(WAYPOINTS) == Route(places, speeds_m_s=(5.0, None))
+
+
+@pytest.mark.parametrize(
+    ("changed", "speeds"),
+    [
+        (("178\t0\t5", "178\t1\t5"), (5.0, None)),
+        (("178\t0\t5", "178\t2\t5"), ()),  # of climbing
+        (("178\t0\t5", "178\t1\t-1"), ()),  # no change
+        (("3\t0\t3\t178", "4\t0\t3\t178"), (5.0, None)),
+    ],
+)
+def test_only_speeds_over_ground_or_through_the_air_are_read(
+    changed: tuple[str, str], speeds: tuple[float | None, ...]
+) -> None:
+    assert parse_waypoints(WAYPOINTS.replace(*changed)).speeds_m_s == speeds
+
+
+def test_a_speed_before_the_first_place_holds_from_there_on() -> None:
+    header, home, *items = WAYPOINTS.splitlines()
+    speed = next(item for item in items if "\t178\t" in item)
+    text = "\n".join((header, home, speed, *(item for item in items if item is not speed)))
+    assert parse_waypoints(text).speeds_m_s == (5.0, None)
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from csv import writer
 from io import StringIO
+from itertools import zip_longest
 
 from m2pem.geo.csv_waypoints import (
     METRES,
@@ -14,10 +15,11 @@ from m2pem.geo.csv_waypoints import (
     positions_as,
 )
 from m2pem.geo.file_text import decoded
-from m2pem.geo.geojson import GeometryError, checked, kind_of
+from m2pem.geo.geojson import GeometryError, checked, kind_of, with_speeds
 from m2pem.geo.geometry_files.contents import Contents, FeatureProblemError, NamedGeometry
 from m2pem.mission.geometry import Area, Coordinate, Point, Route
 
+_SPEED = "speed_m_s"
 _HEADER = ("name", "kind", "ring", "lat_deg", "lon_deg", "alt_m", "altitude_frame")
 _NAMES = {
     **{name: name for name in ("lat", "lon", "alt", "name", "kind", "ring", "altitude_frame")},
@@ -36,7 +38,8 @@ def read_csv(content: bytes, contents: Contents) -> None:
     """Collect the geometries of a table.
 
     Rows of the same `name` make one geometry of its `kind`; without a kind, several make a route
-    and one a point. `ring` counts the rings of an area: 0 is the outer one.
+    and one a point. `ring` counts the rings of an area: 0 is the outer one. `speed_m_s`: from a
+    waypoint of a route on; empty: as fast as before.
 
     Raises:
         GeometryError: it is not CSV, or has no columns of positions.
@@ -60,18 +63,24 @@ def read_csv(content: bytes, contents: Contents) -> None:
 
 
 def write_csv(geometries: Sequence[NamedGeometry]) -> bytes:
-    """Return a table with the columns name, kind, ring, lat_deg, lon_deg, alt_m, altitude_frame."""
+    """Return a table with the columns name, kind, ring, lat_deg, lon_deg, alt_m, altitude_frame,
+    and speed_m_s if a route has speeds."""
     table = StringIO()
     out = writer(table, lineterminator="\n")
-    out.writerow(_HEADER)
+    have_speeds = any(_speeds(each.geometry) for each in geometries)
+    out.writerow((*_HEADER, _SPEED) if have_speeds else _HEADER)
     for each in geometries:
         geometry = each.geometry
         kind, frame = kind_of(geometry), geometry.altitude_frame
         for ring, positions in enumerate(_rings(geometry)):
-            for latitude, longitude, altitude in positions:
-                numbers = (latitude, longitude, "" if altitude is None else altitude)
-                out.writerow((each.name, kind, ring, *numbers, frame))
+            for position, speed in zip_longest(positions, _speeds(geometry)):
+                row = (each.name, kind, ring, *position, frame, speed)
+                out.writerow(row if have_speeds else row[:-1])
     return table.getvalue().encode()
+
+
+def _speeds(geometry: Point | Route | Area) -> Sequence[float | None]:
+    return geometry.speeds_m_s if isinstance(geometry, Route) else ()
 
 
 def _rings(geometry: Point | Route | Area) -> Sequence[Sequence[Coordinate]]:
@@ -108,6 +117,8 @@ def _columns(header: Sequence[str], where: str, contents: Contents) -> dict[int,
 
 
 def _column(text: str, where: str, contents: Contents) -> Column | None:
+    if text.strip().lower() == _SPEED:
+        return Column(_SPEED)
     lower = text.lower().removesuffix("]").removesuffix(")").replace(" [", "_").replace(" (", "_")
     if lower in _NAMES:
         name, unit = _NAMES[lower], ""
@@ -133,6 +144,7 @@ def _geometry(
     kind = ""
     frame = ""
     rings: dict[str, list[Coordinate]] = {}
+    speeds = []
     for where, cells in group:
         given = _cell(cells, "kind").lower() or kind
         if given and given not in _KINDS:
@@ -147,13 +159,24 @@ def _geometry(
             )
         kind, frame = given, its_frame
         rings.setdefault(_cell(cells, "ring"), []).append(csv_position(cells, where))
+        speeds.append(_speed(_cell(cells, _SPEED), where))
     if kind == "area" and len(rings) > 1:
         areas = [positions_as(ring, frame, "area") for ring in rings.values()]
         return Area(
             checked(tuple(area.rings[0] for area in areas if isinstance(area, Area))), frame
         )
     positions = [position for ring in rings.values() for position in ring]
-    return positions_as(positions, frame, kind or ("route" if len(positions) > 1 else "point"))
+    geometry = positions_as(positions, frame, kind or ("route" if len(positions) > 1 else "point"))
+    return with_speeds(geometry, speeds) if any(each is not None for each in speeds) else geometry
+
+
+def _speed(text: str, where: str) -> float | None:
+    if not text.strip():
+        return None
+    try:
+        return float(text)
+    except ValueError:
+        raise GeometryError(f"{where}: {_SPEED} {text[:20]!r} is not a number") from None
 
 
 def _cell(cells: Mapping[str, tuple[str, Column]], name: str) -> str:

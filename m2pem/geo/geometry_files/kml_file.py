@@ -1,9 +1,10 @@
 """KML 2.3 and KMZ (OGC 12-007r2): its placemarks and tracks.
 
 An altitude above home, which KML does not have, is written as above ground, and the extended data
-`altitude_frame` says what it is.
+`altitude_frame` says what it is; the extended data `speeds_m_s` are those of a route's waypoints.
 """
 
+import json
 import re
 from collections.abc import Iterator, Sequence
 from io import BytesIO
@@ -11,7 +12,15 @@ from typing import TypeAlias
 
 from lxml import etree
 
-from m2pem.geo.geojson import ALTITUDE_FRAMES, GeometryError, checked, coordinate
+from m2pem.geo.file_text import parsed_json
+from m2pem.geo.geojson import (
+    ALTITUDE_FRAMES,
+    SPEEDS,
+    GeometryError,
+    checked,
+    coordinate,
+    with_speeds,
+)
 from m2pem.geo.geometry_files.archive import archive_of, member
 from m2pem.geo.geometry_files.contents import Contents, FeatureProblemError, NamedGeometry
 from m2pem.mission.geometry import Area, Coordinate, Point, Route
@@ -98,8 +107,9 @@ def _read_placemark(placemark: Element, contents: Contents) -> None:
         read = [_geometry(part, frame) for child in placemark for part in _parts(child)]
         if not read:
             raise GeometryError("has no point, line or polygon")
+        speeds = _data(placemark, SPEEDS)
         for geometry in read:
-            contents.add(name, geometry)
+            contents.add(name, with_speeds(geometry, parsed_json(speeds)) if speeds else geometry)
 
 
 def _parts(element: Element) -> Iterator[Element]:
@@ -219,9 +229,14 @@ def write_kml(geometries: Sequence[NamedGeometry]) -> bytes:
     for each in geometries:
         placemark = _child(document, "Placemark")
         _child(placemark, "name", each.name)
-        data = _child(_child(placemark, "ExtendedData"), "Data")
-        data.set("name", "altitude_frame")
-        _child(data, "value", each.geometry.altitude_frame)
+        data = {"altitude_frame": each.geometry.altitude_frame}
+        if isinstance(each.geometry, Route) and each.geometry.speeds_m_s:
+            data[SPEEDS] = json.dumps(each.geometry.speeds_m_s)
+        extended = _child(placemark, "ExtendedData")
+        for name, value in data.items():
+            element = _child(extended, "Data")
+            element.set("name", name)
+            _child(element, "value", value)
         _write_geometry(placemark, each.geometry)
     return etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True)
 

@@ -1,30 +1,37 @@
 """Files of ground stations: QGroundControl's `.plan`, and `.waypoints` (QGC WPL 110).
 
-Only places are read: other commands (camera triggers, speed changes) belong into the mission.
+Places and speeds are read: other commands (camera triggers) belong into the mission.
 https://docs.qgroundcontrol.com/master/en/qgc-dev-guide/file_formats/plan.html
 """
 
 import json
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import zip_longest
 from typing import Any
 
 from m2pem.geo.file_text import decoded, parsed_json
 from m2pem.geo.geojson import GeometryError, coordinate
 from m2pem.geo.geometry_files.contents import Contents, FeatureProblemError, NamedGeometry
 from m2pem.geo.qgroundcontrol import (
+    CHANGE_SPEED,
     PLACE_COMMANDS,
     WPL_HEADER,
+    RouteItems,
     parse_waypoints,
     plan_items,
     plan_polygon,
-    route_of_items,
-    simple_item_place,
 )
 from m2pem.mission.geometry import Area, Coordinate, Point, Route
 
 _WAYPOINT = 16
 """MAV_CMD_NAV_WAYPOINT."""
+
+_GROUND_SPEED = 1
+"""SPEED_TYPE_GROUNDSPEED."""
+
+_MISSION_FRAME = 2
+"""MAV_FRAME_MISSION: of commands without a place."""
 
 _FRAME_NUMBERS = {"amsl": 0, "relative": 3, "terrain": 10}
 """MAV_FRAME_GLOBAL, _RELATIVE_ALT, _TERRAIN_ALT."""
@@ -70,25 +77,24 @@ def read_plan(content: bytes, contents: Contents) -> None:
 
 def _read_waypoints(items: Sequence[Mapping[str, Any]], contents: Contents) -> None:
     with contents.feature("mission"):
-        places = []
+        read = RouteItems()
         others: Counter[object] = Counter()
         for index, item in enumerate(items):
             if item.get("type") != "SimpleItem":
                 continue
-            place = simple_item_place(item, f"mission.items[{index}]")
-            if place is not None:
-                places.append(place)
-            elif item.get("command") not in PLACE_COMMANDS:
+            is_read = read.add(item, f"mission.items[{index}]")
+            if not is_read and item.get("command") not in PLACE_COMMANDS:
                 others[item.get("command")] += 1
         if others:
             numbers = ", ".join(str(command)[:20] for command in sorted(others, key=str)[:10])
             contents.warn(
                 "mission",
-                f"{others.total()} items with other commands than places (MAV_CMD {numbers})",
+                f"{others.total()} items with other commands than places and speeds (MAV_CMD "
+                f"{numbers})",
                 "draw what they do as tasks of the mission",
             )
-        if places:
-            contents.add("", route_of_items(places))
+        if read.places:
+            contents.add("", read.route())
 
 
 def _read_complex(item: Mapping[str, Any], where: str, contents: Contents) -> None:
@@ -168,8 +174,8 @@ def write_plan(geometries: Sequence[NamedGeometry], altitude_m: float | None) ->
             "globalPlanAltitudeMode": _ALTITUDE_MODES[frame],
             "plannedHomePosition": [*home, 0],
             "items": [
-                _simple_item(number, place, frame)
-                for number, place in enumerate(waypoints, start=1)
+                _simple_item(number, command, params, frame)
+                for number, (command, params) in enumerate(_items(route, waypoints), start=1)
             ],
         },
         "geoFence": {"version": 2, "circles": [], "polygons": polygons},
@@ -191,27 +197,45 @@ def write_waypoints(geometries: Sequence[NamedGeometry], altitude_m: float | Non
             "holds one route and nothing else: choose a route, or .plan or .geojson"
         )
     waypoints = list(_waypoints(route, altitude_m))
-    number = _FRAME_NUMBERS[route.geometry.altitude_frame]
-    rows = [_row(0, 1, 0, (*waypoints[0][:2], 0.0))]
-    rows += [_row(index, 0, number, place) for index, place in enumerate(waypoints, start=1)]
-    return "\n".join((WPL_HEADER, *rows, "")).encode()
+    frame = _FRAME_NUMBERS[route.geometry.altitude_frame]
+    rows: list[tuple[float, ...]] = [(0, 1, 0, _WAYPOINT, 0, 0, 0, 0, *waypoints[0][:2], 0.0, 1)]
+    for index, (command, params) in enumerate(_items(route, waypoints), start=1):
+        own = frame if command == _WAYPOINT else _MISSION_FRAME
+        rows.append((index, 0, own, command, *(each or 0 for each in params), 1))
+    lines = ("\t".join(str(number) for number in row) for row in rows)
+    return "\n".join((WPL_HEADER, *lines, "")).encode()
 
 
-def _row(index: int, current: int, frame: int, place: tuple[float, float, float]) -> str:
-    numbers = (index, current, frame, _WAYPOINT, 0, 0, 0, 0, *place, 1)
-    return "\t".join(str(number) for number in numbers)
+def _items(
+    route: NamedGeometry | None, waypoints: Sequence[tuple[float, float, float]]
+) -> Iterator[tuple[int, tuple[float | None, ...]]]:
+    """Yield the commands of a route with their seven parameters: waypoints, and the speed behind
+    each that has one."""
+    geometry = route.geometry if route is not None else None
+    speeds = geometry.speeds_m_s if isinstance(geometry, Route) else ()
+    for place, speed in zip_longest(waypoints, speeds):
+        yield _WAYPOINT, (0, 0, 0, None, *place)
+        if speed is not None:
+            yield CHANGE_SPEED, (_GROUND_SPEED, speed, -1, 0, 0, 0, 0)
 
 
-def _simple_item(number: int, place: tuple[float, float, float], frame: str) -> dict[str, Any]:
-    return {
+def _simple_item(
+    number: int, command: int, params: Sequence[float | None], frame: str
+) -> dict[str, Any]:
+    item = {
         "type": "SimpleItem",
-        "command": _WAYPOINT,
-        "frame": _FRAME_NUMBERS[frame],
-        "params": [0, 0, 0, None, *place],
+        "command": command,
+        "frame": _FRAME_NUMBERS[frame] if command == _WAYPOINT else _MISSION_FRAME,
+        "params": list(params),
         "autoContinue": True,
         "doJumpId": number,
+    }
+    if command != _WAYPOINT:
+        return item
+    return {
+        **item,
         "AltitudeMode": _ALTITUDE_MODES[frame],
-        "Altitude": place[2],
+        "Altitude": params[6],
         "AMSLAltAboveTerrain": None,
     }
 

@@ -286,7 +286,8 @@ def test_everything_with_a_place_in_a_plan_is_read() -> None:
         "mission": {
             "items": [
                 simple(22, 53.0, 7.0, 10.0),
-                simple(178, 0, 0, 0),
+                {**simple(178, 0, 0, 0), "params": [1, 4.5, -1, 0, 0, 0, 0]},
+                simple(206, 0, 0, 0),
                 {"type": "ComplexItem", "complexItemType": "survey", "polygon": square},
                 {"type": "ComplexItem", "complexItemType": "CorridorScan", "polyline": square},
                 {"type": "ComplexItem", "complexItemType": "fwLandingPattern"},
@@ -307,10 +308,11 @@ def test_everything_with_a_place_in_a_plan_is_read() -> None:
         ("fence", Area),
         ("rally", Point),
     ]
-    assert file.geometries[0].geometry == Route(((53.0, 7.0, 10.0), (53.5, 7.5, 20.0)))
+    places = ((53.0, 7.0, 10.0), (53.5, 7.5, 20.0))
+    assert file.geometries[0].geometry == Route(places, speeds_m_s=(4.5, None))
     assert [(each.severity, each.feature) for each in file.problems] == [
         (Severity.WARNING, "mission"),
-        (Severity.ERROR, "mission.items[4]"),
+        (Severity.ERROR, "mission.items[5]"),
         (Severity.ERROR, "geoFence.polygons[1]"),
         (Severity.ERROR, "geoFence.circles[0]"),
     ]

@@ -4,6 +4,7 @@ import csv
 import json
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 
@@ -78,6 +79,21 @@ def test_pymavlink_reads_what_is_written(
     assert (home.frame, home.command, home.z) == (0, 16, 0)
     assert {item.frame for item in items} == {{"relative": 3, "amsl": 0, "terrain": 10}[frame]}
     assert [(item.x, item.y, item.z) for item in items] == list(route.waypoints)
+
+
+def test_pymavlink_reads_the_speeds_that_are_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MAVLINK20", "1")
+    monkeypatch.setattr(mavutil, "mavlink", ardupilotmega)
+    route = Route(((38.1, -77.3, 20.5), (38.2, -77.25, 30.0)), speeds_m_s=(2.5, None))
+    path = tmp_path / "road.waypoints"
+    path.write_bytes(written("waypoints", NamedGeometry("road", route)))
+    loader = mavwp.MAVWPLoader()
+    assert loader.load(str(path)) == 4
+    speed = loader.wp(2)
+    assert (speed.command, speed.param1, speed.param2) == (178, 1, 2.5)
+    assert loader.wp(3).command == 16
 
 
 def test_a_plan_has_what_the_format_asks_for() -> None:
@@ -163,7 +179,20 @@ def areas(draw: st.DrawFn) -> Area:
 
 positions = st.tuples(latitudes, longitudes, st.none() | altitudes)
 flown = st.tuples(latitudes, longitudes, altitudes)
-routes = st.builds(Route, st.lists(positions, min_size=2, max_size=8).map(tuple), frames)
+
+
+@st.composite
+def with_speeds(draw: st.DrawFn, routes: st.SearchStrategy[Route]) -> Route:
+    route = draw(routes)
+    count = len(route.waypoints)
+    speeds = draw(st.lists(st.none() | st.floats(0.01, 99.0), min_size=count, max_size=count))
+    has_some = any(speed is not None for speed in speeds)
+    return replace(route, speeds_m_s=tuple(speeds) if has_some else ())
+
+
+routes = with_speeds(
+    st.builds(Route, st.lists(positions, min_size=2, max_size=8).map(tuple), frames)
+)
 points = st.builds(Point, positions, frames)
 names = st.from_regex(r"[a-z][a-z0-9_\-]{0,10}[a-z0-9]", fullmatch=True)
 named = st.lists(
@@ -183,7 +212,9 @@ def test_all_kinds_survive_the_round_trip(
 
 
 @pytest.mark.parametrize("file_format", ["plan", "waypoints"])
-@given(route=st.builds(Route, st.lists(flown, min_size=1, max_size=8).map(tuple), frames))
+@given(
+    route=with_speeds(st.builds(Route, st.lists(flown, min_size=1, max_size=8).map(tuple), frames))
+)
 def test_routes_survive_the_round_trip(file_format: str, route: Route) -> None:
     (again,) = read_again(written(file_format, NamedGeometry("again", route)), file_format)
     assert again == NamedGeometry("again", route)

@@ -69,7 +69,8 @@ def _offered(domain: str) -> tuple[BehaviorSpec, ...]:
 
 
 def _bounded(spec: BehaviorSpec) -> BehaviorSpec:
-    return replace(spec, parameters=tuple(_bound(parameter) for parameter in spec.parameters))
+    bounded = tuple(_bound(parameter) for parameter in spec.parameters)
+    return replace(spec, parameters=bounded, keeps_speeds=spec.name == "single_vehicle_routing")
 
 
 def _bound(spec: ParameterSpec) -> ParameterSpec:

@@ -1,6 +1,7 @@
 """Routes, surveys and circles, flown as missions."""
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import pytest
@@ -80,6 +81,73 @@ def test_waypoints_have_the_altitude_and_frame_that_were_asked_for(way, asked, s
         assert (item.frame, item.altitude_m) == stored
 
     play(Body().fly(33.0), main)
+
+
+FAST_THEN_SLOW = replace(L_SHAPE, speeds_m_s=(8.0, 2.0, None))
+
+
+@pytest.mark.parametrize("firmware", [Firmware.ARDUPILOT, Firmware.PX4])
+def test_waypoints_are_left_at_their_own_speeds(firmware) -> None:
+    async def main(bench) -> None:
+        end = await bench.do("single_vehicle_routing", route=FAST_THEN_SLOW)
+        assert end.state is SUCCEEDED, end
+        commands = [(item.command, item.params[1]) for item in bench.body.mission]
+        assert commands == [
+            (WAYPOINT, 0.0),
+            (CHANGE_SPEED, 8.0),
+            (WAYPOINT, 0.0),
+            (CHANGE_SPEED, 2.0),
+            (WAYPOINT, 0.0),
+        ]
+
+    play(Body(firmware=firmware).fly(), main)
+
+
+def test_a_speed_of_the_task_replaces_those_of_waypoints() -> None:
+    async def main(bench) -> None:
+        await bench.do("single_vehicle_routing", route=FAST_THEN_SLOW, speed=4.0)
+        speeds = [item.params[1] for item in bench.body.mission if item.command == CHANGE_SPEED]
+        assert speeds == [4.0]
+
+    play(Body().fly(), main)
+
+
+def test_after_a_hold_the_vehicle_has_the_speed_of_the_waypoint_again() -> None:
+    async def main(bench) -> None:
+        await bench.start("r1.b1", "single_vehicle_routing", "v", route=FAST_THEN_SLOW)
+        await bench.until(lambda: bench.body.current == 4, 90)
+        await bench.until(lambda: way_left(bench).speeds_m_s == (2.0, None), 20)
+        await bench.arbiter.hold("v")
+        await bench.clock.sleep(20)
+        await bench.arbiter.resume("v")
+        assert (await bench.ended("r1.b1", 90)).state is SUCCEEDED
+        sent = [call[:2] for call in bench.body.calls]
+        assert sent[2:] == [("stop",), ("start_mission", 4), ("set_speed", 2.0)]
+
+    play(Body().fly(), main)
+
+
+def test_the_way_back_of_a_loop_has_the_speed_of_the_last_waypoint() -> None:
+    async def main(bench) -> None:
+        way = replace(L_SHAPE, speeds_m_s=(8.0, None, 3.0))
+        await bench.start("r1.b1", "single_vehicle_routing", "v", route=way, loop=True)
+        await bench.until(lambda: bench.told.count("start_mission") == 2, 300)
+        await bench.until(lambda: bench.told[-1] == "set_speed", 10)
+        assert bench.body.calls[-1][:2] == ("set_speed", 3.0)
+
+    play(Body().fly(), main)
+
+
+def test_the_speeds_of_a_stored_route_are_known_after_a_restart() -> None:
+    async def main(bench, reference: str) -> None:
+        assert (await bench.arbiter.query("r1.b1", reference)).state is RUNNING
+        assert (await bench.ended("r1.b1", 600)).state is SUCCEEDED
+        assert way_left(bench).speeds_m_s[0] == 2.0
+
+    speeds = (*(5.0 for _ in LONG_ROUTE.waypoints[:-2]), 2.0, None)
+    after_a_restart(
+        Body().fly(), "single_vehicle_routing", main, route=replace(LONG_ROUTE, speeds_m_s=speeds)
+    )
 
 
 def test_a_route_of_a_rover_lies_on_the_ground() -> None:
@@ -296,6 +364,12 @@ def test_a_mission_is_found_again_after_a_restart_and_goes_on(behavior, body, pa
 
 
 LONG_ROUTE = route((30, 0, 20.0), (130, 0, 20.0), (130, 100, 20.0))
+
+
+def way_left(bench) -> Route:
+    """The route that is left by the last report that says so."""
+    said = [each for each in bench.of("r1.b1") if each.remaining]
+    return left(said[-1], "single_vehicle_routing")["route"] if said else Route(())
 
 
 def left(report, behavior: str) -> dict:

@@ -3,8 +3,10 @@
 import math
 import zlib
 from abc import abstractmethod
+from bisect import bisect_left, bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import zip_longest
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -133,7 +135,8 @@ class MissionFlight(Behavior):
         self._end: tuple[int, LatLon] | None = None
         self._stillness = StillnessTimer(context)
         self._work: RemainingWork | None = None
-        self._first = 0
+        self._moves: tuple[int, ...] = ()
+        self._speeds: Mapping[int, float] = {}
         self._counts = False
 
     def work(self, way: Sequence[MissionItem]) -> RemainingWork | None:
@@ -154,14 +157,13 @@ class MissionFlight(Behavior):
 
     @property
     def items(self) -> tuple[MissionItem, ...]:
-        """Return the items to upload: the speed if one was requested, then the waypoints; for a
-        plane also a circle at the last of them."""
+        """Return the items to upload: the speed if one was requested, then the waypoints, each with
+        its own speed behind it if it has one; for a plane also a circle at the last of them."""
         if self._items is None:
             way = tuple(self.way())
-            speed = self.parameters.speed_m_s
-            items = way if speed is None else (speed_item(speed), *way)
+            items = self._with_speeds(way)
             last = items[-1]
-            self._first = len(items) - len(way)
+            self._learn(items)
             self._work = self.work(way)
             self._end = (len(items) - 1, (last.latitude_deg, last.longitude_deg))
             circles = self.vehicle.state.loiter_radius_m is not None
@@ -169,16 +171,42 @@ class MissionFlight(Behavior):
             self._kept = fingerprint(self._items)
         return self._items
 
+    def _with_speeds(self, way: Sequence[MissionItem]) -> tuple[MissionItem, ...]:
+        """Return waypoints with the items that set speeds; behind the last one nothing is set."""
+        speed = self.parameters.speed_m_s
+        items = [] if speed is None else [speed_item(speed)]
+        own = self.parameters.waypoint_speeds_m_s[: len(way) - 1]
+        for item, speed in zip_longest(way, own):
+            items += (item,) if speed is None else (item, speed_item(speed))
+        return tuple(items)
+
+    def _learn(self, items: Sequence[MissionItem]) -> None:
+        """Note which items are waypoints, and which ones set a speed."""
+        self._moves = tuple(index for index, item in enumerate(items) if is_navigation(item))
+        self._speeds = {
+            index: item.params[1]
+            for index, item in enumerate(items)
+            if item.command == dialect.MAV_CMD_DO_CHANGE_SPEED
+        }
+
+    def _speed_towards(self, item: int) -> float | None:
+        """Return the speed that the items before one have set, unless it was adjusted since; None:
+        the vehicle's own."""
+        if self.parameters.adjusted_m_s is not None:
+            return self.parameters.adjusted_m_s
+        before = [speed for index, speed in self._speeds.items() if index < item]
+        return before[-1] if before else self.parameters.speed_m_s
+
     def refusal(self) -> str:
         """Check that an aircraft is in the air, and that the path, with a loop's way back, is
         inside the fence."""
         if reason := takeoff_required(self.vehicle):
             return reason
-        speeds = 0 if self.parameters.speed_m_s is None else 1
         items = self.items
         if self.context.fence is None or self._end is None:
             return ""
-        way = [(item.latitude_deg, item.longitude_deg) for item in items[speeds : self._end[0] + 1]]
+        placed = [items[index] for index in self._moves if index <= self._end[0]]
+        way = [(item.latitude_deg, item.longitude_deg) for item in placed]
         start = position_of(self.vehicle)
         if reason := self.context.fence.breach(way, start, self.named):
             return reason
@@ -198,13 +226,14 @@ class MissionFlight(Behavior):
         """Restart the mission at the current item."""
         self._stillness.forget()
         last = self._end[0] if self._end else 0
-        current = self.vehicle.driver.current_item or 0
-        await self.vehicle.driver.start_mission(min(current, last))
-        if (speed := self.parameters.speed_m_s) is not None:
+        current = min(self.vehicle.driver.current_item or 0, last)
+        await self.vehicle.driver.start_mission(current)
+        if (speed := self._speed_towards(current)) is not None:
             await self.vehicle.driver.set_speed(speed)
 
     def adjust(self, speed_m_s: float) -> bool:
-        """Keep the speed for loops and holds; the uploaded mission is not changed."""
+        """Keep the speed for loops and holds; the uploaded mission is not changed: the next
+        waypoint with a speed of its own changes it again."""
         self.parameters.adjusted_m_s = speed_m_s
         return True
 
@@ -215,11 +244,12 @@ class MissionFlight(Behavior):
         if work is None or self.loop:
             return None
         reached, current = driver.reached_item, driver.current_item
-        heading = -1 if reached is None else reached + 1 - self._first
+        heading = -1 if reached is None else bisect_right(self._moves, reached)
         if current is not None:
+            towards = bisect_left(self._moves, current)
             # At first the item of the mission before may still be reported.
-            self._counts = self._counts or reached is not None or current - self._first <= 1
-            heading = max(heading, current - self._first) if self._counts else heading
+            self._counts = self._counts or reached is not None or towards <= 1
+            heading = max(heading, towards) if self._counts else heading
         last = len(work.line.points) - 1
         if heading > 0:
             work.reached(min(heading - 1, last))
@@ -235,9 +265,18 @@ class MissionFlight(Behavior):
             await self.vehicle.until(self.at_the_end)
             self._stillness.forget()
             await self.vehicle.driver.start_mission(0)
-            if self.parameters.adjusted_m_s is not None:  # the mission begins with the speed before
-                await self.vehicle.driver.set_speed(self.parameters.adjusted_m_s)
+            if (speed := self._speed_of_way_back) is not None:
+                await self.vehicle.driver.set_speed(speed)
             await self.vehicle.until(lambda: not self.at_the_end())
+
+    @property
+    def _speed_of_way_back(self) -> float | None:
+        """From the last waypoint to the first, where the mission begins with another speed; None:
+        it has that one."""
+        if self.parameters.adjusted_m_s is not None or not self.parameters.waypoint_speeds_m_s:
+            return self.parameters.adjusted_m_s
+        route = self.parameters.route
+        return None if route is None else route.speed_from(len(route.waypoints) - 1)
 
     def at_the_end(self) -> bool:
         """Return whether the last waypoint was reached, by the vehicle's messages or its
@@ -271,9 +310,9 @@ class MissionFlight(Behavior):
         if not fingerprint(remove_landing(stored)).fits(self._kept):
             return BehaviorState.UNKNOWN
         if self._work is None:
-            moves = [index for index in range(self._end[0] + 1) if is_navigation(stored[index])]
-            self._first, self._counts = moves[0], True
-            self._work = self.work([stored[index] for index in moves])
+            self._learn(stored[: self._end[0] + 1])
+            self._counts = True
+            self._work = self.work([stored[index] for index in self._moves])
         if self.finished() or await self._stands_at_the_end():
             return BehaviorState.SUCCEEDED
         flies = self.vehicle.state.mode is FlightMode.MISSION and self.vehicle.state.armed
@@ -333,9 +372,11 @@ class Routing(MissionFlight):
 
     def work(self, way: Sequence[MissionItem]) -> RemainingWork:
         """Return the account of the route; after a restart of the one that is stored."""
+        own = [self._speeds.get(index + 1) for index in self._moves]
         stored = Route(
             tuple((item.latitude_deg, item.longitude_deg, item.altitude_m) for item in way),
             frame_name(way[0]),
+            tuple(own) if any(speed is not None for speed in own) else (),
         )
         route = self.parameters.route or stored
         frame = LocalFrame(route.waypoints[0][:2])

@@ -29,6 +29,13 @@ class VehicleParameters(BehaviorParameters):
         own."""
         return self.adjusted_m_s or super().speed_m_s or self._context.cruise_m_s
 
+    @property
+    def waypoint_speeds_m_s(self) -> tuple[float | None, ...]:
+        """The speeds of the route's waypoints; (): they have none, or the task's own replaces
+        them."""
+        route = self.route
+        return route.speeds_m_s if route is not None and super().speed_m_s is None else ()
+
     def altitude(
         self, own_m: float | None = None, own_frame: str = RELATIVE
     ) -> tuple[float | None, str]:

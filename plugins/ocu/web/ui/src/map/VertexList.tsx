@@ -6,17 +6,20 @@ const text = strings.operate.map;
 
 export interface VertexListProps {
   vertices: readonly Vertex[];
+  /** Whether vertices have speeds: those of routes. */
+  hasSpeeds: boolean;
   move(index: number, to: Partial<Vertex>): void;
   remove(index: number): void;
 }
 
-export function VertexList({ vertices, move, remove }: VertexListProps) {
+export function VertexList({ vertices, hasSpeeds, move, remove }: VertexListProps) {
   return (
     <ol class="draw-vertices">
       {vertices.map((vertex, index) => (
         <li key={index}>
           <VertexFields
             vertex={vertex}
+            hasSpeed={hasSpeeds}
             label={fill(text.vertex, { number: index + 1 })}
             onChange={(to) => move(index, to)}
           />
@@ -36,21 +39,23 @@ export function VertexList({ vertices, move, remove }: VertexListProps) {
 
 interface VertexFieldsProps {
   vertex: Vertex;
+  hasSpeed: boolean;
   label: string;
   onChange: (to: Partial<Vertex>) => void;
 }
 
-function VertexFields({ vertex, label, onChange }: VertexFieldsProps) {
+function VertexFields({ vertex, hasSpeed, label, onChange }: VertexFieldsProps) {
   const number = (
     name: string,
     value: number | null,
     limit: number,
     set: (value: number | null) => void,
+    least = -limit,
   ) => (
     <input
       type="number"
       step="any"
-      min={-limit}
+      min={least}
       max={limit}
       aria-label={`${label}: ${name}`}
       placeholder={name}
@@ -70,6 +75,8 @@ function VertexFields({ vertex, label, onChange }: VertexFieldsProps) {
         if (longitude !== null) onChange({ longitude });
       })}
       {number(text.altitude, vertex.altitude, 20_000, (altitude) => onChange({ altitude }))}
+      {hasSpeed &&
+        number(text.speed, vertex.speed ?? null, 100, (speed) => onChange({ speed }), 0.1)}
     </>
   );
 }

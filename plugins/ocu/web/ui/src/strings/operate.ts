@@ -130,6 +130,7 @@ export const operate = {
     latitude: "Latitude °",
     longitude: "Longitude °",
     altitude: "Altitude m",
+    speed: "Speed from here m/s",
     above: "Altitudes above",
     frames: { relative: "home", amsl: "sea level", terrain: "the ground" },
     addCentre: "Add map centre",

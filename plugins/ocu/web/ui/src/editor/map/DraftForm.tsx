@@ -36,6 +36,7 @@ export function DraftForm({ draft, change, addMiddle, undo, done, cancel }: Draf
         <summary>{fill(words.vertices, { count: vertices.length })}</summary>
         <VertexList
           vertices={vertices}
+          hasSpeeds={kind === "route"}
           move={(index, to) => change(moved(draft, index, to))}
           remove={(index) => change(removed(draft, index))}
         />

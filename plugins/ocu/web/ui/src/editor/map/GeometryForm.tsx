@@ -152,6 +152,7 @@ function Own({ editor, draft }: { editor: EditorContext; draft: Draft }) {
         <summary>{fill(words.vertices, { count: vertices.length })}</summary>
         <VertexList
           vertices={vertices}
+          hasSpeeds={kind === "route"}
           move={(index, to) => plan.change(moved(draft, index, to))}
           remove={(index) => {
             if (vertices.length > LEAST[kind]) plan.change(removed(draft, index));

@@ -120,6 +120,7 @@ export function DrawForm({ draft }: { draft: Draft }) {
       </div>
       <VertexList
         vertices={draft.vertices}
+        hasSpeeds={draft.kind === "route"}
         move={(index, to) => change(moved(draft, index, to))}
         remove={(index) => change(removed(draft, index))}
       />

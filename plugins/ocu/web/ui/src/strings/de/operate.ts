@@ -133,6 +133,7 @@ export const operate: Translation<typeof english.operate> = {
     latitude: "Breite °",
     longitude: "Länge °",
     altitude: "Höhe m",
+    speed: "Tempo ab hier m/s",
     above: "Höhen über",
     frames: { relative: "dem Startpunkt", amsl: "dem Meeresspiegel", terrain: "dem Gelände" },
     addCentre: "Kartenmitte hinzufügen",
