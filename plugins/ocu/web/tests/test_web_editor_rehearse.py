@@ -1,9 +1,10 @@
 """Rehearsals and starts from the editor, in a real browser."""
 
+import asyncio
 from pathlib import Path
 
 import pytest
-from playwright.async_api import Browser, Page, expect
+from playwright.async_api import Browser, Page, Route, expect
 from web_browsing import KEY, page_at
 from web_desk import IN_ONE_LOOP, Desk
 from web_served import served
@@ -122,6 +123,31 @@ async def test_a_simulated_run_starts_once_and_is_shown(desk: Desk) -> None:
     assert await runs_of(page) == [*before, "vignette1"]
     reality = page.locator("header .reality")
     await expect(reality).to_have_text("Simulated")
+
+
+async def test_a_mission_can_be_started_as_soon_as_it_is_drawn(desk: Desk) -> None:
+    page, comes = desk.page, asyncio.Event()
+
+    async def late(route: Route) -> None:
+        await comes.wait()
+        await route.continue_()
+
+    await page.route("**/api/missions/vignette1", late)
+    await page.goto(f"{desk.executive.origin}/missions/vignette1")
+    await page.get_by_role("tab", name="Run", exact=True).click()
+    start = page.get_by_role("button", name="Start", exact=True)
+    rehearse = page.get_by_role("button", name="Rehearse", exact=True)
+    await expect(start).to_be_disabled()
+    await expect(rehearse).to_be_disabled()
+    await page.get_by_role("tab", name="Verify", exact=True).click()
+    verify = page.get_by_role("button", name="Verify", exact=True)
+    await expect(verify).to_be_disabled()
+    comes.set()
+    await expect(verify).to_be_enabled()
+    await page.get_by_role("tab", name="Run", exact=True).click()
+    await expect(rehearse).to_be_enabled()
+    await start.click()
+    await page.wait_for_url("**/runs/*")
 
 
 async def test_real_vehicles_start_only_when_that_was_confirmed(

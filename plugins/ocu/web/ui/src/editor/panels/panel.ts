@@ -25,6 +25,8 @@ export interface EditorContext {
   /** Counts changes, undone and redone ones too: what was found for an older count may be stale. */
   readonly changes: ReadonlySignal<number>;
   readonly isDirty: ReadonlySignal<boolean>;
+  /** Whether the mission is drawn. Before that there is nothing to check, to rehearse or to start. */
+  readonly isOpen: ReadonlySignal<boolean>;
 
   /** The mission as it is drawn now. */
   xml(): Promise<string>;

@@ -24,6 +24,7 @@ export class EditorSession implements EditorContext {
   readonly diagrams: Diagrams;
   readonly changes = signal(0);
   readonly isDirty = signal(false);
+  readonly isOpen = signal(false);
   readonly canUndo = signal(false);
   readonly canRedo = signal(false);
   readonly selected = signal<readonly Element[]>([]);
@@ -73,6 +74,7 @@ export class EditorSession implements EditorContext {
     this.warnings.value = warnings.map(String);
     this.savedAt = isSaved ? BEGINNING : null;
     this.stackChanged();
+    this.isOpen.value = true;
     this.fit();
   }
 

@@ -63,7 +63,7 @@ function Rehearse({ editor }: { editor: EditorContext }) {
           <button
             type="button"
             class="primary"
-            disabled={busy || !ready}
+            disabled={busy || !ready || !editor.isOpen.value}
             onClick={() => void rehearsal.begin(editor)}
           >
             {words.rehearse}
@@ -123,7 +123,7 @@ function Start({ editor }: { editor: EditorContext }) {
           <button
             type="button"
             class={simulated ? "primary" : "primary m2r-real"}
-            disabled={busy || !ready}
+            disabled={busy || !ready || !editor.isOpen.value}
             onClick={() => (simulated ? void start() : setAsks(true))}
           >
             {busy ? words.starting : simulated ? words.start : words.startRealButton}

@@ -70,7 +70,7 @@ function Ask({ editor, verification }: PartProps) {
           <button
             type="button"
             class="primary"
-            disabled={busy || !ready}
+            disabled={busy || !ready || !editor.isOpen.value}
             title={words.beginHint}
             onClick={() => void verification.begin(editor)}
           >
