@@ -60,17 +60,19 @@ describe("rows", () => {
 
   it("say who has a vehicle", () => {
     const found = rows({
-      vehicles: [vehicle("v1"), vehicle("v2"), vehicle("v3"), vehicle("m", { manned: true })],
+      vehicles: [vehicle("v1"), vehicle("v2"), vehicle("v3"), vehicle("v4"), vehicle("m", { manned: true })],
       status: {
         v1: had({ holder: "r1.b3", run: "r1", task: "Survey" }),
         v2: had({ holder: "ben", run: "r2", task: "goto", direct: true, by: "ben" }),
+        v4: had({ holder: "r3.b1", run: "r3", task: "goto", direct: true, by: "ben" }),
       },
     });
-    expect(found.map(({ operator }) => operator)).toEqual(["", "ben", "", ""]);
+    expect(found.map(({ operator }) => operator)).toEqual(["", "ben", "", "", ""]);
     expect(found.map(({ flags }) => [flags.free, flags.taken, flags.inRun])).toEqual([
       [false, false, true],
       [false, true, false],
       [true, false, false],
+      [false, false, true],
       [false, false, false],
     ]);
     expect(names(matching(found, { search: "r1 surv", filters: new Set(), withPayloads: true })))

@@ -167,7 +167,8 @@ function rowOf(
       lowBattery: isLow(battery),
       free: !manned && (!now || isFree(now)),
       taken: operator !== "",
-      inRun: now !== null && now.run !== "" && !now.direct,
+      // What an operator commands without having taken it is in a run of one task.
+      inRun: now !== null && now.run !== "" && (!now.direct || operator === ""),
     },
   };
 }
