@@ -135,6 +135,10 @@ class StaleDrawingsError(JournalError):
     written."""
 
 
+class StaleAlertsError(JournalError):
+    """Another process has written alerts of the fleet since they were read; nothing was written."""
+
+
 class FleetServedError(JournalError):
     """Another executive serves the fleet on this journal."""
 

@@ -2,7 +2,8 @@
 
 Conditions are given whole each time (`update`): what was not there is raised, what is gone is
 cleared. What is said once (`add`) is open until an operator acknowledges it. The journal keeps the
-list, so that the next executive knows who has acknowledged what.
+list, so that the next executive knows who has acknowledged what. Several executives of a simulated
+fleet may write it: an alert gets another number if one of them was first with that.
 """
 
 import asyncio
@@ -15,7 +16,7 @@ import msgspec
 
 from m2pem.api.alerts import AlertSeverity, OperatorAlert
 from m2pem.api.runs import Alert
-from m2pem.errors import JournalError, OperatorError
+from m2pem.errors import JournalError, OperatorError, StaleAlertsError
 from m2pem.journal.base import Journal
 
 log = logging.getLogger("m2pem.alerts")
@@ -65,6 +66,14 @@ class _Line:
     left: set[str]
     form: str = ""
 
+    def is_same(self, other: "_Line") -> bool:
+        """Whether both are one alert, however it has changed since it was raised."""
+        return self._raised() == other._raised()
+
+    def _raised(self) -> tuple[int, str, str, str, str | None, str]:
+        one = self.alert
+        return one.raised_us, one.code, one.run, one.subject, self.group, self.form
+
 
 class _Kept(msgspec.Struct, frozen=True, omit_defaults=True):
     """A line as the journal has it."""
@@ -86,7 +95,10 @@ class AlertList:
         self._open: dict[int, _Line] = {}
         self._last = 0
         self._unwritten: dict[int, _Line | None] = {}
-        self._was_read = False
+        self._last_kept: int | None = None
+        """The last number that the journal has; None: it must be read before it is written."""
+        self._first_new = 1
+        """Alerts from this number on were raised here since the journal was read or written."""
         self._writing = asyncio.Lock()
         self.changes = 0
         """How often the list has changed."""
@@ -96,38 +108,54 @@ class AlertList:
     async def load(self) -> None:
         """Read what the journal has. Questions and incidents of runs that have ended are over.
 
+        What is not written yet of this executive is newer.
+
         Raises:
             JournalError: it cannot be read; it is read before the next alert is written.
         """
         kept = await self._journal.alerts(self._fleet)
         runs = await self._journal.runs(files=False) if kept else ()
         # From here on nothing is awaited: what is raised meanwhile has the numbers after these.
-        self._was_read = True
-        if not kept:
-            return
         over = {each.run for each in runs if each.outcome or each.gone}
-        raised = list(self._lines.values())
+        raised = [(number, each) for number, each in self._lines.items() if self._is_new(number)]
+        changed = {n: each for n, each in self._unwritten.items() if not self._is_new(n)}
         self._lines, self._open, self._unwritten = {}, {}, {}
-        self._last = 0
+        self._last = self._last_kept = max(kept, default=0)
+        self._first_new = self._last + 1
         for number, text in kept.items():
-            self._last = max(self._last, number)
-            try:
-                found = msgspec.json.decode(text, type=_Kept)
-            except (msgspec.MsgspecError, UnicodeError) as error:
-                log.warning("an alert cannot be read, or is of a newer m2pem: %s", error)
+            if number in changed and changed[number] is None:
+                self._unwritten[number] = None
                 continue
-            line = _Line(found.alert, found.group, set(found.left), found.form)
-            self._lines[number] = line
-            if line.alert.open:
-                self._open[number] = line
-                if line.group is None and line.alert.subject and line.alert.run in over:
-                    self._clear(number, line)
-        for line in raised:
-            alert = replace(line.alert, alert=self._next_id())
-            self._lines[self._last] = line
-            if alert.open:
-                self._open[self._last] = line
-            self._change(self._last, line, alert)
+            line = changed.get(number) or _decoded(text)
+            if line is not None:
+                self._put(number, line)
+                if number in changed:
+                    self._changed(number, line)
+        for wanted, line in raised:
+            # A writing that was given up may have been done.
+            written = self._lines.get(wanted) if wanted <= self._last_kept else None
+            number = wanted
+            if wanted > self._last:
+                self._last = wanted
+            elif written is None or not line.is_same(written):
+                # Another executive was first with its number.
+                line.alert = replace(line.alert, alert=self._next_id())
+                number = self._last
+            self._put(number, line)
+            self._changed(number, line)
+        for number, line in list(self._open.items()):
+            if line.group is None and line.alert.subject and line.alert.run in over:
+                self._clear(number, line)
+
+    def _is_new(self, number: int) -> bool:
+        return number >= self._first_new
+
+    def _put(self, number: int, line: _Line) -> None:
+        self._lines[number] = line
+        if line.alert.open:
+            self._open[number] = line
+        else:
+            self._open.pop(number, None)
 
     def alerts(self, *, over: bool = False) -> list[OperatorAlert]:
         """The open alerts, the most severe first, the newest of each severity first; with `over`,
@@ -339,22 +367,26 @@ class AlertList:
             JournalError: it cannot be written; it is written with the next call.
         """
         async with self._writing:
-            if self._unwritten and not self._was_read:  # the numbers of what it has are not known
-                await self.load()
-            taken, self._unwritten = self._unwritten, {}
-            if not taken:
-                return
-            try:
-                await self._journal.write_alerts(
-                    self._fleet,
-                    {
-                        number: None if line is None else _encoded(line)
-                        for number, line in taken.items()
-                    },
-                )
-            except BaseException:
-                self._unwritten = {**taken, **self._unwritten}
-                raise
+            while True:
+                if self._unwritten and self._last_kept is None:
+                    await self.load()
+                taken, self._unwritten = self._unwritten, {}
+                if not taken:
+                    return
+                last = self._last_kept or 0
+                lines = {n: None if line is None else _encoded(line) for n, line in taken.items()}
+                try:
+                    await self._journal.write_alerts(self._fleet, lines, last=last)
+                except BaseException as error:
+                    self._unwritten = {**taken, **self._unwritten}
+                    # Whether the journal has what was on its way is not known.
+                    self._last_kept = None
+                    if not isinstance(error, StaleAlertsError):
+                        raise
+                else:
+                    self._last_kept = max((last, *taken))
+                    self._first_new = self._last_kept + 1
+                    return
 
     async def _written(self, what: str) -> None:
         try:
@@ -420,6 +452,16 @@ def _filled(form: str, names: Sequence[str]) -> str:
     if len(names) > SHOWN_NAMES:
         shown += f" and {len(names) - SHOWN_NAMES:,} more"
     return form.replace("{names}", shown)
+
+
+def _decoded(text: str) -> _Line | None:
+    """A line as the journal has it; None: it cannot be read, which is logged."""
+    try:
+        found = msgspec.json.decode(text, type=_Kept)
+    except (msgspec.MsgspecError, UnicodeError) as error:
+        log.warning("an alert cannot be read, or is of a newer m2pem: %s", error)
+        return None
+    return _Line(found.alert, found.group, set(found.left), found.form)
 
 
 def _encoded(line: _Line) -> str:

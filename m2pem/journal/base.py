@@ -402,11 +402,17 @@ class Journal(Protocol):
 
     # --- alerts ---------------------------------------------------------------------------------
 
-    async def write_alerts(self, fleet: str, alerts: Mapping[int, str | None]) -> None:
+    async def write_alerts(
+        self, fleet: str, alerts: Mapping[int, str | None], *, last: int | None = None
+    ) -> None:
         """Write alerts of a fleet by their numbers, new ones or in place of those of the same
         number; None: remove it. Durable on return.
 
+        `last`: the greatest number that the fleet must have before, 0 for none; None: any. Of two
+        processes that have read the same alerts, one writes, and the other is refused.
+
         Raises:
+            StaleAlertsError: the greatest number is another one; nothing was written.
             JournalError: they cannot be written.
         """
         ...

@@ -11,7 +11,7 @@ import msgspec
 
 from m2pem.engine.inputs import Input
 from m2pem.engine.records import Record
-from m2pem.errors import InternalError, JournalError, StaleDrawingsError
+from m2pem.errors import InternalError, JournalError, StaleAlertsError, StaleDrawingsError
 from m2pem.fleet.approval import Approval, Edit
 from m2pem.journal.base import Entry
 from m2pem.mission.library import Source
@@ -144,6 +144,18 @@ def refuse_stale_drawings(fleet: str, found: int, last: int) -> None:
     if found != last:
         raise StaleDrawingsError(
             f"the last version of the drawings of {fleet} is {found}, not {last}: read them again"
+        )
+
+
+def refuse_stale_alerts(fleet: str, found: int, last: int) -> None:
+    """Refuse a writer of alerts that has read another `last` one than there is.
+
+    Raises:
+        StaleAlertsError: the numbers differ.
+    """
+    if found != last:
+        raise StaleAlertsError(
+            f"the last alert of {fleet} is a{found}, not a{last}: read them again"
         )
 
 

@@ -452,10 +452,12 @@ class DatabaseJournal(ABC):
                 found[digest] = decode_part(row[0], Edit)
         return found
 
-    async def write_alerts(self, fleet: str, alerts: Mapping[int, str | None]) -> None:
+    async def write_alerts(
+        self, fleet: str, alerts: Mapping[int, str | None], *, last: int | None = None
+    ) -> None:
         """See `Journal.write_alerts`."""
         self._check_open()
-        await self._writer.submit(lambda transaction: transaction.write_alerts(fleet, alerts))
+        await self._writer.submit(lambda transaction: transaction.write_alerts(fleet, alerts, last))
 
     async def alerts(self, fleet: str) -> Mapping[int, str]:
         """See `Journal.alerts`."""

@@ -15,6 +15,7 @@ from m2pem.fleet.approval import Approval, Edit
 from m2pem.journal.base import Deletion, Entry, RunHeader, RunInfo
 from m2pem.journal.codec import (
     encode_part,
+    refuse_stale_alerts,
     refuse_stale_drawings,
     run_id,
     run_number,
@@ -320,10 +321,15 @@ class MemoryJournal:
         self._check_open()
         return {each: self._edits[each] for each in digests if each in self._edits}
 
-    async def write_alerts(self, fleet: str, alerts: Mapping[int, str | None]) -> None:
+    async def write_alerts(
+        self, fleet: str, alerts: Mapping[int, str | None], *, last: int | None = None
+    ) -> None:
         """See `Journal.write_alerts`."""
         self._check_open()
-        _write(self._alerts.setdefault(fleet, {}), alerts)
+        kept = self._alerts.setdefault(fleet, {})
+        if last is not None:
+            refuse_stale_alerts(fleet, max(kept, default=0), last)
+        _write(kept, alerts)
 
     async def alerts(self, fleet: str) -> Mapping[int, str]:
         """See `Journal.alerts`."""

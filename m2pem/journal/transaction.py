@@ -20,6 +20,7 @@ from m2pem.journal.codec import (
     encode_library,
     encode_part,
     known_entry,
+    refuse_stale_alerts,
     refuse_stale_drawings,
     run_id,
     run_number,
@@ -356,9 +357,17 @@ class WriteTransaction:
         )
         self._wrote = True
 
-    def write_alerts(self, fleet: str, alerts: Mapping[int, str | None]) -> None:
-        """Write or remove alerts of a fleet."""
+    def write_alerts(
+        self, fleet: str, alerts: Mapping[int, str | None], last: int | None = None
+    ) -> None:
+        """Write or remove alerts of a fleet, if its last one is as expected."""
         self._refuse_while_short()
+        if last is not None:
+            self._storage.exclude_others()
+            found = self._connection.execute(
+                "SELECT max(number) FROM alerts WHERE fleet = ?", (fleet,)
+            ).fetchone()[0]
+            refuse_stale_alerts(fleet, found or 0, last)
         for number, text in alerts.items():
             if text is None:
                 self._connection.execute(

@@ -1,12 +1,15 @@
 """The list of alerts: raised and cleared, grouped, acknowledged, owned, and kept."""
 
+import asyncio
+import sys
+
 import pytest
 
 from m2pem.api.alerts import LINK_LOST, AlertSeverity
 from m2pem.api.runs import Alert
 from m2pem.errors import JournalError, OperatorError
 from m2pem.executive.alert_list import MOST_OVER, AlertList, Condition
-from m2pem.journal import MemoryJournal
+from m2pem.journal import MemoryJournal, open_journal
 from m2pem.units import US_PER_S
 
 pytestmark = pytest.mark.asyncio
@@ -25,7 +28,7 @@ class Clock:
 class FullJournal(MemoryJournal):
     """A journal whose disk is full."""
 
-    async def write_alerts(self, fleet, alerts):
+    async def write_alerts(self, fleet, alerts, *, last=None):
         raise JournalError("the disk is full")
 
 
@@ -256,3 +259,158 @@ async def test_what_could_not_be_read_at_first_is_not_written_over():
     again = made(journal=journal)
     await again.load()
     assert again.alerts() == after.alerts()
+
+
+def warning(text):
+    """Something that is said once, and open until an operator acknowledges it."""
+    return Alert("", "SCHEDULE", text, AlertSeverity.WARNING)
+
+
+def at(s):
+    clock = Clock()
+    clock.s = s
+    return clock
+
+
+async def kept(journal):
+    """The alerts that the next executive reads, by their ids."""
+    again = made(journal=journal)
+    await again.load()
+    return {each.alert: each for each in again.alerts(over=True)}
+
+
+async def test_two_executives_of_a_fleet_write_over_no_alert_of_each_other():
+    journal = MemoryJournal()
+    one, two = made(at(1), journal), made(at(2), journal)
+    await one.load()
+    await two.load()
+    one.add(warning("rain"))
+    update(two, lost("uav1"))
+    two.add(warning("wind"))
+    await one.write()
+    await two.write()
+    assert {key: each.text for key, each in (await kept(journal)).items()} == {
+        "a1": "rain",
+        "a2": "uav1: the link is lost",
+        "a3": "wind",
+    }
+    assert {each.alert for each in two.alerts()} == {"a1", "a2", "a3"}
+    await two.acknowledge("a3", "otto")
+    one.add(warning("snow"))
+    await one.acknowledge("a1", "anna")
+    assert {key: each.acknowledged_by for key, each in (await kept(journal)).items()} == {
+        "a1": "anna",
+        "a2": "",
+        "a3": "otto",
+        "a4": "",
+    }
+
+
+async def test_what_changed_here_is_newer_than_what_another_executive_left():
+    journal = MemoryJournal()
+    one, two = made(at(1), journal), made(at(2), journal)
+    one.add(warning("rain"))
+    update(one, asks("p1"))
+    await one.write()
+    await two.load()
+    two.add(warning("wind"))
+    await two.write()
+    update(one)  # the question was answered
+    one.add(warning("snow"))
+    await one.write()
+    found = await kept(journal)
+    assert {key: each.text for key, each in found.items() if each.open} == {
+        "a1": "rain",
+        "a3": "wind",
+        "a4": "snow",
+    }
+    assert {each.alert for each in one.alerts()} == {"a1", "a3", "a4"}
+
+
+async def test_what_another_executive_removed_stays_removed():
+    journal = MemoryJournal()
+    one, two = made(at(1), journal), made(at(2), journal)
+    one.add(Alert("", "SCHEDULE", "old", AlertSeverity.NOTICE))
+    await one.write()
+    await two.load()
+    for number in range(MOST_OVER):
+        two.add(Alert("", "SCHEDULE", f"{number}", AlertSeverity.NOTICE))
+    await two.write()
+    one.add(warning("rain"))
+    await one.write()
+    numbers = sorted(await journal.alerts("north"))
+    assert (numbers[0], numbers[-1]) == (2, MOST_OVER + 2)
+
+
+class Slow(MemoryJournal):
+    """A journal that may be waited for in vain; `written`: what was asked for is done anyway."""
+
+    stuck = written = False
+
+    async def write_alerts(self, fleet, alerts, *, last=None):
+        if not self.stuck or self.written:
+            await super().write_alerts(fleet, alerts, last=last)
+        if self.stuck:
+            await asyncio.Event().wait()
+
+
+@pytest.mark.parametrize("written", [False, True])
+async def test_an_alert_whose_writing_was_given_up_is_written_once(written):
+    journal = Slow()
+    alerts = made(journal=journal)
+    await alerts.load()
+    journal.stuck, journal.written = True, written
+    alerts.add(warning("rain"))
+    writing = asyncio.create_task(alerts.write())
+    await asyncio.sleep(0)
+    alerts.add(warning("rain"))  # again
+    writing.cancel()
+    await asyncio.wait([writing])
+    journal.stuck = False
+    await alerts.acknowledge("a1", "anna")
+    (alert,) = (await kept(journal)).values()
+    assert (alert.alert, alert.count, alert.acknowledged_by) == ("a1", 2, "anna")
+
+
+_WRITER = """
+import asyncio, sys
+from m2pem.api.runs import Alert
+from m2pem.executive.alert_list import AlertList
+from m2pem.journal import open_journal
+
+async def write(url, who, times):
+    journal = open_journal(url)
+    alerts = AlertList("north", journal, lambda: 1)
+    await alerts.load()
+    print("ready", flush=True)
+    sys.stdin.readline()
+    for number in range(int(times)):
+        alerts.add(Alert("", "SCHEDULE", f"{who} {number}"))
+        await alerts.write()
+    await journal.close()
+
+asyncio.run(write(*sys.argv[1:]))
+"""
+
+
+async def test_two_processes_that_write_alerts_at_the_same_time_lose_none(tmp_path):
+    times, people = 40, ("anna", "ben")
+    url = str(tmp_path / "journal.db")
+    pipe = asyncio.subprocess.PIPE
+    writers = [
+        await asyncio.create_subprocess_exec(
+            sys.executable, "-c", _WRITER, url, who, str(times), stdin=pipe, stdout=pipe
+        )
+        for who in people
+    ]
+    for writer in writers:
+        assert await writer.stdout.readline() == b"ready\n"
+    ended = await asyncio.gather(*(writer.communicate(b"go\n") for writer in writers))
+    assert [writer.returncode for writer in writers] == [0, 0], ended
+    journal = open_journal(url)
+    found = await kept(journal)
+    await journal.close()
+    assert set(found) == {f"a{number}" for number in range(1, 2 * times + 1)}
+    assert sorted(each.text for each in found.values()) == sorted(
+        f"{who} {number}" for who in people for number in range(times)
+    )

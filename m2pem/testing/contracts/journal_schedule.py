@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from m2pem.errors import JournalError, StaleDrawingsError, StaleEntryError
+from m2pem.errors import JournalError, StaleAlertsError, StaleDrawingsError, StaleEntryError
 from m2pem.scheduling.entry import (
     EntryChange,
     EntryState,
@@ -249,6 +249,26 @@ class JournalSchedule(JournalFixtures):
             ]
             assert await journal.drawings("north") == {1: "one", 2: "two"}
             assert await journal.drawings("south") == {1: "another"}
+
+    async def test_of_two_writers_that_have_read_the_same_alerts_one_is_refused(
+        self, open_journal: OpenJournal
+    ) -> None:
+        """The last number is compared and the alerts are written in one transaction."""
+        async with opened(open_journal) as journal:
+            await journal.write_alerts("north", {1: "one"}, last=0)
+            written = await asyncio.gather(
+                journal.write_alerts("north", {2: "two"}, last=1),
+                journal.write_alerts("north", {1: None, 2: "other"}, last=1),
+                journal.write_alerts("south", {1: "another"}, last=0),
+                return_exceptions=True,
+            )
+            assert [type(each) for each in written] == [
+                type(None),
+                StaleAlertsError,
+                type(None),
+            ]
+            assert await journal.alerts("north") == {1: "one", 2: "two"}
+            assert await journal.alerts("south") == {1: "another"}
 
     @needs("durability")
     async def test_each_of_two_journals_sees_what_the_other_does_with_the_schedule(
