@@ -95,3 +95,15 @@ async def test_a_click_into_the_plots_of_a_replay_goes_to_that_time(desk: Desk) 
     await times.press("Home")
     await times.press("Enter")
     await expect(position).to_have_attribute("aria-valuetext", "0:00.0")
+    # Without colours, too, each line is told from the others.
+    assert len(await pane.evaluate(LINES)) == 1
+    await page.emulate_media(contrast="more")
+    await page.wait_for_function(f"({LINES})(document).length === 2")
+    await page.emulate_media(contrast="no-preference", forced_colors="active")
+    await page.wait_for_function(f"({LINES})(document).length === 2")
+
+
+# Dashes and widths of the first lines of the legend: as many as differ.
+LINES = """(there) => [...new Set([...there.querySelectorAll(".swatch line")].slice(0, 2)
+  .map((line) => getComputedStyle(line))
+  .map(({ strokeDasharray, strokeWidth }) => `${strokeDasharray} ${strokeWidth}`))]"""

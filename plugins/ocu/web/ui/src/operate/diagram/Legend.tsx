@@ -1,6 +1,6 @@
 // What the colours mean.
 import { strings } from "../../strings";
-import { css, palette } from "./colours";
+import { css, palette, SIGNS } from "./colours";
 
 const text = strings.operate.diagram;
 
@@ -15,7 +15,9 @@ export function Legend() {
           : "1px solid #777";
         return (
           <li key={look}>
-            <i style={`background: ${css(fill)}; border: ${line}`} aria-hidden="true" />
+            <i style={`background: ${css(fill)}; border: ${line}`} aria-hidden="true">
+              {SIGNS[look]}
+            </i>
             {text.states[look]}
           </li>
         );

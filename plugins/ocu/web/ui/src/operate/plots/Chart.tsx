@@ -6,7 +6,7 @@ import { strings } from "../../strings";
 import { LINK_LEVELS } from "./fields";
 import type { TelemetryHistory } from "./history";
 import { drawn, grid, type Range } from "./series";
-import { forced, lineOf } from "./style";
+import { lineOf, means } from "./style";
 import "uplot/dist/uPlot.min.css";
 import { textScale } from "../../shared/textScale";
 
@@ -75,7 +75,7 @@ export function Chart(props: ChartProps) {
       series: [
         {},
         ...resources.map((resource, index) => {
-          const { colour, dash, width: px } = lineOf(index, box, forced.peek());
+          const { colour, dash, width: px } = lineOf(index, box, means.peek());
           return {
             label: resource,
             stroke: colour,
@@ -93,7 +93,7 @@ export function Chart(props: ChartProps) {
       chart.current = undefined;
       made.destroy();
     };
-  }, [field, names, theme.value, forced.value, axis_px]);
+  }, [field, names, theme.value, means.value, axis_px]);
 
   useEffect(() => chart.current?.setSize({ width, height }), [width, height]);
 
@@ -104,7 +104,7 @@ export function Chart(props: ChartProps) {
       return series ? drawn(series, range, columns) : [];
     });
     chart.current?.setData([grid(range, columns), ...data]);
-  }, [history, field, names, range.from_s, range.to_s, width, theme.value, forced.value, axis_px]);
+  }, [history, field, names, range.from_s, range.to_s, width, theme.value, means.value, axis_px]);
 
   return (
     <div class="plot" role="img" aria-label={label}>

@@ -1,8 +1,8 @@
 // A piece of the line of a vehicle or payload.
-import { forced, swatchOf } from "./style";
+import { means, swatchOf } from "./style";
 
 export function Swatch({ index }: { index: number }) {
-  const { colour, dash, width } = swatchOf(index, forced.value);
+  const { colour, dash, width } = swatchOf(index, means.value);
   return (
     <svg class="swatch" width="22" height="8" aria-hidden="true">
       <line

@@ -1,6 +1,7 @@
-// Lines that can be told apart: by colour, and by dashes where there are more of them than colours,
-// or where the system has its own colours (forced colours).
-import { signal } from "@preact/signals";
+// Lines that can be told apart: by colour, and by dashes where there are more of them than colours;
+// by dashes and widths alone in high contrast, and where the system has its own colours (forced colours).
+import { computed, signal } from "@preact/signals";
+import { theme } from "../../shared/theme";
 
 export interface Line {
   colour: string;
@@ -13,25 +14,37 @@ export const COLOURS = 8;
 const DASHES: readonly number[][] = [[], [8, 4], [2, 3], [12, 3, 2, 3], [5, 2], [2, 6]];
 
 const media = matchMedia("(forced-colors: active)");
-
-export const forced = signal(media.matches);
+const forced = signal(media.matches);
 media.addEventListener("change", () => (forced.value = media.matches));
 
-/** `host` has the colours of the theme. */
-export function lineOf(index: number, host: HTMLElement, isForced: boolean): Line {
-  const style = getComputedStyle(host);
-  if (isForced) {
-    const width = index % (2 * DASHES.length) < DASHES.length ? 1.5 : 3;
-    return { colour: style.color, dash: DASHES[index % DASHES.length]!, width };
+/** What tells lines apart: their colours first, their dashes as well, or their dashes only. */
+export type Means = "colours" | "both" | "dashes";
+
+export const means = computed<Means>(() => {
+  if (forced.value) return "dashes";
+  return theme.value === "contrast" ? "both" : "colours";
+});
+
+function strokeOf(index: number, by: Means): { dash: number[]; isWide: boolean } {
+  if (by === "colours") {
+    return { dash: DASHES[Math.floor(index / COLOURS) % DASHES.length]!, isWide: false };
   }
-  const colour = style.getPropertyValue(`--series-${(index % COLOURS) + 1}`).trim();
-  return { colour, dash: DASHES[Math.floor(index / COLOURS) % DASHES.length]!, width: 1.75 };
+  const isWide = index % (2 * DASHES.length) >= DASHES.length;
+  return { dash: DASHES[index % DASHES.length]!, isWide };
+}
+
+/** `host` has the colours of the theme. */
+export function lineOf(index: number, host: HTMLElement, by: Means): Line {
+  const style = getComputedStyle(host);
+  const { dash, isWide } = strokeOf(index, by);
+  const series = style.getPropertyValue(`--series-${(index % COLOURS) + 1}`).trim();
+  const colour = by === "dashes" ? style.color : series;
+  return { colour, dash, width: isWide ? 3 : by === "dashes" ? 1.5 : 1.75 };
 }
 
 /** The same as a piece of a line, for legends. */
-export function swatchOf(index: number, isForced: boolean) {
-  const colour = isForced ? "CanvasText" : `var(--series-${(index % COLOURS) + 1})`;
-  const at = isForced ? index : Math.floor(index / COLOURS);
-  const wide = isForced && index % (2 * DASHES.length) >= DASHES.length;
-  return { colour, dash: DASHES[at % DASHES.length]!.join(" "), width: wide ? 3 : 2 };
+export function swatchOf(index: number, by: Means) {
+  const { dash, isWide } = strokeOf(index, by);
+  const colour = by === "dashes" ? "CanvasText" : `var(--series-${(index % COLOURS) + 1})`;
+  return { colour, dash: dash.join(" "), width: isWide ? 3 : 2 };
 }
