@@ -1,7 +1,7 @@
 """Vehicles, payloads and space as operators see them: who has them, which tasks wait for them, and
 what a start or a take would do with them."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from m2pem.api.runs import RunId
@@ -134,6 +134,11 @@ class WaitingTask:
             f"{self.run}: {self.task} waits since {self.waited_s:.0f} s and {limit}{priority}: "
             f"{self.reason}"
         )
+
+
+def blocked_by(incident: str, waiting: Iterable[WaitingTask]) -> list[WaitingTask]:
+    """Return those of the tasks that wait for what an incident holds. `incident`: its id."""
+    return [each for each in waiting if incident in each.holders.values()]
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,6 +15,7 @@ from m2pem.cli.options import (
 from m2pem.cli.run_control import by_option, executives_here, journal_file, steer
 
 if TYPE_CHECKING:
+    from m2pem.api.allocation import WaitingTask
     from m2pem.api.runs import OpenIncident
     from m2pem.mission.values import Value
 
@@ -28,26 +29,34 @@ LONG_TIMEOUT_S = 120.0
 def incidents(journal: str | None, output: str) -> None:
     """List the errors about which operators must decide.
 
-    Those of all runs that executives on this host drive, each with what can be chosen.
+    Those of all runs that executives on this host drive, each with what can be chosen, and with the
+    tasks of any run that wait for what it holds.
     """
+    from dataclasses import asdict
+
     import msgspec
 
+    from m2pem.api.allocation import WaitingTask, blocked_by
     from m2pem.api.runs import OpenIncident
     from m2pem.control_socket.client import ask
 
-    found = [
-        each
-        for socket in executives_here(journal)
-        for each in msgspec.convert(ask(socket, "incidents"), list[OpenIncident])
-    ]
+    found: list[tuple[OpenIncident, list[WaitingTask]]] = []
+    for socket in executives_here(journal):
+        opened = msgspec.convert(ask(socket, "incidents"), list[OpenIncident])
+        waiting = msgspec.convert(ask(socket, "waiting"), list[WaitingTask]) if opened else []
+        found += [(each, blocked_by(each.incident, waiting)) for each in opened]
     if output == "json":
-        click.echo(as_json({"incidents": found}))
+        listed = [{**asdict(each), "blocks": tasks} for each, tasks in found]
+        click.echo(as_json({"incidents": listed}))
     else:
-        click.echo("\n\n".join(map(_as_text, found)) or "no incident is open")
+        texts = [_as_text(each, tasks) for each, tasks in found]
+        click.echo("\n\n".join(texts) or "no incident is open")
 
 
-def _as_text(incident: "OpenIncident") -> str:
+def _as_text(incident: "OpenIncident", blocked: "list[WaitingTask]") -> str:
     lines = [str(incident), f"  choices: {', '.join(incident.choices)}"]
+    if blocked:
+        lines.insert(1, f"  blocked: {'; '.join(each.in_short() for each in blocked)}")
     if "retry_with" in incident.choices:
         roles = [f"{role}={','.join(ids)}" for role, ids in incident.roles.items()]
         lines.append(f"  roles for retry_with: {' '.join(roles)}")

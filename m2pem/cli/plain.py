@@ -7,6 +7,7 @@ from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
+from m2pem.api.allocation import blocked_by
 from m2pem.api.control import MissionControl
 from m2pem.api.description import printable
 from m2pem.api.foreground import Lines
@@ -258,9 +259,13 @@ class PlainOcu:
 
     async def _incidents(self, _: list[str]) -> None:
         found = await self._control.incidents()
+        waiting = await self._control.waiting() if found else ()
         for incident in found:
             self._say(str(incident))
             self._say(f"choices: {', '.join(incident.choices)}", indent=4)
+            if blocked := blocked_by(incident.incident, waiting):
+                tasks = "; ".join(each.in_short() for each in blocked)
+                self._say(f"blocked: {tasks}", indent=4)
         if not found:
             self._say("no incident is open")
 

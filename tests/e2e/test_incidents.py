@@ -1,6 +1,7 @@
 """An incident outlives the executive: kill -9, resume, resolve, and replay to the same state."""
 
 import asyncio
+import itertools
 import json
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,6 +13,7 @@ from m2pem.api.clock import SystemClock
 from m2pem.simulation.executions import EffectKind
 from m2pem.simulation.state_file import recorded_effects
 from tests.command_line import ANSWERS, MISSION, CommandLine, Program, fleet_with_state
+from tests.executive.conftest import flow, mission, task
 from tests.incident_rows import CHOICES, SPARE, Provocation, Table, decide_after_kill
 
 
@@ -127,6 +129,46 @@ def test_a_choice_after_which_the_mission_cannot_complete_must_be_confirmed(
     program.type("resolve i1 move Home")
     program.type("resolve! i1 move Home")
     program.until_record("IncidentResolved", choice="move", by="plain")
+    program.type("stop")
+    assert program.rest()[0] == 130
+
+
+TARGET = '<m2pem:property name="target" value="[0.01, 0.0]"/>'
+
+
+def test_what_an_incident_blocks_is_listed(m2pem: CommandLine, tmp_path: Path) -> None:
+    fleet, blocking = tmp_path / "fleet.yaml", tmp_path / "blocking.bpmn"
+    rover = {"domain": "ground", "arbiter": "sim", "connection": {"faults": ["goto: fail at 1 s"]}}
+    fleet.write_text(json.dumps({"version": 1, "vehicles": {"rover1": rover}}))
+    tasks = {"Drive": "vehicle='rover1'", "Fetch": "requires='true' wait='unlimited'"}
+    blocking.write_bytes(
+        mission(
+            '<process id="P" isExecutable="true" m2pem:onError="incident"><startEvent id="S"/>'
+            + "".join(task(name, role, "goto", TARGET) for name, role in tasks.items())
+            + '<parallelGateway id="Fork"/><endEvent id="E"/><endEvent id="F"/>'
+            '<intermediateCatchEvent id="Later"><timerEventDefinition><timeDuration>PT2S'
+            "</timeDuration></timerEventDefinition></intermediateCatchEvent>"
+            + "".join(itertools.starmap(flow, itertools.pairwise(("S", "Fork", "Drive", "E"))))
+            + "".join(itertools.starmap(flow, itertools.pairwise(("Fork", "Later", "Fetch", "F"))))
+            + "</process>"
+        )
+    )
+    program = m2pem.start(
+        "run", blocking, "--fleet", fleet, "--simulate", "--speed", "10", "--format", "json"
+    )
+    program.until_record("AllocationDelayed", holders={"rover1": "r1.i1"})
+    blocked = "blocked: Fetch of r1 waits since "
+    status, listed, _ = m2pem.run("incidents")
+    assert status == 0
+    assert blocked in listed
+    (incident,) = json.loads(m2pem.run("incidents", "--format", "json")[1])["incidents"]
+    assert [(each["run"], each["element"]) for each in incident["blocks"]] == [("r1", "Fetch")]
+    program.type("incidents")
+    while blocked not in program.stderr.readline():
+        pass
+    program.type("resolve i1 skip")
+    program.until_record("BehaviorRequested", element="Fetch")
+    assert "no incident is open" in m2pem.run("incidents")[1]
     program.type("stop")
     assert program.rest()[0] == 130
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from rich.text import Text
 
 from m2pem.api import IncidentPreview, IncidentVerdict, OpenIncident
-from m2pem.api.allocation import WaitingTask
+from m2pem.api.allocation import WaitingTask, blocked_by
 from m2pem_plugin_terminal.dialogs import Choice
 
 if TYPE_CHECKING:
@@ -43,9 +43,8 @@ def incident_choices(incidents: Sequence[OpenIncident]) -> list[Choice]:
 
 def blocked_text(incident: OpenIncident, waiting: Sequence[WaitingTask]) -> str:
     """Return the incident, and the tasks that wait for what it holds."""
-    id_ = f"{incident.run}.{incident.incident.rpartition('.')[2]}"
-    blocked = [each for each in waiting if id_ in each.holders.values()]
-    lines = [f"it blocks {each.in_short()}" for each in blocked]
+    blocked = blocked_by(incident.incident, waiting)
+    lines = [f"blocked: {each.in_short()}" for each in blocked]
     return "\n".join([str(incident), *(lines or ["no other task waits for it"])])
 
 

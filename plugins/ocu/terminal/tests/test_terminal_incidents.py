@@ -1,7 +1,10 @@
 """Deciding about an error that stops a task."""
 
+from m2pem_plugin_terminal.incidents import blocked_text
 from terminal_world import MISSION, World
 
+from m2pem.api import OpenIncident
+from m2pem.api.allocation import WaitingTask
 from m2pem.mission.catalogue import BehaviorState
 
 
@@ -53,3 +56,15 @@ async def test_without_an_incident_there_is_nothing_to_decide(world: World) -> N
         await world.start()
         await terminal.press("i")
         await terminal.until_shown("No error stops a task here")
+
+
+def test_what_an_incident_blocks_is_said() -> None:
+    incident = OpenIncident("r1", "r1.i1", "Drive", "Drive", "FAILED", "", ("skip",), ("ugv1",))
+    waits = [
+        WaitingTask(run, "a1", "Fetch", "Fetch", "goto", 12.0, None, 0, "", {"ugv1": holder})
+        for run, holder in (("r2", "r1.i1"), ("r3", "r1.i10"))
+    ]
+    assert blocked_text(incident, waits).splitlines()[1:] == [
+        "blocked: Fetch of r2 waits since 12 s"
+    ]
+    assert "no other task waits for it" in blocked_text(incident, waits[1:])
