@@ -1,5 +1,6 @@
 // On every page: who asks whom for a vehicle. Who has it gives it or keeps it.
 import { useEffect, useState } from "preact/hooks";
+import { clock } from "../shared/format";
 import { may } from "../shared/session";
 import { fill, strings } from "../strings";
 import { answer, left_s, requests, type ControlRequest } from "./people";
@@ -54,5 +55,6 @@ function Left({ request }: { request: ControlRequest }) {
     const timer = setInterval(() => renew((count) => count + 1), 1000);
     return () => clearInterval(timer);
   }, []);
-  return <b aria-hidden="true">{Math.ceil(left_s(request))} s</b>;
+  const left = Math.ceil(left_s(request));
+  return <b aria-hidden="true">{left < 60 ? `${left} s` : clock(left)}</b>;
 }
