@@ -45,6 +45,8 @@ class Proxy:
             )
         except asyncio.CancelledError:
             pass  # the test is over; streams would log it
+        except ConnectionRefusedError:
+            writer.close()  # as the server's own port does while the server is down
         finally:
             self._tasks.discard(task)
 
