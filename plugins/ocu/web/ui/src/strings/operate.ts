@@ -70,6 +70,7 @@ export const operate = {
     fades: { "0": "no fade", "2": "2 s", "5": "5 s", "15": "15 s", "60": "1 min" },
     noDiagram: "This file has no diagram. Its elements are in the list.",
     legend: "Legend",
+    between: "{kind} from {source} to {target}",
     states: {
       idle: "not visited",
       active: "active",

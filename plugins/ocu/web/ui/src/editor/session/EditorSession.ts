@@ -8,11 +8,13 @@ import type { ModdleElement } from "../moddle/moddle";
 import type { EditorContext } from "../panels/panel";
 import type { Catalogue } from "./catalogue";
 import { Checks } from "./checks";
+import { DiagramReading } from "./DiagramReading";
 import { Diagrams } from "./diagrams";
 import { fitTo } from "./fitting";
 import { Locator } from "./Locator";
 import { Marks } from "./marks";
 import { makeModeler, type MissionModeler } from "./modeler";
+import { followPalette } from "./paletteFocus";
 import type { Element, Services } from "./services";
 
 /** Stands for the last change where there is none. */
@@ -32,6 +34,8 @@ export class EditorSession implements EditorContext {
   readonly plan: MapPlan;
   private readonly locator: Locator;
   private readonly marks: Marks;
+  private readonly reading: DiagramReading;
+  private readonly leavePalette: () => void;
   /** The last change when the mission was saved; null: what is saved is not on the command stack. */
   private savedAt: object | null = BEGINNING;
 
@@ -49,6 +53,8 @@ export class EditorSession implements EditorContext {
     this.plan = new MapPlan(this);
     this.locator = new Locator(this.modeler, this.diagrams);
     this.marks = new Marks(this.modeler);
+    this.leavePalette = followPalette(this.service("canvas").getContainer());
+    this.reading = new DiagramReading(this.modeler, this.checks, this.marks);
     this.follow();
   }
 
@@ -112,6 +118,8 @@ export class EditorSession implements EditorContext {
 
   end(): void {
     this.checks.end();
+    this.reading.dispose();
+    this.leavePalette();
     this.modeler.destroy();
   }
 

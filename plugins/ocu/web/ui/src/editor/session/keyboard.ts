@@ -53,6 +53,7 @@ function step(session: EditorSession, event: KeyboardEvent): boolean {
 /** Tab goes from element to element in the order of the flow; at either end it leaves the canvas. */
 export function stepThrough(session: EditorSession, event: KeyboardEvent): void {
   if (event.key !== "Tab" || event.ctrlKey || event.altKey) return;
+  if ((event.target as HTMLElement).matches(".djs-palette")) return;
   const all = inOrder(session);
   const [selected] = session.selected.value;
   const at = selected ? all.findIndex(({ id }) => id === selected.id) : -1;

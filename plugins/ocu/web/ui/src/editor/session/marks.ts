@@ -1,7 +1,10 @@
 // CSS classes on elements of the canvas, by layers that know nothing of each other.
+import { signal } from "@preact/signals";
 import type { MissionModeler } from "./modeler";
 
 export class Marks {
+  /** Counts them. */
+  readonly changes = signal(0);
   private readonly layers = new Map<string, Readonly<Record<string, string>>>();
   private readonly shown = new Map<string, [id: string, name: string][]>();
 
@@ -10,6 +13,11 @@ export class Marks {
   set(layer: string, classes: Readonly<Record<string, string>>): void {
     this.layers.set(layer, classes);
     this.show(layer);
+    this.changes.value = this.changes.peek() + 1;
+  }
+
+  classesOf(id: string): string[] {
+    return [...this.layers.values()].flatMap((classes) => classes[id]?.split(" ") ?? []);
   }
 
   /** Another diagram is drawn. */

@@ -1,8 +1,11 @@
 // Numbers at the corners of elements: how often a token came, how many are there now; and a sign
-// for what failed, asks or waits. Renewed a few times a second: people read no faster.
+// for what failed, asks or waits; and the same in words, for screen readers. Renewed a few times a
+// second: people read no faster.
+import { nameSymbol } from "../../shared/elementNames";
 import type { ElementState } from "../../shared/types";
 import { lookOf, SIGNS } from "./colours";
 import type { Outline } from "./painter";
+import { statesOf } from "./spoken";
 
 const SVG = "http://www.w3.org/2000/svg";
 const RENEWED_MS = 250;
@@ -22,9 +25,16 @@ interface Badge {
 
 type Corner = "hits" | "tokens" | "sign";
 
-interface Waiting {
+export interface Badged {
+  key: string;
+  /** What it is called, without its state. */
+  name: string;
   gfx: SVGElement;
   outline: Outline;
+}
+
+interface Waiting {
+  badged: Badged;
   state: ElementState;
 }
 
@@ -35,8 +45,8 @@ export class Badges {
   private size = "";
   private timer: ReturnType<typeof setTimeout> | undefined;
 
-  set(key: string, gfx: SVGElement, outline: Outline, state: ElementState): void {
-    this.waiting.set(key, { gfx, outline, state });
+  set(badged: Badged, state: ElementState): void {
+    this.waiting.set(badged.key, { badged, state });
     this.timer ??= setTimeout(() => this.renew(), Math.max(RENEWED_MS, this.wrote * EACH_MS));
   }
 
@@ -55,7 +65,9 @@ export class Badges {
   private renew(): void {
     this.timer = undefined;
     this.wrote = this.waiting.size;
-    for (const [key, { gfx, outline, state }] of this.waiting) {
+    for (const { badged, state } of this.waiting.values()) {
+      const { key, name, gfx, outline } = badged;
+      nameSymbol(gfx, [name, ...statesOf(state)].filter(Boolean).join(", "));
       this.write(`${key}\nhits`, gfx, outline, "hits", state.hits > 1 ? short(state.hits) : "");
       const tokens = state.active > 1 ? `● ${short(state.active)}` : "";
       this.write(`${key}\ntokens`, gfx, outline, "tokens", tokens);

@@ -5,19 +5,19 @@ import type ElementRegistry from "diagram-js/lib/core/ElementRegistry";
 import type EventBus from "diagram-js/lib/core/EventBus";
 import type { ElementLike, RootLike, ShapeLike } from "diagram-js/lib/core/Types";
 import type { Point } from "diagram-js/lib/util/Types";
+import { described, nameSymbol } from "../../shared/elementNames";
 import type { ElementState } from "../../shared/types";
+import { strings } from "../../strings";
 import { processOf, type Element } from "../mission/moddle";
 import { keyIn, keyOf, qualified } from "../mission/names";
-import { Badges } from "./badges";
+import { Badges, type Badged } from "./badges";
 import { lookOf, type Look, type Palette } from "./colours";
 import { Painter, type Outline, type Window } from "./painter";
+import { statesOf } from "./spoken";
 
-interface Figure {
-  key: string;
+interface Figure extends Badged {
   id: string;
   root: RootLike | undefined;
-  outline: Outline;
-  gfx: SVGElement;
   look: Look;
   left_ms: number;
 }
@@ -83,6 +83,9 @@ export class Drawing {
   ): Promise<Drawing> {
     const viewer = new NavigatedViewer({ container: host });
     await viewer.importXML(file.xml, diagram);
+    const svg = host.querySelector(".djs-container > svg")!;
+    svg.setAttribute("role", "graphics-document");
+    svg.setAttribute("aria-label", strings.operate.panes.diagram);
     const canvas = document.createElement("canvas");
     canvas.className = "glow";
     host.querySelector(".djs-container")!.append(canvas);
@@ -143,7 +146,7 @@ export class Drawing {
       figure.left_ms = performance.now() - age_ms;
     }
     if (look !== figure.look) this.mark(figure, look);
-    this.badges.set(figure.key, figure.gfx, figure.outline, state);
+    this.badges.set(figure, state);
     this.paint(figure);
   }
 
@@ -166,11 +169,16 @@ export class Drawing {
     const registry = this.viewer.get<ElementRegistry>("elementRegistry");
     registry.forEach((element, gfx) => {
       const about = element.businessObject as Element | undefined;
-      if (!isShape(element) || !about?.$instanceOf("bpmn:FlowNode")) return;
+      if (!about || !element.parent) return;
+      if (element.type === "label") return gfx.setAttribute("aria-hidden", "true");
+      const name = described(element);
+      if (!isShape(element) || !about.$instanceOf("bpmn:FlowNode")) return nameSymbol(gfx, name);
+      nameSymbol(gfx, [name, ...statesOf(undefined)].join(", "));
       const key = keyIn(qualifier, about);
       const root = this.canvas.findRoot(element);
       const outline = outlineOf(element, about);
-      this.figures.set(key, { key, id: element.id, root, outline, gfx, look: "idle", left_ms: 0 });
+      const { id } = element;
+      this.figures.set(key, { key, id, name, root, outline, gfx, look: "idle", left_ms: 0 });
     });
   }
 

@@ -1,5 +1,5 @@
 // A mission as it is shown: its elements as a tree, and the diagrams in which they are drawn.
-import { strings } from "../../strings";
+import { kindOf, labelOf } from "../../shared/elementNames";
 import type { Collaboration, Definitions, Element, FlowNode, Process } from "./moddle";
 import { drawnAs, keyOf, qualified } from "./names";
 import { viewsOf, type View } from "./views";
@@ -9,6 +9,8 @@ export interface MissionNode {
   id: string;
   /** As BPMN names it: `ScriptTask`; `Process` for a process. */
   type: string;
+  /** In words: "timer boundary event". */
+  kind: string;
   label: string;
   children: MissionNode[];
   /** The process that a call activity calls. */
@@ -33,13 +35,6 @@ export interface MissionModel {
   viewOf(process: string, element: string): View | undefined;
   label(process: string, element: string): string;
   definition(id: string): string;
-}
-
-const unnamed: Readonly<Record<string, string>> = strings.operate.outline.unnamed;
-
-export function labelOf(element: Element): string {
-  const name = element.name?.replace(/\s+/g, " ").trim();
-  return name || unnamed[element.$type.replace("bpmn:", "")] || element.id;
 }
 
 export interface MissionSource {
@@ -97,6 +92,7 @@ function treesOf({ qualifier, definitions }: MissionSource): MissionNode[] {
       process: id,
       id,
       type: "Process",
+      kind: kindOf(process),
       label: process.name || pools.get(process.id) || process.id,
       children: childrenOf(process.flowElements, id, qualifier),
       calls: "",
@@ -123,6 +119,7 @@ function childrenOf(
     process,
     id: qualified(qualifier, element.id),
     type: element.$type.replace("bpmn:", ""),
+    kind: kindOf(element),
     label: labelOf(element),
     children: childrenOf(element.flowElements, process, qualifier),
     calls: (element.calledElement ?? "").replace(/^.*:/, ""),

@@ -5,6 +5,7 @@ import { useEffect, useRef } from "preact/hooks";
 import { fill, strings } from "../../strings";
 import type { ElementState } from "../../shared/types";
 import { lookOf, SIGNS, type Look } from "../diagram/colours";
+import { statesOf, visitsOf } from "../diagram/spoken";
 import { useOperating } from "../context";
 import { Pane } from "../layout/Pane";
 import type { MissionNode } from "../mission/missionModel";
@@ -13,7 +14,6 @@ import { moved, rowsOf, type Row } from "./rows";
 import "./outline.css";
 
 const text = strings.operate.outline;
-const states = strings.operate.diagram.states;
 
 export function OutlinePane() {
   const { scene, mission, selected } = useOperating();
@@ -111,11 +111,9 @@ function Item({ row, state, selected, reached, onKeyDown, onClick, onTurn }: Ite
   const isProcess = node.type === "Process";
   const said = [
     node.label,
-    words(node.type),
+    node.kind,
     node.calls && fill(text.calls, { process: node.calls }),
-    isProcess ? "" : states[look],
-    state && state.hits > 0 ? times(state.hits) : "",
-    state && state.active > 1 ? fill(text.tokens, { count: state.active }) : "",
+    ...(isProcess ? visitsOf(state) : statesOf(state)),
   ];
   return (
     <li
@@ -151,8 +149,3 @@ function Item({ row, state, selected, reached, onKeyDown, onClick, onTurn }: Ite
     </li>
   );
 }
-
-const words = (type: string): string => type.replace(/(?<=[a-z])(?=[A-Z])/g, " ").toLowerCase();
-
-const times = (hits: number): string =>
-  hits === 1 ? text.once : fill(text.times, { count: hits });

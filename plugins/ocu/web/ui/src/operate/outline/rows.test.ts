@@ -6,6 +6,7 @@ const node = (id: string, ...children: MissionNode[]): MissionNode => ({
   process: "P",
   id,
   type: "Task",
+  kind: "task",
   label: `The ${id}`,
   children,
   calls: "",

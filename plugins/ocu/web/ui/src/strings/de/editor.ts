@@ -15,6 +15,20 @@ export const editor: Translation<typeof english.editor> = {
   viewerHint:
     "Sie dürfen sich alles ansehen und ausprobieren; nur Einsatzleiter speichern Missionen.",
   canvas: "Diagramm der Mission",
+  reading: {
+    diagram: "Diagramm: Tab geht von Element zu Element",
+    palette: "Zeichenwerkzeuge; die Tasten N, A und R haben dieselben Elemente",
+    problems: { one: "1 Problem", many: "{count} Probleme" },
+    states: {
+      "m2-rehearsed": "aktiv",
+      "m2v-now": "in diesem Schritt",
+      "m2v-token": "hat ein Token",
+      "m2v-waits": "wartet",
+      "m2v-stuck": "kommt nicht weiter",
+      "m2v-missing": "kein Token kam",
+      "m2v-unreached": "wird nie erreicht",
+    },
+  },
   notes: "Was der Editor nicht bewahren kann",
   importWarnings: "Teile der Datei wurden nicht verstanden: {warnings}",
   notDrawn: "{element} ist in keinem Diagramm gezeichnet.",

@@ -73,6 +73,7 @@ export const operate: Translation<typeof english.operate> = {
     fades: { "0": "kein Verblassen", "2": "2 s", "5": "5 s", "15": "15 s", "60": "1 min" },
     noDiagram: "Diese Datei hat kein Diagramm. Ihre Elemente stehen in der Liste.",
     legend: "Legende",
+    between: "{kind} von {source} nach {target}",
     states: {
       idle: "nicht besucht",
       active: "aktiv",
