@@ -51,7 +51,7 @@ if TYPE_CHECKING:
     from m2pem.api.clock import Clock, SystemClock
     from m2pem.api.commands import LazyCommand, command_group, simulator_group
     from m2pem.api.connection_reader import ConnectionReader
-    from m2pem.api.control import ControlEvent, MissionControl
+    from m2pem.api.control import MissionControl
     from m2pem.api.declared_behaviors import read_declared_behaviors
     from m2pem.api.description import Description, Importance, Kind, describe
     from m2pem.api.epoch_fence import EpochFence
@@ -84,6 +84,7 @@ if TYPE_CHECKING:
     from m2pem.api.latest_task import LatestTask
     from m2pem.api.log_context import current_run, trace_ids
     from m2pem.api.map_geometries import shown_geometries
+    from m2pem.api.mission_control.watching import ControlEvent
     from m2pem.api.ocu import Ocu, StandbyOcu
     from m2pem.api.operations import (
         MAX_DATA_VALUES,
@@ -231,7 +232,8 @@ _MODULES = {
     "m2pem.api.clock": "Clock SystemClock",
     "m2pem.api.commands": "LazyCommand command_group simulator_group",
     "m2pem.api.connection_reader": "ConnectionReader",
-    "m2pem.api.control": "ControlEvent MissionControl",
+    "m2pem.api.control": "MissionControl",
+    "m2pem.api.mission_control.watching": "ControlEvent",
     "m2pem.api.declared_behaviors": "read_declared_behaviors",
     "m2pem.api.description": "Description Importance Kind describe",
     "m2pem.api.epoch_fence": "EpochFence",

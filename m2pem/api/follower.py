@@ -13,7 +13,8 @@ from dataclasses import replace
 from m2pem.api import records as r
 from m2pem.api.alerts import AlertsChanged
 from m2pem.api.allocation import SharedSpaceChanged
-from m2pem.api.control import ControlEvent, MissionControl
+from m2pem.api.control import MissionControl
+from m2pem.api.mission_control.watching import ControlEvent
 from m2pem.api.people import OperatorsChanged
 from m2pem.api.run_view import RunView
 from m2pem.api.runs import (

@@ -7,8 +7,8 @@ from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import contextmanager
 from typing import TextIO
 
-from m2pem.api.control import ControlEvent
 from m2pem.api.description import printable
+from m2pem.api.mission_control.watching import ControlEvent
 from m2pem.api.runs import LEFT_ARMED, LOGGED, Alert, RunId, StampedRecord
 from m2pem.cli.line_formatter import LineFormatter
 from m2pem.cli.standard_streams import LineWriter, writer_for

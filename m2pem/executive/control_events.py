@@ -15,7 +15,7 @@ from types import TracebackType
 from typing import Self
 
 from m2pem.api.alerts import AlertSeverity
-from m2pem.api.control import ControlEvent
+from m2pem.api.mission_control.watching import ControlEvent
 from m2pem.api.runs import LOGGED, Alert, RunId
 from m2pem.engine.records import Record
 from m2pem.errors import OperatorError

@@ -24,11 +24,12 @@ from m2pem.executive.alert_list import AlertList
 from m2pem.executive.alert_watch import keep_alerts, watch_alerts, write_alerts
 from m2pem.executive.approvals import Approvals
 from m2pem.executive.behavior_lifecycle import ExecutiveViews
-from m2pem.executive.control import Control, Estimate, Rehearse
+from m2pem.executive.control import Control
 from m2pem.executive.control_events import ControlEvents, LoggedAlerts, RecordObservers
 from m2pem.executive.fleet_connections import FleetArbiters, FleetConnections
 from m2pem.executive.health import ExecutiveHealth
 from m2pem.executive.incidents import Foresee
+from m2pem.executive.mission_control.parts import Estimate, Rehearse
 from m2pem.executive.outages import Outages
 from m2pem.executive.process_monitors import watch_space
 from m2pem.executive.run_starter import RunStarter

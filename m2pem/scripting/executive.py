@@ -19,7 +19,8 @@ from typing import Any, Self
 
 from m2pem.api.authoring import MissionSource
 from m2pem.api.clock import SystemClock
-from m2pem.api.control import ControlEvent, MissionControl
+from m2pem.api.control import MissionControl
+from m2pem.api.mission_control.watching import ControlEvent
 from m2pem.api.operator import operator_name
 from m2pem.api.runs import OpenPrompt, RunId, RunStatus, RunSummary, SimulationResult, StampedRecord
 from m2pem.control_socket.server import ControlSocket

@@ -7,7 +7,7 @@ from collections.abc import AsyncIterator
 
 import pytest
 
-from m2pem.api.control import ControlEvent
+from m2pem.api.mission_control.watching import ControlEvent
 from m2pem.api.runs import LEFT_ARMED, Alert, StampedRecord
 from m2pem.cli.output import Output
 from m2pem.cli.standard_streams import writer_for

@@ -8,7 +8,8 @@ from typing import Any, cast
 
 import pytest
 
-from m2pem.api.control import ControlEvent, MissionControl
+from m2pem.api.control import MissionControl
+from m2pem.api.mission_control.watching import ControlEvent
 from m2pem.api.runs import OpenPrompt, PromptClosed, RunStatus, RunSummary, StampedRecord
 from m2pem.cli import plain
 from m2pem.cli.plain import PlainOcu

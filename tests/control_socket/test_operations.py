@@ -16,7 +16,8 @@ OPERATION = pytest.mark.parametrize("operation", OPERATIONS.values(), ids=OPERAT
 
 
 def methods() -> set[str]:
-    return {name for name in vars(MissionControl) if not name.startswith("_")}
+    parts = [each for each in MissionControl.__mro__ if each.__module__.startswith("m2pem.")]
+    return {name for each in parts for name in vars(each) if not name.startswith("_")}
 
 
 def test_every_method_of_mission_control_is_an_operation_or_refused() -> None:

@@ -8,7 +8,7 @@ from datetime import datetime, timedelta
 from typing import Any
 
 from m2pem.api.clock import VirtualClock
-from m2pem.api.control import ControlEvent
+from m2pem.api.mission_control.watching import ControlEvent
 from m2pem.api.runs import NOT_STARTED, SCHEDULE, STARTS_SOON, Alert, RunId
 from m2pem.api.schedule import ScheduledMission, When
 from m2pem.api.telemetry import LinkState, VehicleState

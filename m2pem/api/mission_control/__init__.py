@@ -1,0 +1,1 @@
+"""The operations of `MissionControl`, by what they are about."""

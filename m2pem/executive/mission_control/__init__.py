@@ -1,0 +1,1 @@
+"""The operations of `MissionControl` over an executive, by what they are about."""
