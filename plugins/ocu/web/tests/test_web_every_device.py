@@ -93,6 +93,14 @@ async def show_replay(desk: Desk) -> None:
     await open_plots(desk.page)
 
 
+async def choose_plots(page: Page) -> None:
+    """They are a tab where there is room for one pane."""
+    tab = page.get_by_role("tab", name="Plots")
+    if await tab.count():
+        await tab.click()
+    await expect(page.locator(".plots-pane canvas").first).to_be_visible()
+
+
 async def run_of(desk: Desk, wanted: Callable[[str], bool]) -> str:
     """The newest run whose status is wanted."""
     runs = await desk.ask("GET", "/api/runs?limit=20")
@@ -161,6 +169,8 @@ async def going_on(desk: Desk) -> AsyncIterator[None]:
 async def look_at(eyes: Accessibility, where: str, cells: list[Cell]) -> None:
     for cell in cells:
         await cell.shown(eyes.page)
+        if where == "replay":
+            await choose_plots(eyes.page)
         name = f"{where}, {cell.look}, {cell.device}"
         await eyes.look(name)
         if PICTURES:

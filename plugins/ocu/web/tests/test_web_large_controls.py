@@ -26,6 +26,9 @@ async def show_home(desk: Desk, _: str) -> None:
 async def show_fleet(desk: Desk, _: str) -> None:
     await desk.page.goto(f"{desk.executive.origin}/fleet")
     await desk.page.get_by_role("row").filter(has_text=VEHICLE).click()
+    tab = desk.page.get_by_role("tab", name="Commands (1)")  # where there is room for one pane
+    if await tab.count():
+        await tab.click()
     await expect(desk.page.get_by_role("region", name="Details and commands")).to_be_attached()
 
 
