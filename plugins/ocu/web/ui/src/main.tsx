@@ -17,6 +17,7 @@ import { strings } from "./strings";
 import "./theme.css";
 import "./contrast.css";
 import "./controls.css";
+import "./forced.css";
 
 const Home = loaded(() => import("./home/Home"));
 const Alerts = loaded(() => import("./alerts/AlertPage"));

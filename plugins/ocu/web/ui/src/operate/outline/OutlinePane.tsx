@@ -15,6 +15,9 @@ import "./outline.css";
 
 const text = strings.operate.outline;
 
+/** Rows have no ring around them that tells states without colours. */
+const ROW_SIGNS: Record<Look, string> = { ...SIGNS, active: "●", done: "✓" };
+
 export function OutlinePane() {
   const { scene, mission, selected } = useOperating();
   const folded = useSignal<ReadonlySet<string>>(new Set());
@@ -141,7 +144,7 @@ function Item({ row, state, selected, reached, onKeyDown, onClick, onTurn }: Ite
       </span>
       {!isProcess && (
         <i class="dot" aria-hidden="true">
-          {SIGNS[look]}
+          {ROW_SIGNS[look]}
         </i>
       )}
       <span class="name">{node.label}</span>

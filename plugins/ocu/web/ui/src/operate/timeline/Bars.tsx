@@ -13,6 +13,9 @@ const text = strings.operate.timeline;
 /** Narrower ones can hardly be seen, or hit. */
 const LEAST_PX = 3;
 
+/** What tells how it ended without its colour; the lines around bars do so, too. */
+const SIGNS: Partial<Record<Span["end"], string>> = { failed: "✕ ", cancelled: "– ", unknown: "? " };
+
 export interface BarsProps {
   rows: Row[];
   window: Window;
@@ -81,6 +84,7 @@ export function Bars({ rows, window, width, now, lane_px, onSeek }: BarsProps) {
             {wide > 40 && (
               <svg width={wide - 4} height={lane_px - 4} aria-hidden="true">
                 <text x={6} y={(lane_px - 4) * 0.72}>
+                  {SIGNS[span.end]}
                   {shown}
                 </text>
               </svg>
