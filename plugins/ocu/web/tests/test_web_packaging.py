@@ -32,6 +32,8 @@ ON_DEMAND = (
     "MapPanel-*.*",
     "VersionsPanel-*.*",
     "CameraList-*.*",
+    "DetectionsPane-*.*",
+    "DetectionCard-*.*",
 )
 """Loaded by no page, but by a button of one, or for those who chose a language."""
 

@@ -24,6 +24,8 @@ export interface OperateContext {
   followed: Signal<string>;
   /** A vehicle that the map shows, once; a new object each time. */
   centred: Signal<{ resource: string } | null>;
+  /** The number of the detection that is looked at; null: none. */
+  detection: Signal<number | null>;
   /** What the time line and the plots show of the run's time; null: all of it. */
   range: Signal<Range | null>;
   /** The time that is pointed at, on the time line or the plots. */
@@ -56,6 +58,7 @@ export function operateContext(
     selected: signal(null),
     followed: signal(""),
     centred: signal(null),
+    detection: signal(null),
     range: signal(null),
     pointed: signal(null),
     draft: signal(null),

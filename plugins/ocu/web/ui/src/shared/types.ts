@@ -338,6 +338,18 @@ export interface PayloadState {
   footprint: GeoPosition[];
 }
 
+/** Something that a payload detected. A later one of the same number replaces the one before. */
+export interface Detection {
+  number: number;
+  /** Mission time. */
+  t_s: number;
+  type: string;
+  source: string;
+  /** Null: the device did not know it. */
+  position: { latitude_deg: number | null; longitude_deg: number | null; altitude_m: number | null };
+  time_us: number;
+}
+
 export interface TeamState {
   behavior: string;
   name: string;
@@ -371,6 +383,7 @@ export type ServerMessage =
   | { type: "prompt"; seq: number; prompt: Prompt }
   | { type: "prompt_closed"; seq: number; run: string; prompt: string; decision: string; by: string }
   | { type: "run"; seq: number; run: RunSummary }
+  | { type: "detections"; seq: number; run: string; detections: Detection[]; more: number }
   | { type: "fault"; seq: number; text: string }
   | { type: "notice"; seq: number; text: string }
   | { type: "alerts"; seq: number }

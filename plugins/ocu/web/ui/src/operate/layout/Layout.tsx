@@ -1,10 +1,12 @@
 // Where the parts of the page are: beside each other where there is room, behind tabs on a tablet.
+import { useComputed } from "@preact/signals";
 import { loaded } from "../../shared/loaded";
 import { Split } from "../../shared/Split";
 import { Tabs, type Tab } from "../../shared/Tabs";
 import { useMedia } from "../../shared/useMedia";
-import { strings } from "../../strings";
+import { fill, strings } from "../../strings";
 import { useOperating } from "../context";
+import { detectionsShown } from "../detections/shown";
 import { DiagramPane } from "../diagram/DiagramPane";
 import { LogPane } from "../log/LogPane";
 import { DrawForm } from "../map/DrawForm";
@@ -20,6 +22,7 @@ const kinds = strings.operate.map.kinds;
 
 /** With what draws and plays them: only those who look at them load that. */
 const Cameras = loaded(() => import("../cameras/CamerasPane"));
+const Detections = loaded(() => import("../detections/DetectionsPane"));
 const Plots = loaded(() => import("../plots/PlotsPane"));
 
 const WIDE = "(width >= 1180px)";
@@ -71,8 +74,21 @@ function Wide({ onSeek }: Parts) {
   );
 }
 
-/** Plots are below the time line, so that the same times are below each other. */
+/** The list of detections is beside the time line, which has the button that shows it. */
 function TimesPane({ onSeek }: Parts) {
+  const count = useDetectionCount();
+  const shows = detectionsShown.value && count > 0;
+  const label = `${text.resize}: ${fill(strings.operate.detections.title, { count })}`;
+  return (
+    <Split name="detections" direction="row" initial={66} label={label} alone={!shows}>
+      <TimePanes onSeek={onSeek} />
+      {shows && <Detections inside={false} />}
+    </Split>
+  );
+}
+
+/** Plots are below the time line, so that the same times are below each other. */
+function TimePanes({ onSeek }: Parts) {
   if (!plotsShown.value) return <TimelinePane onSeek={onSeek} plots={plotsShown} />;
   return (
     <Split name="plots" direction="column" initial={38} label={`${text.resize}: ${text.plots}`}>
@@ -94,8 +110,20 @@ function useCameras(): boolean {
   return scene.mode === "live" && fleet.payloads.some(({ video }) => video);
 }
 
+/** How many detections there are, at the times when that number changes. */
+function useDetectionCount(): number {
+  const { scene } = useOperating();
+  return useComputed(() => scene.detections.value.all.length + scene.detections.value.more).value;
+}
+
 function Narrow({ onSeek }: Parts) {
   const cameras = useCameras();
+  const count = useDetectionCount();
+  const detections: Tab = {
+    id: "detections",
+    title: fill(strings.operate.detections.title, { count }),
+    render: () => <Detections inside />,
+  };
   return (
     <Split name="narrow" direction="column" initial={52} label={text.resize}>
       <Tabs
@@ -112,6 +140,7 @@ function Narrow({ onSeek }: Parts) {
           { id: "vehicles", title: text.vehicles, render: () => <VehiclesPane /> },
           ...(cameras ? [CAMERAS] : []),
           { id: "timeline", title: text.timeline, render: () => <TimelinePane onSeek={onSeek} /> },
+          ...(count > 0 ? [detections] : []),
           { id: "plots", title: text.plots, render: () => <Plots onSeek={onSeek} /> },
           { id: "log", title: text.log, render: () => <LogPane /> },
         ]}

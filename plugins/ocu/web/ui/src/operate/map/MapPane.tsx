@@ -1,6 +1,6 @@
 // Where everybody is; and routes, areas and points, which operators draw for the mission.
 import { useComputed, useSignal } from "@preact/signals";
-import { useEffect, useRef } from "preact/hooks";
+import { useEffect, useRef, useState } from "preact/hooks";
 import { clock, STALE_S } from "../../shared/format";
 import { unknownSince } from "../../shared/executive";
 import { remember, remembered } from "../../shared/memory";
@@ -23,13 +23,27 @@ const text = strings.operate.map;
 
 /** Few operators look at it in a run. */
 const VersionsPanel = loaded(() => import("./VersionsPanel"));
+const DetectionCard = loaded(() => import("../detections/DetectionCard"));
 
-const SHOWS: MapShows = { trails: true, names: true, footprints: true, geometries: true };
+const SHOWS: MapShows = {
+  trails: true,
+  names: true,
+  footprints: true,
+  detections: true,
+  geometries: true,
+};
+
 const AGES_MS = 500;
 
 /** `formInside`: what is drawn is shown as numbers below the map. */
 export function MapPane({ formInside }: { formInside: boolean }) {
-  const { scene, fleet, geometries, followed, centred, selected, draft, middle } = useOperating();
+  const { scene, fleet, geometries, followed, centred, selected, draft, middle, detection } =
+    useOperating();
+  const detected = useComputed(() => {
+    const { all } = scene.detections.value;
+    // What a replay has not come to yet is not on the map.
+    return scene.mode === "live" ? all : all.filter(({ t_s }) => t_s <= scene.time.value);
+  });
   const host = useRef<HTMLDivElement>(null);
   const view = useRef<MapView>();
   const listed = useSignal<readonly VehicleMark[]>([]);
@@ -49,6 +63,7 @@ export function MapPane({ formInside }: { formInside: boolean }) {
       dragged: (index, { latitude, longitude }) => {
         if (draft.value) draft.value = moved(draft.value, index, { latitude, longitude });
       },
+      detected: (number) => (detection.value = number),
       moved: () => (followed.value = ""),
     });
     view.current = made;
@@ -70,6 +85,11 @@ export function MapPane({ formInside }: { formInside: boolean }) {
       }),
       scene.jumps.subscribe(() => made.vehicles.retrace((resource) => scene.trail(resource))),
       scene.payloads.subscribe((states) => made.vehicles.payloads(states)),
+      detected.subscribe((now) => made.detections.show(now)),
+      detection.subscribe((number) => {
+        if (number !== null) followed.value = ""; // the map would leave it at once
+        made.detections.choose(number);
+      }),
       made.vehicles.listed.subscribe((now) => (listed.value = now)),
       followed.subscribe((resource) => {
         made.vehicles.choose(resource);
@@ -81,6 +101,7 @@ export function MapPane({ formInside }: { formInside: boolean }) {
       shows.subscribe((now) => {
         made.vehicles.show(now);
         made.turnGeometries(now.geometries);
+        made.detections.turn(now.detections);
         remember("map", now);
       }),
     ];
@@ -108,7 +129,7 @@ export function MapPane({ formInside }: { formInside: boolean }) {
           shows={shows}
           geometries={geometries.value}
           mayDraw={may("operator") && draft.value === null}
-          onFit={() => view.current?.fitAll()}
+          onFit={() => view.current?.fitAll(true)}
           onDraw={(kind: Kind) => (draft.value = emptyDraft(kind))}
           onEdit={(geometry) => (draft.value = draftOf(geometry))}
           onVersions={(name) => (versionsOf.value = name)}
@@ -126,12 +147,31 @@ export function MapPane({ formInside }: { formInside: boolean }) {
         }}
       />
       <VehicleList vehicles={listed} />
+      {detection.value !== null && (
+        <DetectionCard
+          onLayout={(card) => view.current?.detections.clear(card.getBoundingClientRect())}
+        />
+      )}
       {formInside && draft.value && <DrawForm draft={draft.value} />}
       {!draft.value && versionsOf.value && (
         <VersionsPanel name={versionsOf} compared={compared} />
       )}
+      <Newest />
       <Nobody />
     </Pane>
+  );
+}
+
+/** What was detected last, read aloud as it comes. */
+function Newest() {
+  const { scene } = useOperating();
+  const [before] = useState(() => scene.detections.peek().all.at(-1)?.number ?? 0);
+  const newest = scene.mode === "live" ? scene.detections.value.all.at(-1) : undefined;
+  const { type = "", source = "" } = newest ?? {};
+  return (
+    <p class="for-readers" role="status">
+      {newest && newest.number > before && fill(strings.operate.detections.card, { type, source })}
+    </p>
   );
 }
 

@@ -11,6 +11,7 @@ export interface MapShows {
   trails: boolean;
   names: boolean;
   footprints: boolean;
+  detections: boolean;
   geometries: boolean;
 }
 
@@ -32,7 +33,7 @@ const DRAWN: [Kind, string][] = [
   ["point", text.drawPoint],
 ];
 
-const SHOWN = ["trails", "names", "footprints", "geometries"] as const;
+const SHOWN = ["trails", "names", "footprints", "detections", "geometries"] as const;
 
 export function MapTools(props: MapToolsProps) {
   const { fleet, followed, shows, geometries, mayDraw, onFit, onDraw, onEdit, onVersions } = props;

@@ -4,12 +4,15 @@ import type { Fleet, Geometry, SharedSpace } from "../../shared/types";
 import type { Draft, Vertex } from "../../map/draft";
 import { baseMap, escaped, placeOf, vertexOf, type Tiles } from "../../map/baseMap";
 import { fill, strings } from "../../strings";
+import { DetectionLayer } from "./detectionLayer";
 import { VehicleLayer } from "./vehicleLayer";
 
 const text = strings.operate.map;
 
 export interface MapListener {
   chosen(resource: string): void;
+  /** A detection was chosen. */
+  detected(number: number): void;
   clicked(vertex: Vertex): void;
   dragged(index: number, to: Vertex): void;
   /** A hand moved the map: it follows no vehicle any more. */
@@ -34,6 +37,7 @@ const DRAFT = "#0b63ce";
 
 export class MapView {
   readonly vehicles: VehicleLayer;
+  readonly detections: DetectionLayer;
   private readonly map: L.Map;
   private readonly geometries = L.layerGroup();
   private readonly spaces = L.layerGroup();
@@ -59,6 +63,7 @@ export class MapView {
     this.drafted.addTo(this.map);
     this.compared.addTo(this.map);
     this.vehicles = new VehicleLayer(this.map, fleet);
+    this.detections = new DetectionLayer(this.map, (number) => listener.detected(number));
     this.map.on("click", ({ latlng, containerPoint }) => {
       if (this.isDrawing) return listener.clicked(vertexOf(latlng));
       const resource = this.vehicles.at(containerPoint);
@@ -183,8 +188,10 @@ export class MapView {
     this.nameGeometries();
   }
 
-  fitAll(): void {
+  /** `withDetections`: if an operator asks for it, as devices may report places far away. */
+  fitAll(withDetections = false): void {
     const bounds = L.latLngBounds(this.vehicles.positions());
+    if (withDetections) this.detections.positions().forEach((each) => bounds.extend(each));
     this.geometries.eachLayer((layer) => {
       if (layer instanceof L.GeoJSON) bounds.extend(layer.getBounds());
     });

@@ -13,6 +13,7 @@ import type {
 import { historyOf, TelemetryHistory } from "../plots/history";
 import { HistoryRecorder } from "../plots/recorder";
 import { followResources } from "../vehicles/resources";
+import { detectionsOf, NO_DETECTIONS, withDetections, type Detections } from "./detections";
 import { ElementBoard } from "./elementBoard";
 import { RecordFeed, type Page } from "./recordFeed";
 import { TRAIL_POINTS, type Scene } from "./scene";
@@ -20,6 +21,9 @@ import { loadTrack } from "./telemetryPages";
 import { NO_TELEMETRY, TelemetryTrack } from "./telemetryTrack";
 
 const TICK_MS = 200;
+
+/** A detection comes so much later, at most, than frames of its time. */
+const LOOKED_BACK_S = 30;
 
 type Frame = Extract<ServerMessage, { type: "frame" }>;
 type Snapshot = Extract<ServerMessage, { type: "snapshot" }>;
@@ -44,6 +48,7 @@ export class LiveScene implements Scene {
   readonly vehicles = executive.vehicles;
   readonly payloads = executive.payloads;
   readonly teams = executive.teams;
+  readonly detections = signal<Detections>(NO_DETECTIONS);
   readonly silentFor_s = executive.silentFor_s;
   readonly end = this.time;
   readonly history = signal({ history: new TelemetryHistory(0) });
@@ -67,7 +72,6 @@ export class LiveScene implements Scene {
     this.stopListening = executive.listen((message) => this.take(message));
     this.ticking = setInterval(() => this.tick(), TICK_MS);
     executive.watch(run);
-    void this.lookBack();
   }
 
   get timeline() {
@@ -114,6 +118,7 @@ export class LiveScene implements Scene {
     try {
       track = await loadTrack(this.run);
       this.before = new TelemetryTrack(track);
+      this.found(detectionsOf(track.samples));
       this.jumps.value += 1;
     } catch {
       // Trails and plots begin now, then.
@@ -122,6 +127,21 @@ export class LiveScene implements Scene {
     const expected = known.reduce((sum, states) => sum + Object.keys(states).length, 0);
     this.recorder = new HistoryRecorder(historyOf(track, expected, null));
     this.history.value = { history: this.recorder.history };
+  }
+
+  /** What was detected while the connection was interrupted. */
+  private async lookAgain(since_s: number): Promise<void> {
+    try {
+      const { samples } = await loadTrack(this.run, since_s);
+      const { all } = detectionsOf(samples);
+      this.found({ all, more: 0 });
+    } catch {
+      // The next break, or the replay, has them.
+    }
+  }
+
+  private found(detections: Detections): void {
+    this.detections.value = withDetections(this.detections.peek(), detections);
   }
 
   private tick(): void {
@@ -143,6 +163,9 @@ export class LiveScene implements Scene {
       case "frame":
         if (message.run === this.run) this.takeFrame(message);
         break;
+      case "detections":
+        if (message.run === this.run) this.found({ all: message.detections, more: message.more });
+        break;
       case "log":
         this.feed.push(message.records.filter(({ run }) => run === this.run));
         break;
@@ -150,6 +173,9 @@ export class LiveScene implements Scene {
   }
 
   private takeSnapshot(snapshot: Snapshot): void {
+    // What is detected from now on is sent; the track has what was detected before.
+    if (this.begun) void this.lookAgain(Math.max(0, this.told_s - LOOKED_BACK_S));
+    else void this.lookBack();
     batch(() => {
       this.clock(snapshot.t, snapshot.events);
       this.pace.value = snapshot.speed || 1;

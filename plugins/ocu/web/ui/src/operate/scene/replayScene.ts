@@ -17,6 +17,7 @@ import type {
 } from "../../shared/types";
 import { historyOf, type TelemetryHistory } from "../plots/history";
 import type { Range } from "../plots/series";
+import { detectionsOf, NO_DETECTIONS, type Detections } from "./detections";
 import { ElementBoard } from "./elementBoard";
 import { TRAIL_POINTS, type LogPage, type Scene } from "./scene";
 import { NO_TELEMETRY, TelemetryTrack, type Telemetry } from "./telemetryTrack";
@@ -67,6 +68,7 @@ export class ReplayScene implements Scene {
   readonly vehicles = signal<Record<string, VehicleState>>({});
   readonly payloads = signal<Record<string, PayloadState>>({});
   readonly teams = signal<Record<string, TeamState>>({});
+  readonly detections = signal<Detections>(NO_DETECTIONS);
   readonly playing = signal(false);
   readonly speed = signal(1);
   readonly pace = computed(() => (this.playing.value ? this.speed.value : 0));
@@ -133,6 +135,7 @@ export class ReplayScene implements Scene {
     if (this.left) return;
     batch(() => {
       this.telemetry.value = { known: true, track: new TelemetryTrack(telemetry), of: telemetry };
+      this.detections.value = detectionsOf(telemetry.samples);
       if (this.known.peek()) this.known.value = this.makeHistory();
       this.showVehicles();
       this.jumps.value += 1;

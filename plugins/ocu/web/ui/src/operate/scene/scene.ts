@@ -15,6 +15,7 @@ import type {
   TeamState,
   VehicleState,
 } from "../../shared/types";
+import type { Detections } from "./detections";
 import type { ElementBoard } from "./elementBoard";
 
 /** Places of a trail. */
@@ -50,6 +51,8 @@ export interface Scene {
   readonly vehicles: ReadonlySignal<Record<string, VehicleState>>;
   readonly payloads: ReadonlySignal<Record<string, PayloadState>>;
   readonly teams: ReadonlySignal<Record<string, TeamState>>;
+  /** All that is known of: of a replay, also those of later than now. */
+  readonly detections: ReadonlySignal<Detections>;
   /** Whether anything is known of where vehicles are and how: not of all runs of the past. */
   readonly hasTelemetry: boolean;
   /** From when on it is known, in seconds. */
@@ -75,5 +78,7 @@ export interface Scene {
   older(): Promise<void>;
   /** The whole length in seconds, of what is over. */
   readonly end: ReadonlySignal<number>;
+  /** Show another moment, of what is over. */
+  seek?(t: number): void;
   dispose(): void;
 }

@@ -1,12 +1,14 @@
 // Where everybody was at any moment of a rehearsal, or of a run as far as that was kept.
 import { longestStep_s, pieces } from "../map/trail";
-import type { GeoPosition, PayloadState, TeamState, VehicleState } from "../../shared/types";
+import type { Detection, GeoPosition, PayloadState, TeamState, VehicleState } from "../../shared/types";
 
 export interface TelemetrySample {
   t: number;
   vehicles: Record<string, VehicleState>;
   payloads?: Record<string, PayloadState>;
   teams?: Record<string, TeamState>;
+  detections?: readonly Detection[];
+  more_detections?: number;
 }
 
 export interface Telemetry {
@@ -19,7 +21,7 @@ export interface Telemetry {
 
 export const NO_TELEMETRY: Telemetry = { samples: [], onlyNews: true, problem: null };
 
-type States = Required<Omit<TelemetrySample, "t">>;
+type States = Required<Pick<TelemetrySample, "vehicles" | "payloads" | "teams">>;
 
 export class TelemetryTrack {
   private index = -1;

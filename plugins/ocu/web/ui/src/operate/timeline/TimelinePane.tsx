@@ -3,9 +3,10 @@ import type { Signal } from "@preact/signals";
 import { useEffect, useMemo, useRef } from "preact/hooks";
 import { PROMPTS, SERVICES, WAITS, type Bars as Shown, type Span } from "../../records/spans";
 import { clock } from "../../shared/format";
-import { strings } from "../../strings";
+import { fill, strings } from "../../strings";
 import type { Fleet } from "../../shared/types";
 import { useOperating } from "../context";
+import { detectionsShown } from "../detections/shown";
 import { Pane } from "../layout/Pane";
 import { usePaced } from "../layout/pace";
 import type { Scene } from "../scene/scene";
@@ -82,6 +83,7 @@ export function TimelinePane({ onSeek, plots }: TimelineProps) {
       scrolls
       tools={
         <TimeTools shown={shown}>
+          {plots && <DetectionsButton />}
           {plots && (
             <button
               type="button"
@@ -148,6 +150,23 @@ export function TimelinePane({ onSeek, plots }: TimelineProps) {
         </div>
       </div>
     </Pane>
+  );
+}
+
+/** Shows the list of detections, if there are any. */
+function DetectionsButton() {
+  const { scene } = useOperating();
+  const { all, more } = scene.detections.value;
+  if (all.length + more === 0) return null;
+  return (
+    <button
+      type="button"
+      class="plain"
+      aria-pressed={detectionsShown.value}
+      onClick={() => (detectionsShown.value = !detectionsShown.value)}
+    >
+      {fill(strings.operate.detections.title, { count: all.length + more })}
+    </button>
   );
 }
 

@@ -1,0 +1,69 @@
+// One detection: what, by which payload, when and where.
+import { useEffect, useRef } from "preact/hooks";
+import { clock } from "../../shared/format";
+import { fill, strings } from "../../strings";
+import { useOperating } from "../context";
+import { positionOf } from "./position";
+import "./detections.css";
+
+const text = strings.operate.detections;
+
+/** `onLayout`: it is on the page, or has another size. */
+export default function DetectionCard({ onLayout }: { onLayout?: (card: HTMLElement) => void }) {
+  const { scene, detection } = useOperating();
+  const found = scene.detections.value.all.find(({ number }) => number === detection.value);
+  const card = useRef<HTMLElement>(null);
+  const close = useRef<HTMLButtonElement>(null);
+  const before = useRef<Element | null>(null);
+  const leave = () => {
+    detection.value = null;
+    if (before.current instanceof HTMLElement) before.current.focus();
+  };
+  useEffect(() => {
+    before.current = document.activeElement;
+    close.current?.focus();
+  }, [found?.number]);
+  useEffect(() => {
+    const shown = card.current;
+    if (!shown || !onLayout) return;
+    const observer = new ResizeObserver(() => onLayout(shown));
+    observer.observe(shown);
+    return () => observer.disconnect();
+  }, [found?.number]);
+  if (!found) return null;
+  return (
+    <section
+      ref={card}
+      class="detection-card"
+      aria-label={fill(text.card, { type: found.type, source: found.source })}
+      onKeyDown={(event) => {
+        if (event.key !== "Escape" || event.shiftKey) return;
+        event.stopPropagation();
+        leave();
+      }}
+    >
+      <header>
+        <strong>
+          <i class="detection-mark" aria-hidden="true" />
+          {found.type}
+        </strong>
+        <button type="button" class="plain" ref={close} aria-label={text.close} onClick={leave}>
+          ✕
+        </button>
+      </header>
+      <dl>
+        <dt>{text.source}</dt>
+        <dd>{found.source}</dd>
+        <dt>{text.time}</dt>
+        <dd>{clock(found.t_s)}</dd>
+        <dt>{text.where}</dt>
+        <dd>{positionOf(found)}</dd>
+      </dl>
+      {scene.seek && (
+        <button type="button" class="secondary" onClick={() => scene.seek?.(found.t_s)}>
+          {text.seek}
+        </button>
+      )}
+    </section>
+  );
+}
