@@ -74,6 +74,7 @@ def _remove_files(journal: Path, identity: UUID, runs: Sequence[str]) -> None:
 def _files(journal: Path, identity: UUID, run: str) -> Iterator[Path]:
     """Yield the files of a run beside the journal (docs/journal.md), if they exist or not."""
     yield beside(journal, "tracks") / f"{run}.jsonl"
+    yield from beside(journal, "tracks").glob(f"{run}-*")
     yield beside(journal, "replays") / f"{run}.index"
     yield from beside(journal, "recordings").glob(f"{run}-*.mcap")
     yield beside(journal, f"stopped-{run}")

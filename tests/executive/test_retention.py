@@ -44,6 +44,7 @@ async def test_what_is_kept_of_a_deleted_run_goes_with_it(tmp_path, monkeypatch)
         kept, gone = (
             [
                 tracks / f"{run}.jsonl",
+                tracks / f"{run}-1.jpg",
                 replays / f"{run}.index",
                 recordings / f"{run}-20261126-160312.mcap",
                 recordings / f"{run}-20261126-160312.2.mcap",
@@ -55,8 +56,8 @@ async def test_what_is_kept_of_a_deleted_run_goes_with_it(tmp_path, monkeypatch)
         for file in (*kept, *gone):
             file.touch()
         await delete_runs(journal, ["r2"], by="ann")
-        assert [file.exists() for file in gone] == [False] * 6
-        assert [file.exists() for file in kept] == [True] * 6
+        assert [file.exists() for file in gone] == [False] * 7
+        assert [file.exists() for file in kept] == [True] * 7
 
 
 async def test_only_runs_that_ended_before_are_deleted():

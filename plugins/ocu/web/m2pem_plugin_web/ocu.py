@@ -50,6 +50,7 @@ class WebOcu:
         from m2pem_plugin_web.replay.replays import Replays  # noqa: PLC0415
         from m2pem_plugin_web.server import Server  # noqa: PLC0415
         from m2pem_plugin_web.services import services_of  # noqa: PLC0415
+        from m2pem_plugin_web.tracks.pictures import pictures_beside  # noqa: PLC0415
         from m2pem_plugin_web.tracks.recorder import Recorder  # noqa: PLC0415
         from m2pem_plugin_web.tracks.stores import store_beside  # noqa: PLC0415
 
@@ -62,9 +63,15 @@ class WebOcu:
             entry = self._entry(settings)
             self._replays = Replays(control)
             self.hub = Hub(control, self._replays.recordings)
-            store = store_beside(control.journal_file())
-            views = self.hub.follower.views
-            self._recorder = Recorder(control, views, self.hub.fleet, store, self.hub.detected)
+            journal = control.journal_file()
+            self._recorder = Recorder(
+                control,
+                self.hub.follower.views,
+                self.hub.fleet,
+                store_beside(journal),
+                pictures_beside(journal),
+                self.hub.detected,
+            )
             self._services = services_of(control, settings.missions)
 
             def app() -> "ASGIApp":

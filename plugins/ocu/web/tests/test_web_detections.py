@@ -18,7 +18,7 @@ from m2pem.api import Detection, GeoPosition
 from m2pem.api.clock import SystemClock
 from m2pem.executive.executive import Executive
 from m2pem.fleet.fleet_file import load_fleet
-from m2pem.journal import MemoryJournal
+from m2pem.journal import Journal, MemoryJournal
 from m2pem.mission.catalogue import ResourceId
 from m2pem.testing import scenarios
 
@@ -38,7 +38,7 @@ vehicles:
     payloads:
       radar:
         detector: true
-        connection: {{kind: gpr, range: 5 m, {finds}}}
+        connection: {{kind: gpr, range: 5 m, {finds}}}{more}
 """
 BEHIND = """targets: [
   {type: mine, position: [38.1073, -77.3192]}, {type: man, position: [38.1069, -77.3192]}]"""
@@ -62,11 +62,19 @@ def entered(numbering: Numbering, t_s: float, *found: Detection) -> Sample:
     return Sample(t_s, {}, {}, entries, more)
 
 
-async def detecting(stack: AsyncExitStack, folder: Path, finds: str = BEHIND) -> World:
+async def detecting(
+    stack: AsyncExitStack,
+    folder: Path,
+    finds: str = BEHIND,
+    more: str = "",
+    journal: Journal | None = None,
+) -> World:
+    """An executive with a detector. `more`: other payloads of its vehicle."""
     path = folder / "detectors.yaml"
-    path.write_text(FLEET.format(finds=finds), "utf-8")
+    path.write_text(FLEET.format(finds=finds, more=more), "utf-8")
+    clock = SystemClock(SPEED)
     running = await stack.enter_async_context(
-        Executive(load_fleet(path), MemoryJournal(), PLUGINS, SystemClock(SPEED), speed=SPEED)
+        Executive(load_fleet(path), journal or MemoryJournal(), PLUGINS, clock, speed=SPEED)
     )
     return await stack.enter_async_context(serving(running.control, folder, {}))
 

@@ -5,10 +5,14 @@ from contextlib import AsyncExitStack
 from pathlib import Path
 
 from playwright.async_api import Browser, Locator, Page, expect
-from test_web_detections import detecting
+from test_web_detections import BEHIND, detecting
+from test_web_snapshots import eye
 from web_axe import Accessibility
 from web_browsing import page_at
+from web_cameras import SIZE
 from web_desk import IN_ONE_LOOP
+from web_pictures import picture
+from web_snapshots import picture_server
 
 from m2pem.testing import scenarios
 
@@ -30,6 +34,17 @@ def card(page: Page) -> Locator:
     return page.locator(".detection-card")
 
 
+def seen(page: Page) -> Locator:
+    """What the camera saw."""
+    return page.locator(".detection-picture img")
+
+
+async def assert_seen(page: Page) -> None:
+    """The picture of the camera is in the card."""
+    await expect(seen(page)).to_have_js_property("naturalWidth", SIZE[0])
+    await expect(card(page)).to_contain_text("Picture of ugv1/mast")
+
+
 async def assert_uncovered(page: Page) -> None:
     """The mark of the chosen detection is beside or above its card."""
     await page.wait_for_function(UNCOVERED)
@@ -43,7 +58,8 @@ async def look_at(page: Page, name: str) -> None:
 
 async def test_detections_are_on_the_map_and_in_a_list(chromium: Browser, tmp_path: Path) -> None:
     async with AsyncExitStack() as stack:
-        world = await detecting(stack, tmp_path)
+        server = await stack.enter_async_context(picture_server())
+        world = await detecting(stack, tmp_path, BEHIND, eye(server, "/good"))
         watched = await stack.enter_async_context(
             page_at(chromium, world.ocu.url, width=1440, height=960)
         )
@@ -63,12 +79,22 @@ async def test_detections_are_on_the_map_and_in_a_list(chromium: Browser, tmp_pa
         await expect(card(page)).to_contain_text("ugv1/radar")
         await expect(card(page)).to_contain_text("38.107300°, -77.319200°")
         await expect(page.locator(".map-detection-chosen")).to_have_text("mine")
+        await assert_seen(page)
         await assert_uncovered(page)
         eyes = Accessibility(page)
         await eyes.look("a detection", ".map-pane")
         await eyes.look("the list of detections", ".detections-pane")
         eyes.assert_well()
         await look_at(page, "live")
+        await picture(page, "detections")
+        small = await seen(page).bounding_box()
+        await page.get_by_role("button", name="What ugv1/mast saw").click()
+        await expect(page.locator(".detection-card-large")).to_be_visible()
+        large = await seen(page).bounding_box()
+        assert small is not None
+        assert large is not None
+        assert large["width"] > small["width"]
+        await look_at(page, "large")
         await page.keyboard.press("Escape")
         await expect(card(page)).to_have_count(0)
         await expect(mine).to_be_focused()
@@ -109,6 +135,7 @@ async def replay(page: Page, address: str) -> None:
     await expect(marks).to_have_count(2)
     await expect(card(page).locator("dd").nth(1)).to_have_text(latest or "")
     await assert_uncovered(page)
+    await assert_seen(page)
     await look_at(page, "replay")
 
 
@@ -125,3 +152,21 @@ async def narrow(page: Page) -> None:
     await expect(card(page)).to_be_visible()
     await assert_uncovered(page)
     await look_at(page, "phone_map")
+
+
+async def test_the_card_says_why_there_is_no_picture(chromium: Browser, tmp_path: Path) -> None:
+    async with AsyncExitStack() as stack:
+        server = await stack.enter_async_context(picture_server())
+        world = await detecting(stack, tmp_path, BEHIND, eye(server, "/missing"))
+        watched = await stack.enter_async_context(page_at(chromium, world.ocu.url))
+        page = watched.page
+        run = await world.control.start(NEAR)
+        await page.goto(f"{world.base}/runs/{run}")
+        mine = page.locator(".map-detection").filter(has_text="mine")
+        await expect(mine).to_be_attached()
+        await page.get_by_role("button", name="Show all", exact=True).click()
+        await mine.click()
+        await expect(card(page)).to_contain_text("No picture: the camera's server answers 404")
+        await expect(seen(page)).to_have_count(0)
+        await world.control.stop(run)
+        assert watched.complaints == []

@@ -1,17 +1,20 @@
-"""/api/runs/{run}/telemetry: where the vehicles of a run were, as far as it was kept here."""
+"""Where the vehicles of a run were, and what was detected, as far as it was kept here."""
 
 import asyncio
 from typing import Annotated
 
 import msgspec
 from fastapi import APIRouter, Query, Response
+from fastapi import Path as InPath
 from pydantic import BaseModel
 
-from m2pem.api import MissionControl
+from m2pem.api import MissionControl, RunId
 from m2pem_plugin_web.access.permissions import Viewer
 from m2pem_plugin_web.problems import RESPONSES, ProblemError
 from m2pem_plugin_web.rest.models import find_run
 from m2pem_plugin_web.rest.rehearsals import SampleModel
+from m2pem_plugin_web.tracks.camera_pictures import MEDIA_TYPES
+from m2pem_plugin_web.tracks.detections import MOST_DETECTIONS
 from m2pem_plugin_web.tracks.recorder import Recorder
 from m2pem_plugin_web.tracks.track import page_of
 
@@ -22,7 +25,10 @@ _encode = msgspec.json.Encoder().encode
 
 
 class DetectionModel(BaseModel):
-    """A detection. `t_s`: mission time; `time_us`: since the Unix epoch, as the device says."""
+    """A detection. `t_s`: mission time; `time_us`: since the Unix epoch, as the device says.
+    `camera`: the camera that was asked for a picture; "": there is none. `picture`: the number
+    with which the picture is had; `picture_after_s`: how many seconds later that had come.
+    `no_picture`: why there is none. With neither of the two, it is not known or still asked for."""
 
     number: int
     t_s: float
@@ -30,6 +36,10 @@ class DetectionModel(BaseModel):
     source: str
     position: dict[str, float | None]
     time_us: int
+    camera: str = ""
+    picture: int | None = None
+    picture_after_s: float = 0.0
+    no_picture: str = ""
 
 
 class TrackSampleModel(SampleModel):
@@ -50,7 +60,7 @@ class TelemetryPage(BaseModel):
 
 
 def router(control: MissionControl, recorder: Recorder) -> APIRouter:
-    """The route of tracks."""
+    """The routes of tracks, and of pictures of what was detected."""
     routes = APIRouter(prefix="/api/runs", tags=["runs"], responses=RESPONSES)
 
     @routes.get("/{run}/telemetry", response_model=TelemetryPage)
@@ -78,5 +88,23 @@ def router(control: MissionControl, recorder: Recorder) -> APIRouter:
             "problem": recorder.problems.get(run),
         }
         return Response(_encode(content), media_type="application/json")
+
+    @routes.get(
+        "/{run}/detections/{number}/picture",
+        response_class=Response,
+        responses={200: {"content": {each: {} for each in MEDIA_TYPES.values()}}},
+    )
+    async def picture(
+        _: Viewer, run: str, number: Annotated[int, InPath(ge=1, le=MOST_DETECTIONS)]
+    ) -> Response:
+        """The picture of what was detected: `picture` of its entry in the telemetry."""
+        await find_run(control, run)
+        try:
+            found = await asyncio.to_thread(recorder.pictures.get, RunId(run), number)
+        except OSError as error:
+            raise ProblemError(503, f"pictures of {run}: {error.strerror}") from error
+        if found is None:
+            raise ProblemError(404, f"{run} has no picture {number}")
+        return Response(found.content, media_type=MEDIA_TYPES[found.suffix])
 
     return routes

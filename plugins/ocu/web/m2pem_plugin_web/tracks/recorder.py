@@ -8,7 +8,7 @@ import asyncio
 import logging
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import msgspec
 
@@ -23,7 +23,9 @@ from m2pem.api import (
 )
 from m2pem.errors import M2pemError
 from m2pem_plugin_web.live.latest_states import FleetStates
-from m2pem_plugin_web.tracks.detections import DetectionEntry, Found
+from m2pem_plugin_web.tracks.detections import MOST_DETECTIONS, DetectionEntry, Found
+from m2pem_plugin_web.tracks.pictures import FullError, PictureStore
+from m2pem_plugin_web.tracks.snapshots import CameraAnswer, Snapshot, Snapshots
 from m2pem_plugin_web.tracks.stores import HeldError, TrackStore
 from m2pem_plugin_web.tracks.thinning import SPACING_S, Sample, State
 from m2pem_plugin_web.tracks.track import Head, Track, head_of
@@ -41,12 +43,18 @@ MOST_WAITING = 2000
 
 MOST_PROBLEMS = 100
 
+MOST_SHARED = 50
+"""Most pictures of a run that later entries may still share."""
+
 LONGEST_HEAD = 1000
 
 GOES_ON = (RunStatus.RUNNING, RunStatus.PAUSED)
 
 Announce: TypeAlias = Callable[[RunId, Sequence[DetectionEntry], int], None]
 """Is called with new entries of a run, and how many detections it has without an entry."""
+
+Keeping: TypeAlias = asyncio.Task[Mapping[str, Any]]
+"""Waits for a picture and keeps it; gives what entries say of it."""
 
 _encode = msgspec.json.Encoder().encode
 log = logging.getLogger("m2pem.ocu.web")
@@ -60,13 +68,18 @@ class _Writing:
     waiting: list[Sample] = field(default_factory=list)
     last_s: float = 0.0
     """The mission time of the last sample."""
+    awaited: list[tuple[DetectionEntry, Snapshot, Keeping]] = field(default_factory=list)
+    """Entries whose pictures are asked for."""
+    kept: dict[asyncio.Task[CameraAnswer], Keeping] = field(default_factory=dict)
+    """The newest pictures, which later entries may share."""
     turn: asyncio.Lock = field(default_factory=asyncio.Lock)
 
 
 class Recorder:
     """Records tracks. `views`: the runs; `fleet`: the latest states of vehicles and payloads.
 
-    `announce`: sends new detections of a run to those who watch it.
+    `pictures`: where pictures of detections are kept. `announce`: sends new detections of a run to
+    those who watch it, and their pictures when these have come.
     """
 
     def __init__(
@@ -75,9 +88,13 @@ class Recorder:
         views: Mapping[RunId, RunView],
         fleet: FleetStates,
         store: TrackStore,
-        announce: Announce = lambda _run, _entries, _more: None,
+        pictures: PictureStore,
+        announce: Announce,
     ) -> None:
         self.store = store
+        self.pictures = pictures
+        self._storing = asyncio.Lock()
+        self._snapshots = Snapshots(control.fleet)
         self._announce = announce
         self._found: dict[RunId, Found] = {}
         fleet.detected.append(self._detected)
@@ -104,6 +121,7 @@ class Recorder:
         finally:
             for run in list(self._writing):
                 await self._close(run)
+            await self._snapshots.close()
 
     async def flush(self, run: RunId) -> None:
         """Write the remaining samples of a run."""
@@ -135,7 +153,7 @@ class Recorder:
                     if loop.time() >= self._not_before.get(run, 0.0):
                         await self._look_at(run, view)
                 elif run in self._writing:
-                    await self._close(run)
+                    await self._end(run)
             for run in self._found.keys() - self._writing.keys() - self._going_on():
                 del self._found[run]
             for run in self._writing.keys() - self._views.keys():
@@ -181,7 +199,9 @@ class Recorder:
                 fresh[kind][state.resource] = msgspec.Raw(_encode(state))
         run = writing.track.run
         found = self._found.pop(run, None) if with_detections else None
-        entries, more = writing.track.numbering.enter(t_s, found) if found else ((), 0)
+        new, more = writing.track.numbering.enter(t_s, found) if found else ((), 0)
+        entries = (*self._pictured(writing), *new)
+        self._await_pictures(writing, new, found.snapshots if found else ())
         if any(fresh.values()) or entries or more:
             writing.waiting.append(Sample(t_s, **fresh, detections=entries, more_detections=more))
             writing.last_s = t_s
@@ -189,9 +209,17 @@ class Recorder:
             self._announce(run, entries, writing.track.numbering.more)
 
     def _detected(self, detection: Detection) -> None:
-        """Note a detection for each run that goes on at that time."""
+        """Note a detection for each run that goes on at that time, and ask for its picture."""
+        snapshot: Snapshot | None = None
+        now_s = asyncio.get_running_loop().time()
         for run in self._going_on():
-            self._found.setdefault(run, Found()).add(detection)
+            found = self._found.setdefault(run, Found())
+            writing = self._writing.get(run)
+            last = writing.track.numbering.last if writing is not None else 0
+            has_room = last + len(found.detections) < MOST_DETECTIONS
+            if snapshot is None and has_room and now_s >= self._not_before.get(run, 0.0):
+                snapshot = self._snapshots.of(detection.source)
+            found.add(detection, snapshot)
 
     def _going_on(self) -> set[RunId]:
         """Return the runs that go on."""
@@ -211,11 +239,65 @@ class Recorder:
             self._log_once(run, error)
             self._leave_alone(run)
             return None
-        self._writing[run] = _Writing(track, last_s=track.last_s)
-        return self._writing[run]
+        writing = self._writing[run] = _Writing(track, last_s=track.last_s)
+        await self._forget_pictures(run, track.numbering.last)
+        return writing
 
     def _leave_alone(self, run: RunId) -> None:
         self._not_before[run] = asyncio.get_running_loop().time() + AGAIN_S
+
+    # --- pictures -------------------------------------------------------------------------------
+
+    def _await_pictures(
+        self,
+        writing: _Writing,
+        entries: Sequence[DetectionEntry],
+        snapshots: Sequence[Snapshot | None],
+    ) -> None:
+        """Have the pictures of new entries kept when they come; several entries may share one."""
+        for entry, snapshot in zip(entries, snapshots, strict=False):  # some have no entry
+            if snapshot is None:
+                continue
+            keeping = writing.kept.get(snapshot.coming)
+            if keeping is None:
+                keep = self._keep_picture(writing.track.run, entry.number, snapshot.coming)
+                keeping = asyncio.create_task(keep, name="web: keep a picture")
+                writing.kept[snapshot.coming] = keeping
+                for old in list(writing.kept)[:-MOST_SHARED]:
+                    del writing.kept[old]
+            writing.awaited.append((entry, snapshot, keeping))
+
+    async def _keep_picture(
+        self, run: RunId, number: int, coming: asyncio.Task[CameraAnswer]
+    ) -> Mapping[str, Any]:
+        """Wait for a picture and keep it. Return what entries say of it."""
+        answer = await asyncio.shield(coming)  # other runs want it, too
+        picture = answer.picture
+        if picture is None:
+            return {"no_picture": answer.why}
+        try:
+            async with self._storing:
+                await _to_the_end(lambda: self.pictures.put(run, number, picture))
+        except FullError as error:
+            return {"no_picture": str(error)}
+        except OSError as error:
+            log.warning("a picture of %s cannot be kept: %s", run, error)
+            return {"no_picture": f"it cannot be kept: {error.strerror}"}
+        return {"picture": number}
+
+    def _pictured(self, writing: _Writing) -> list[DetectionEntry]:
+        """Return the entries whose pictures are kept, or will not come, as they are now."""
+        done = [each for each in writing.awaited if each[2].done()]
+        writing.awaited = [each for each in writing.awaited if not each[2].done()]
+        return [_with_picture(*each) for each in done]
+
+    async def _forget_pictures(self, run: RunId, after: int) -> None:
+        """Remove pictures of detections that the track of a run does not have."""
+        try:
+            async with self._storing:
+                await _to_the_end(lambda: self.pictures.remove(run, after))
+        except OSError as error:
+            log.warning("pictures of %s cannot be deleted: %s", run, error)
 
     # --- writing --------------------------------------------------------------------------------
 
@@ -225,11 +307,27 @@ class Recorder:
             for run in list(self._writing):
                 await self.flush(run)
 
+    async def _end(self, run: RunId) -> None:
+        """Close the track of a run that has ended, unless pictures are still to come."""
+        writing = self._writing[run]
+        self._take_last(writing)
+        if not writing.awaited:
+            await self._close(run)
+
+    def _take_last(self, writing: _Writing) -> None:
+        """Add what has come since the last sample: a detection may end a run at once."""
+        view = self._views.get(writing.track.run)
+        self._take(writing, max(view.t_s if view is not None else 0.0, writing.last_s), ())
+
     async def _close(self, run: RunId) -> None:
         if (writing := self._writing.get(run)) is not None:
-            # A detection may end a run at once.
-            view = self._views.get(run)
-            self._take(writing, max(view.t_s if view is not None else 0.0, writing.last_s), ())
+            self._take_last(writing)
+            keeping = {each[2] for each in writing.awaited}
+            for task in keeping:
+                task.cancel()
+            if keeping:
+                await asyncio.wait(keeping)
+            self._take_last(writing)
         await self.flush(run)
         writing = self._writing.pop(run, None)
         if writing is not None:
@@ -254,6 +352,9 @@ class Recorder:
             for run, started_us in kept.items():
                 if run not in there or (started_us and started_us != there[run]):
                     await asyncio.to_thread(self.store.remove, run)
+            tracked = await asyncio.to_thread(self.store.runs)
+            for run in set(await asyncio.to_thread(self.pictures.runs)).difference(tracked):
+                await self._forget_pictures(run, 0)
         except (OSError, M2pemError) as error:
             log.warning("tracks of removed runs cannot be deleted: %s", error)
 
@@ -261,6 +362,16 @@ class Recorder:
         """Return when each run with a track began; 0 if the head of its track cannot be read."""
         heads = {run: head_of(self.store.read(run, LONGEST_HEAD)) for run in self.store.runs()}
         return {run: head.started_us if head is not None else 0 for run, head in heads.items()}
+
+
+def _with_picture(entry: DetectionEntry, snapshot: Snapshot, keeping: Keeping) -> DetectionEntry:
+    if keeping.cancelled():
+        return msgspec.structs.replace(entry, no_picture="m2pem ended before it came")
+    said = dict(keeping.result())
+    if "picture" in said:
+        after_s = snapshot.coming.result().at_s - snapshot.since_s
+        said["picture_after_s"] = round(max(0.0, after_s), 3)
+    return msgspec.structs.replace(entry, **said)
 
 
 async def _to_the_end(work: Callable[[], None]) -> None:

@@ -76,6 +76,10 @@ async function problemOf(response: Response): Promise<Problem> {
   }
 }
 
+/** The bytes of a file. */
+export async function getFile(path: string): Promise<Blob> {
+  return (await answered(path, undefined, { method: "GET", credentials: "same-origin" })).blob();
+}
 export const get = <T>(path: string): Promise<T> => request("GET", path);
 export const post = <T>(path: string, body: unknown = {}, options?: Options): Promise<T> =>
   request("POST", path, body, options);

@@ -348,6 +348,13 @@ export interface Detection {
   /** Null: the device did not know it. */
   position: { latitude_deg: number | null; longitude_deg: number | null; altitude_m: number | null };
   time_us: number;
+  /** The camera that was asked for a picture; "" or left out: there is none. */
+  camera?: string;
+  /** The number with which the picture is had, and how much later that had come. */
+  picture?: number;
+  picture_after_s?: number;
+  /** Why there is no picture. */
+  no_picture?: string;
 }
 
 export interface TeamState {

@@ -1,8 +1,9 @@
-// One detection: what, by which payload, when and where.
-import { useEffect, useRef } from "preact/hooks";
+// One detection: what, by which payload, when and where, and what a camera saw then.
+import { useEffect, useRef, useState } from "preact/hooks";
 import { clock } from "../../shared/format";
 import { fill, strings } from "../../strings";
 import { useOperating } from "../context";
+import { DetectionPicture } from "./DetectionPicture";
 import { positionOf } from "./position";
 import "./detections.css";
 
@@ -15,6 +16,7 @@ export default function DetectionCard({ onLayout }: { onLayout?: (card: HTMLElem
   const card = useRef<HTMLElement>(null);
   const close = useRef<HTMLButtonElement>(null);
   const before = useRef<Element | null>(null);
+  const [large, enlarge] = useState(false);
   const leave = () => {
     detection.value = null;
     if (before.current instanceof HTMLElement) before.current.focus();
@@ -34,7 +36,7 @@ export default function DetectionCard({ onLayout }: { onLayout?: (card: HTMLElem
   return (
     <section
       ref={card}
-      class="detection-card"
+      class={large ? "detection-card detection-card-large" : "detection-card"}
       aria-label={fill(text.card, { type: found.type, source: found.source })}
       onKeyDown={(event) => {
         if (event.key !== "Escape" || event.shiftKey) return;
@@ -51,6 +53,7 @@ export default function DetectionCard({ onLayout }: { onLayout?: (card: HTMLElem
           ✕
         </button>
       </header>
+      <DetectionPicture of={found} onEnlarge={() => enlarge(!large)} />
       <dl>
         <dt>{text.source}</dt>
         <dd>{found.source}</dd>

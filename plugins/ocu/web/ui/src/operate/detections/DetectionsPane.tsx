@@ -43,6 +43,7 @@ export default function DetectionsPane({ inside }: { inside: boolean }) {
                 <strong>{each.type}</strong>
                 <span>{each.source}</span>
                 <small>{positionOf(each)}</small>
+                {each.picture !== undefined && <small>{text.hasPicture}</small>}
               </button>
             </li>
           ))}
