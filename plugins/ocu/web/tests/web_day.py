@@ -1,4 +1,4 @@
-"""The world of an operator's day: a fleet of 20 simulated vehicles, its missions and its people."""
+"""The world of an operator's day: a fleet of 20 simulated vehicles and its missions."""
 
 import json
 from collections.abc import Mapping
