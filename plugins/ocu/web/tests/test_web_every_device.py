@@ -123,7 +123,7 @@ async def show_no_connection(desk: Desk) -> None:
     desk.refusals.append(0)
     await desk.home()
     await desk.page.wait_for_function(
-        "JSON.parse(localStorage.getItem('m2pem.last-known'))?.runs.length > 0"
+        "() => JSON.parse(localStorage.getItem('m2pem.last-known'))?.runs.length > 0"
     )
     await desk.page.route("**/api/session", refuse)
     await desk.page.goto(desk.executive.origin)

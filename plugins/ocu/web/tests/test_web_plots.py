@@ -98,9 +98,9 @@ async def test_a_click_into_the_plots_of_a_replay_goes_to_that_time(desk: Desk) 
     # Without colours, too, each line is told from the others.
     assert len(await pane.evaluate(LINES)) == 1
     await page.emulate_media(contrast="more")
-    await page.wait_for_function(f"({LINES})(document).length === 2")
+    await page.wait_for_function(f"() => ({LINES})(document).length === 2")
     await page.emulate_media(contrast="no-preference", forced_colors="active")
-    await page.wait_for_function(f"({LINES})(document).length === 2")
+    await page.wait_for_function(f"() => ({LINES})(document).length === 2")
 
 
 # Dashes and widths of the first lines of the legend: as many as differ.
