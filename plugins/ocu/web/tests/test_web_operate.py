@@ -146,6 +146,24 @@ async def test_a_vehicle_and_its_payload_are_taken_and_given_back(desk: Desk) ->
     assert await holder(desk, "evsg2/ptz") == ""
 
 
+async def test_taking_a_vehicle_from_a_task_says_before_what_that_ends(desk: Desk) -> None:
+    page = await desk.driving()
+    take = page.locator(".card", has_text="evsg1").get_by_role(
+        "button", name="Take over", exact=True
+    )
+    dialog = page.get_by_role("dialog", name="Take over evsg1")
+    await take.click()
+    await expect(dialog).to_contain_text("DRIVE ROUTE ends with error TAKEN_OVER")
+    await page.keyboard.press("Escape")
+    await expect(dialog).to_have_count(0)
+    await expect(element(page, "DriveRoute")).to_contain_class("m2-active")
+    assert await holder(desk, "evsg1") not in ("", "anna")
+    await take.click()
+    await dialog.get_by_role("button", name="Take over").click()
+    await desk.until("/api/resources", lambda said: said["holders"]["evsg1"] == "anna")
+    await expect(element(page, "DriveRoute")).not_to_contain_class("m2-active")
+
+
 async def holder(desk: Desk, vehicle: str) -> str:
     """Who has it, as the server says."""
     return str((await desk.ask("GET", "/api/resources"))["holders"][vehicle])

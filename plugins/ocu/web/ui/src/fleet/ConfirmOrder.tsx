@@ -1,13 +1,15 @@
 // Before a command to many vehicles, or one that ends something: whom it concerns, and what it ends.
-import { useEffect, useRef } from "preact/hooks";
+import { useEffect, useLayoutEffect, useRef } from "preact/hooks";
 import { Dialog } from "../shared/Dialog";
 import { fill, strings } from "../strings";
 import { asked, namesOf, send, type Effect, type Order } from "./commands";
+import "./confirm.css";
 
 const text = strings.fleet.commands;
 
 export function ConfirmOrder() {
   const now = asked.value;
+  useEffect(() => () => void (asked.value = null), []); // another page does not ask it
   if (!now) return null;
   return <Asked order={now.order} effects={now.effects} />;
 }
@@ -24,7 +26,7 @@ function Asked({ order, effects }: { order: Order; effects: readonly Effect[] | 
   const label = isTaking
     ? fill(text.confirmTaking, { act: text.acts[verb as "hold"] })
     : text.confirm[verb];
-  useEffect(() => {
+  useLayoutEffect(() => {
     if (effects) confirm.current?.focus();
   }, [effects]);
   return (

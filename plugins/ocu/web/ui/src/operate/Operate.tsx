@@ -1,6 +1,7 @@
 // The operator page: a run that goes on, a run of the past, or a rehearsal.
 import { useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
+import { ConfirmOrder } from "../fleet/ConfirmOrder";
 import { ApiError, get } from "../shared/api";
 import { connection, isOver, listen } from "../shared/executive";
 import { fill, strings } from "../strings";
@@ -79,6 +80,7 @@ export default function Operate({ source }: { source: Source }) {
         {!isReplay && <IncidentPanel />}
         <Layout key={scene.mode} onSeek={isReplay ? (t) => scene.seek(t) : undefined} />
         {isReplay && <Player scene={scene} />}
+        {!isReplay && <ConfirmOrder />}
         {ended.value && <RunEnd onClose={() => (ended.value = false)} />}
       </div>
     </OperatingProvider>

@@ -2,7 +2,7 @@
 // cannot be used meanwhile. Escape closes; the focus goes back to where it was.
 import type { ComponentChildren } from "preact";
 import { createPortal } from "preact/compat";
-import { useEffect, useRef } from "preact/hooks";
+import { useLayoutEffect, useRef } from "preact/hooks";
 import { strings } from "../strings";
 import { useUniqueId } from "./uniqueId";
 import "./dialog.css";
@@ -36,7 +36,8 @@ function keepBehind(): () => void {
 export function Dialog({ title, onClose, children, actions, wide = false, full = false }: DialogProps) {
   const dialog = useRef<HTMLDivElement>(null);
   const heading = useUniqueId();
-  useEffect(() => {
+  // At once: the next key is for the dialog.
+  useLayoutEffect(() => {
     const before = document.activeElement;
     const release = keepBehind();
     const body = dialog.current?.querySelector(".dialog-body");

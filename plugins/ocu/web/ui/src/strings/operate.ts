@@ -275,7 +275,6 @@ export const operate = {
     take: "Take over",
     giveBack: "Give back",
     takeHint: "Control it yourself; what it does for a mission ends",
-    taken: "You have {resource}.",
     given: "{resource} was given back to the missions.",
     centre: "Centre",
     follow: "Follow",

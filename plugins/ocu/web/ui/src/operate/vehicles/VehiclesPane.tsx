@@ -7,6 +7,7 @@ import { askFor, isSelf, requests } from "../../people/people";
 import { unknownSince } from "../../shared/executive";
 import { timeOfDay } from "../../shared/moments";
 import { may } from "../../shared/session";
+import { order } from "../../fleet/commands";
 import { ForceGiveBack } from "../../people/ForceGiveBack";
 import { command } from "../../shared/command";
 import { toast } from "../../shared/Toasts";
@@ -244,10 +245,10 @@ function HandOver({ resource, name }: { resource: string; name?: string }) {
   const { scene } = useOperating();
   if (scene.mode !== "live" || !may("operator")) return null;
   const holder = scene.holders.value[resource] ?? "";
-  const ask = async (what: "take" | "give-back", done: string) => {
+  const giveBack = async () => {
     const path = resource.split("/").map(encodeURIComponent).join("/");
-    if (await command(`/resources/${path}/${what}`)) {
-      toast(fill(done, { resource }), "good");
+    if (await command(`/resources/${path}/give-back`)) {
+      toast(fill(text.given, { resource }), "good");
     }
   };
   const kind = name ? "card-hand-over" : "secondary";
@@ -261,7 +262,7 @@ function HandOver({ resource, name }: { resource: string; name?: string }) {
         type="button"
         class={kind}
         aria-label={label(text.giveBack)}
-        onClick={() => void ask("give-back", text.given)}
+        onClick={() => void giveBack()}
       >
         {text.giveBack}
       </button>
@@ -273,7 +274,7 @@ function HandOver({ resource, name }: { resource: string; name?: string }) {
       class={kind}
       aria-label={label(text.take)}
       title={text.takeHint}
-      onClick={() => void ask("take", text.taken)}
+      onClick={() => void order({ verb: "take", resources: [resource] })}
     >
       {text.take}
     </button>

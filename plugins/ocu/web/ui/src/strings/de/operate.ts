@@ -278,7 +278,6 @@ export const operate: Translation<typeof english.operate> = {
     take: "Übernehmen",
     giveBack: "Zurückgeben",
     takeHint: "Von Hand steuern; was es für eine Mission tut, endet",
-    taken: "Sie haben {resource}.",
     given: "{resource} gehört wieder den Missionen.",
     centre: "Zentrieren",
     follow: "Folgen",
