@@ -100,6 +100,7 @@ async def page_at(
     dark: bool = False,
     language: str = "en-US",
     offline: bool = False,
+    touch: bool = False,
 ) -> AsyncIterator[Watched]:
     """A page of its own profile, so of its own operator, at an address.
 
@@ -112,6 +113,7 @@ async def page_at(
         reduced_motion="reduce",
         accept_downloads=True,
         locale=language,
+        has_touch=touch,
         service_workers="allow" if offline else "block",
         permissions=["clipboard-read", "clipboard-write"],
     )

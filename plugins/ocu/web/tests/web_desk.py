@@ -161,9 +161,14 @@ def executive(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
 
 
 @asynccontextmanager
-async def signed_in(chromium: Browser, executive: Served, name: str) -> AsyncIterator[Desk]:
-    """The desk of somebody who has a browser profile of their own and has just signed in."""
-    async with page_at(chromium, f"{executive.origin}/healthz") as it:
+async def signed_in(
+    chromium: Browser, executive: Served, name: str, **screen: Any
+) -> AsyncIterator[Desk]:
+    """The desk of somebody who has a browser profile of their own and has just signed in.
+
+    `screen`: as for `page_at`.
+    """
+    async with page_at(chromium, f"{executive.origin}/healthz", **screen) as it:
         key = await it.page.evaluate(SIGN_IN, [name, PASSWORD])
         yield Desk(executive, it, key)
 

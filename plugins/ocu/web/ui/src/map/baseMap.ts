@@ -13,6 +13,7 @@ export interface Tiles {
 }
 
 const FENCE = "#c2262e";
+const FOR_FINGERS = 1.35;
 
 export function baseMap(
   host: HTMLElement,
@@ -28,6 +29,8 @@ export function baseMap(
     preferCanvas: true,
     attributionControl: tiles !== null,
     zoomSnap: 0.5,
+    tapHold: true, // a long press is a right click, also where the browser makes none of it
+    fadeAnimation: false, // a name that is drawn again would be there twice while one of them fades
     ...options,
   });
   map.attributionControl?.setPrefix(false);
@@ -49,7 +52,15 @@ export function baseMap(
 
 /** Leaflet takes it as HTML. */
 export const escaped = (text: string): string =>
-  text.replaceAll("&", "&amp;").replaceAll("<", "&lt;").replaceAll(">", "&gt;");
+  text
+    .replaceAll("&", "&amp;")
+    .replaceAll("<", "&lt;")
+    .replaceAll(">", "&gt;")
+    .replaceAll('"', "&quot;");
+
+/** How large something is drawn that is dragged: larger for a finger. */
+export const handlePx = (px: number): number =>
+  matchMedia("(pointer: coarse)").matches ? Math.round(px * FOR_FINGERS) : px;
 
 export const vertexOf = ({ lat, lng }: L.LatLng): Vertex => ({
   latitude: lat,

@@ -68,7 +68,7 @@ export default function MapPanel({ editor }: { editor: EditorContext }) {
       const isSurveyed = plan.surveys.open.peek() !== null;
       made.edit(isSurveyed ? null : (draft ?? (own ? draftOf(own) : null)), draft !== null);
       if (first && catalogue.geometries.value.length > 0) {
-        first = false;
+        first = editor.changes.peek() === 0; // the mission's own come when it has been opened
         made.fit();
       }
     };

@@ -1,7 +1,7 @@
 // The editor's map, without Preact: geometries that can be selected, handles to change one, and what
 // the mission commands, numbered.
 import L from "leaflet";
-import { baseMap, escaped, placeOf, vertexOf, type Tiles } from "../../map/baseMap";
+import { baseMap, escaped, handlePx, placeOf, vertexOf, type Tiles } from "../../map/baseMap";
 import {
   draftOf,
   inserted,
@@ -12,6 +12,7 @@ import {
   type Draft,
   type Vertex,
 } from "../../map/draft";
+import { markCrowded } from "../../map/labels";
 import { distance_m, legs_m, middleOf, writtenLength } from "../../map/measure";
 import { snapped } from "../../map/snap";
 import { VehicleLayer } from "../../operate/map/vehicleLayer";
@@ -53,6 +54,8 @@ const DRAFT = "#0b63ce";
 const NAMED_PX = 60;
 const NAMED_UNUSED_PX = 220;
 const NEAR_PX = 4;
+/** Between a badge and the edge of the map. */
+const EDGE_PX = 6;
 
 export class PlanMap {
   /** Of a rehearsal that is played. */
@@ -70,6 +73,8 @@ export class PlanMap {
   private isNew = false;
   private picksPlace = false;
   private corners: Vertex[] = [];
+  /** What the geometry that is selected covers; null: none is. */
+  private selected: L.LatLngBounds | null = null;
   private readonly named_px = new WeakMap<L.Layer, number>();
 
   constructor(
@@ -89,11 +94,14 @@ export class PlanMap {
     this.band = L.polyline([], style).addTo(this.map);
     this.map.on("click", ({ latlng }) => this.click(latlng));
     this.map.on("mousemove", ({ latlng }) => this.stretch(latlng));
-    this.map.on("zoomend", () => this.nameGeometries());
+    this.map.on("moveend", () => this.placeLabels()); // also after the zoom has changed
     this.observer = new ResizeObserver(() => {
       const had = this.map.getSize();
-      this.map.invalidateSize({ animate: false });
+      const wasSeen = this.isSeen(this.selected);
+      // What is drawn stays under the pointer, whatever room the form below takes.
+      this.map.invalidateSize({ animate: false, pan: !this.isNew });
       if (had.x === 0) this.fit();
+      else if (wasSeen && !this.isSeen(this.selected)) this.fitTo(this.selected!);
     });
     this.observer.observe(host);
   }
@@ -121,10 +129,12 @@ export class PlanMap {
       this.geometry(geometry, used, isOn || geometry.name === selected);
     }
     for (const there of places.values()) this.badge(there, tasks, colour);
+    const looked = geometries.find(({ name }) => name === selected);
+    this.selected = looked ? L.geoJSON(looked.geometry).getBounds() : null;
     this.corners = geometries
       .filter(({ name }) => name !== selected)
       .flatMap((each) => [...draftOf(each).vertices]);
-    this.nameGeometries();
+    this.placeLabels();
   }
 
   /** Handles at the vertices of what is changed, or drawn; null: of nothing. */
@@ -134,7 +144,12 @@ export class PlanMap {
     this.crosshair();
     this.band.setLatLngs([]).unbindTooltip();
     this.handles.clearLayers();
-    if (!draft) return;
+    if (draft) this.addHandles(draft);
+    this.placeLabels();
+  }
+
+  private addHandles(draft: Draft): void {
+    const { isNew } = this;
     const points = draft.vertices.map(placeOf);
     const style = { color: DRAFT, weight: 3, interactive: false, ...(isNew && { dashArray: "4 6" }) };
     const line = draft.kind === "area" ? L.polygon(points, style) : L.polyline(points, style);
@@ -173,7 +188,11 @@ export class PlanMap {
   /** Brings a geometry into view, unless it is there. */
   look(geometry: Geometry): void {
     const bounds = L.geoJSON(geometry.geometry).getBounds();
-    if (bounds.isValid() && !this.map.getBounds().contains(bounds)) this.fitTo(bounds);
+    if (bounds.isValid() && !this.isSeen(bounds)) this.fitTo(bounds);
+  }
+
+  private isSeen(bounds: L.LatLngBounds | null): boolean {
+    return bounds !== null && this.map.getBounds().contains(bounds);
   }
 
   middle(): Vertex {
@@ -255,8 +274,8 @@ export class PlanMap {
     const rows = there.map(({ task, number, title, who }) => {
       const on = tasks.includes(task) ? " plan-badge-on" : "";
       return (
-        `<button type="button" tabindex="-1" data-task="${escaped(task)}" class="plan-badge${on}">` +
-        `<b style="background:${colour(who)}">${number}</b><span>${escaped(title)}</span></button>`
+        `<button type="button" tabindex="-1" data-task="${escaped(task)}" class="plan-badge${on}" ` +
+        `title="${escaped(title)}"><b style="background:${colour(who)}">${number}</b><span>${escaped(title)}</span></button>`
       );
     });
     const icon = L.divIcon({ className: "plan-badges", html: rows.join(""), iconSize: undefined });
@@ -286,8 +305,12 @@ export class PlanMap {
         this.listener.finished();
       }
     });
-    marker.on("contextmenu", () => {
-      if (draft.vertices.length > LEAST[draft.kind]) this.listener.edited(removed(draft, index));
+    marker.on("contextmenu", ({ originalEvent }) => {
+      if (draft.vertices.length <= LEAST[draft.kind]) return;
+      const remove = () => this.listener.edited(removed(draft, index));
+      // Leaflet's long press ends where the finger is lifted, which must still be on the page then.
+      if ("_simulated" in originalEvent) addEventListener("touchend", remove, { once: true });
+      else remove();
     });
     const hint = draft.kind === "point" ? words.dragPoint : words.dragVertex;
     if (!this.isNew) marker.bindTooltip(hint, { direction: "top", offset: [0, -12] });
@@ -325,25 +348,60 @@ export class PlanMap {
     at: Vertex,
     className: string,
     html: string,
-    size: number,
+    usual_px: number,
     zIndexOffset: number,
     aside_px = 0,
   ): L.Marker {
+    const size = handlePx(usual_px);
     const iconAnchor: L.PointTuple = [size / 2 + aside_px, size / 2 + aside_px];
     const icon = L.divIcon({ className, html, iconSize: [size, size], iconAnchor });
     const options = { icon, draggable: true, keyboard: false, zIndexOffset };
     return L.marker(placeOf(at), options).addTo(this.handles);
   }
 
-  /** Names of what is small would lie on top of each other. */
-  private nameGeometries(): void {
+  /**
+   * Badges keep their numbers, and their titles where there is room. Names of what is small are left
+   * out, and those that would lie on a badge, a handle or another name.
+   */
+  private placeLabels(): void {
+    const all = (selector: string) => [
+      ...this.map.getContainer().querySelectorAll<HTMLElement>(selector),
+    ];
+    const boxOf = (element: HTMLElement) => element.getBoundingClientRect();
+    const handles = all(".map-vertex, .plan-leg span, .plan-mover").map(boxOf);
+    const badges = [...all(".plan-badge-on"), ...all(".plan-badge:not(.plan-badge-on)")];
+    pullIn(badges, boxOf(this.map.getContainer()));
+    markCrowded(
+      badges.map((element) => ({ element })),
+      "plan-badge-short",
+      handles,
+    );
+    const named: { element: HTMLElement; size: number }[] = [];
     this.geometries.eachLayer((layer) => {
-      if (!(layer instanceof L.GeoJSON)) return;
+      const element = layer.getTooltip()?.getElement();
+      if (!element || !(layer instanceof L.GeoJSON)) return;
       const bounds = layer.getBounds();
       const [one, other] = [bounds.getNorthWest(), bounds.getSouthEast()];
       const size = this.map.latLngToLayerPoint(one).distanceTo(this.map.latLngToLayerPoint(other));
-      const named = one.equals(other) || size >= (this.named_px.get(layer) ?? NAMED_PX);
-      layer.getTooltip()?.getElement()?.classList.toggle("map-unnamed", !named);
+      const isLarge = one.equals(other) || size >= (this.named_px.get(layer) ?? NAMED_PX);
+      element.classList.toggle("map-unnamed", !isLarge);
+      if (isLarge) named.push({ element, size });
     });
+    named.sort((one, other) => other.size - one.size);
+    markCrowded(named, "map-unnamed", [...handles, ...badges.map(boxOf)]);
   }
+}
+
+/** Badges that would end beyond the right edge of the map go to the left. */
+function pullIn(badges: readonly HTMLElement[], map: DOMRect): void {
+  for (const badge of badges) {
+    badge.classList.remove("plan-badge-short");
+    badge.style.translate = "";
+  }
+  const boxes = badges.map((badge) => badge.getBoundingClientRect());
+  badges.forEach((badge, index) => {
+    const { left, right } = boxes[index]!;
+    const beyond = right + EDGE_PX - map.right;
+    if (beyond > 0 && left < map.right) badge.style.translate = `${-beyond}px`;
+  });
 }

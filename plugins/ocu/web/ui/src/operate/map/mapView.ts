@@ -2,7 +2,8 @@
 import L from "leaflet";
 import type { Fleet, Geometry, SharedSpace } from "../../shared/types";
 import type { Draft, Vertex } from "../../map/draft";
-import { baseMap, escaped, placeOf, vertexOf, type Tiles } from "../../map/baseMap";
+import { baseMap, escaped, handlePx, placeOf, vertexOf, type Tiles } from "../../map/baseMap";
+import { markCrowded } from "../../map/labels";
 import { fill, strings } from "../../strings";
 import { DetectionLayer } from "./detectionLayer";
 import { VehicleLayer } from "./vehicleLayer";
@@ -34,6 +35,7 @@ const TILE_PX = 256;
 /** A label of a space stands so far above its middle: names of routes are there. */
 const LABEL_PX = 14;
 const DRAFT = "#0b63ce";
+const VERTEX_PX = 22;
 
 export class MapView {
   readonly vehicles: VehicleLayer;
@@ -70,7 +72,10 @@ export class MapView {
       if (resource) listener.chosen(resource);
     });
     this.map.on("dragstart", () => listener.moved());
-    this.observer = new ResizeObserver(() => this.map.invalidateSize({ animate: false }));
+    // What is drawn stays under the pointer, whatever room the form beside the map takes.
+    this.observer = new ResizeObserver(() =>
+      this.map.invalidateSize({ animate: false, pan: !this.isDrawing }),
+    );
     this.observer.observe(host);
   }
 
@@ -156,14 +161,8 @@ export class MapView {
       if (isLarge) named.push({ element, size });
     });
     named.sort((one, other) => other.size - one.size);
-    const boxes = named.map(({ element }) => element.getBoundingClientRect());
-    const kept: DOMRect[] = [];
-    named.forEach(({ element, size }, index) => {
-      const box = boxes[index]!;
-      const hasRoom = !kept.some((other) => overlaps(box, other));
-      if (size < Infinity) element.classList.toggle("map-unnamed", !hasRoom);
-      if (hasRoom) kept.push(box);
-    });
+    const labels = named.map(({ element, size }) => ({ element, stays: size === Infinity }));
+    markCrowded(labels, "map-unnamed");
   }
 
   /** A former version beside what is there now, which stays as it is. */
@@ -232,7 +231,7 @@ export class MapView {
     const icon = L.divIcon({
       className: "map-vertex",
       html: String(index + 1),
-      iconSize: [22, 22],
+      iconSize: [handlePx(VERTEX_PX), handlePx(VERTEX_PX)],
     });
     const marker = L.marker(point, { icon, draggable: true, keyboard: false, zIndexOffset: 2000 });
     marker.on("drag", () => {
@@ -245,12 +244,6 @@ export class MapView {
     marker.addTo(this.drafted);
   }
 }
-
-const overlaps = (one: DOMRect, other: DOMRect): boolean =>
-  one.left < other.right &&
-  other.left < one.right &&
-  one.top < other.bottom &&
-  other.top < one.bottom;
 
 function layerOf({ kind, from, geometry }: Geometry): L.GeoJSON {
   const color = { fleet: OF_FLEET, operator: OF_OPERATOR, mission: OF_MISSION }[from];

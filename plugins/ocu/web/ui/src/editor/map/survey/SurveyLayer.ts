@@ -1,7 +1,7 @@
 // A survey on the map while its form is open: the routes, each in the colour of its vehicle, and a
 // handle that turns the passes.
 import L from "leaflet";
-import { placeOf, vertexOf } from "../../../map/baseMap";
+import { handlePx, placeOf, vertexOf } from "../../../map/baseMap";
 import type { Vertex } from "../../../map/draft";
 import { strings } from "../../../strings";
 import type { SurveyRoutes } from "./pattern";
@@ -81,7 +81,7 @@ export class SurveyLayer {
     const icon = L.divIcon({
       className: "survey-turn",
       html: `<b>${Math.round(shown.heading_deg)}°</b>`,
-      iconSize: [HANDLE_PX, HANDLE_PX],
+      iconSize: [handlePx(HANDLE_PX), handlePx(HANDLE_PX)],
     });
     const at = this.map.containerPointToLatLng(end);
     const marker = L.marker(at, { icon, draggable: true, keyboard: false, zIndexOffset: 3000 });
