@@ -261,12 +261,14 @@ dist: $(CREATED) ## build the wheels of m2pem and its plugins, into dist/
 docs: python-packages ## build the documentation into site/
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict
 
+PICTURED := mission_drawn first_mission editor_map editor_survey editor_terrain plots cameras fleet_page
+
 pictures: npm-packages page ## draw the missions and examples, and the web page, for the docs (needs Chromium)
 	@cd $(JS) && node draw_bpmn.mjs ../../docs/images ../../missions/*.bpmn && \
 	node draw_bpmn.mjs ../../docs/tutorials/patrol ../../docs/tutorials/patrol/*.bpmn && \
 	for example in ../../examples/*/; do node draw_bpmn.mjs "$$example" "$$example"*.bpmn; done
 	@$(BIN)/python -m tools.broken_mission_pictures
-	@M2PEM_PICTURES=1 $(BIN)/pytest --quiet plugins/ocu/web/tests/test_web_mission_drawn.py plugins/ocu/web/tests/test_web_plots.py plugins/ocu/web/tests/test_web_cameras.py plugins/ocu/web/tests/test_web_fleet_page.py
+	@M2PEM_PICTURES=1 $(BIN)/pytest --quiet $(PICTURED:%=plugins/ocu/web/tests/test_web_%.py)
 
 PEERS := .conformance
 
