@@ -192,7 +192,7 @@ async def run(author: Author, otto: Desk) -> None:
     await page.wait_for_url("**/runs/*")
     await otto.page.goto(page.url)
     go_on = page.get_by_role("button", name=re.compile("Continue")).first
-    await expect(go_on).to_be_visible(timeout=FLIGHT_MS)
+    await expect(go_on).to_be_enabled(timeout=FLIGHT_MS)
     await author.picture("question")
     await author.click(go_on)
     log = page.get_by_role("region", name="Events")
@@ -218,4 +218,6 @@ async def replay(author: Author) -> None:
     await expect(position).to_have_attribute("aria-valuetext", "0:00.0")
     await author.click(page.get_by_role("button", name="Play", exact=True))
     await expect(position).not_to_have_attribute("aria-valuetext", "0:00.0")
+    await position.fill("60")
+    await expect(position).to_have_attribute("aria-valuetext", re.compile(r"^1:"))
     await author.picture("replayed")
