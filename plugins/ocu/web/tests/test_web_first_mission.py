@@ -220,4 +220,6 @@ async def replay(author: Author) -> None:
     await expect(position).not_to_have_attribute("aria-valuetext", "0:00.0")
     await position.fill("60")
     await expect(position).to_have_attribute("aria-valuetext", re.compile(r"^1:"))
+    log = page.get_by_role("region", name="Events")
+    await expect(log).to_contain_text("uav2 begins return_to_launch")
     await author.picture("replayed")
