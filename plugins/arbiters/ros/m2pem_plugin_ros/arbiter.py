@@ -45,6 +45,10 @@ discovery."""
 NAMED_WITHIN_S = 2.5
 """It waits no longer than this for vehicles that are not there, or cannot be commanded."""
 
+DISCOVERY_S = 0.5
+"""It waits at least so long: a vehicle may be received before DDS has listed another one whose
+namespace is the same, and which would obey the same commands."""
+
 SEARCH_AFTER_S = 1.0
 """Vehicles that are not there by then are searched in other ROS domains."""
 
@@ -154,9 +158,9 @@ class RosArbiter:
     # --- life -----------------------------------------------------------------------------------
 
     async def connect(self) -> None:
-        """Subscribe to all vehicles. Return when each was received once and can be commanded. For
-        those that are not there or cannot, wait for `NAMED_WITHIN_S`, for silent ones for
-        `FIRST_CONTACT_WITHIN_S`.
+        """Subscribe to all vehicles. Return when each was received once and can be commanded, and
+        `DISCOVERY_S` have passed. For those that are not there or cannot, wait for
+        `NAMED_WITHIN_S`, for silent ones for `FIRST_CONTACT_WITHIN_S`.
 
         Raises:
             RosError: ROS, or a package of it that a driver needs, is not installed or not usable.
@@ -300,7 +304,8 @@ class RosArbiter:
             passed_s = loop.time() - began_s
             wrong = [vehicle for vehicle in self._vehicles.values() if vehicle.problem]
             silent = [v for v in self._vehicles.values() if not v.first_contact.is_set()]
-            if not (wrong or silent) or passed_s >= FIRST_CONTACT_WITHIN_S:
+            is_well = not (wrong or silent) and passed_s >= DISCOVERY_S
+            if is_well or passed_s >= FIRST_CONTACT_WITHIN_S:
                 break
             if passed_s >= NAMED_WITHIN_S and all(vehicle in wrong for vehicle in silent):
                 break

@@ -240,6 +240,16 @@ async def click_the_map(page: Page) -> None:
     await page.mouse.click(box["x"] + box["width"] * 0.7, box["y"] + box["height"] * 0.25)
 
 
+async def click_far_away(page: Page) -> None:
+    """Kilometres away: no vehicle is there before all are on their way."""
+    map_of_fleet = page.get_by_role("application", name="Map of the fleet")
+    scale = map_of_fleet.locator(".leaflet-control-scale-line").first
+    async with asyncio.timeout(TIMEOUT_MS / 1000):
+        while "km" not in await scale.inner_text():
+            await map_of_fleet.get_by_role("button", name="Zoom out").click()
+    await click_the_map(page)
+
+
 async def take_from_a_mission(day: Day) -> None:
     """What the mission does then is said before, and is an incident, which is decided."""
     anna = day.anna
@@ -335,7 +345,7 @@ async def stop_all_from_the_phone(day: Day, free: int) -> None:
     await anna.page.get_by_role("button", name=f"Free {free}", exact=True).click()
     await anna.page.get_by_role("checkbox", name="Select all that are shown").check()
     await anna.command("Goto…")
-    await click_the_map(anna.page)
+    await click_far_away(anna.page)
     await anna.command("Give the command")
     confirm = anna.page.get_by_role("dialog", name=re.compile(r"^Goto: \d+ vehicles$"))
     await confirm.get_by_role("button", name="Give the command").click()
