@@ -22,10 +22,10 @@ EXAMPLE = Path(__file__).parents[4] / "examples" / "t23_own_ros_vehicle"
 HOME = (38.1075, -77.3192)
 METRES_PER_DEGREE = 111_320.0
 FASTER = 20.0
-MISSION_SPEED = 10.0
+MISSION_SPEED = 5.0
 """Whoever is silent for 3 s of a clock that is faster is lost on a busy machine."""
 
-PATIENCE_S = 60.0
+PATIENCE_S = 120.0
 
 ACCEPTED, RUNNING, SUCCEEDED = (
     BehaviorStatus.ACCEPTED,
