@@ -33,9 +33,11 @@ FILES_AT_ONCE = 2
 
 MAX_FILE_NAME = 255
 FILE_BODY = {
-    "required": True,
+    "required": False,
     "content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}},
 }
+"""An empty file has no body, and is read: the answer says what is wrong with it."""
+
 MEDIA_TYPES = {
     FileFormat.GEOJSON: "application/geo+json",
     FileFormat.KML: "application/vnd.google-earth.kml+xml",
