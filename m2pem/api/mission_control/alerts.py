@@ -49,7 +49,7 @@ class AlertControl(Protocol):
         """Decide about an incident: one of its `choices`. The first one that ends it wins.
 
         `data`: what `set_data` writes. `to`: the element or sequence flow that `move` goes to.
-        `roles`: who fills roles instead, by `retry_with`; a team stands for its members.
+        `roles`: who fills roles instead, by `retry_with`; a team means all of its members.
         `even_if_stuck`: an operator has confirmed a choice after which the mission cannot complete.
 
         Raises:

@@ -16,13 +16,13 @@ class ExecutiveControl(Protocol):
     """The operations of `MissionControl` on the executive itself."""
 
     async def switch_over(self, *, by: str = "") -> ExecutiveAddress:
-        """Leave every run, as it is, to the executive that stands by, and end; returns which one.
+        """Leave every run, as it is, to the standby executive, and end; returns which one.
 
         Vehicles go on with what they do. The standby takes the runs up as those of an executive
         that was killed.
 
         Raises:
-            OperatorError: no executive stands by. Nothing has changed then.
+            OperatorError: there is no standby executive. Nothing has changed then.
             JournalError: the journal cannot say which one does.
         """
         ...

@@ -17,7 +17,7 @@ class OperatorControl(Protocol):
         """Ask the operator who has taken a vehicle or payload for it.
 
         Within the fleet's `hand_over: answer_within` the holder gives it or refuses; afterwards it
-        stays, or goes to `by`, as the fleet says. All operators are told.
+        stays, or goes to `by`, as the fleet says. All operators see the request.
 
         Raises:
             OperatorError: no other operator has it, or one asks for it already.

@@ -61,7 +61,7 @@ class WatchControl(Protocol):
         ...
 
     async def mission_time_s(self, run: RunId) -> float:
-        """Seconds from the start of a run that has not ended; stands during a pause."""
+        """Seconds from the start of a run that has not ended; does not advance during a pause."""
         ...
 
     async def wait(self, run: RunId) -> RunSummary:

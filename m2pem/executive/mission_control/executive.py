@@ -15,7 +15,7 @@ class ExecutiveOperations(ControlParts):
     """See `m2pem.api.mission_control.executive.ExecutiveControl`."""
 
     async def switch_over(self, *, by: str = "") -> ExecutiveAddress:
-        """Leave every run, as it is, to the executive that stands by, and end."""
+        """Leave every run, as it is, to the standby executive, and end."""
         return await self._switchover.ask(by)
 
     async def standbys(self) -> Sequence[ExecutiveAddress]:

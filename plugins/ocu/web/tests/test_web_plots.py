@@ -95,7 +95,7 @@ async def test_a_click_into_the_plots_of_a_replay_goes_to_that_time(desk: Desk) 
     await times.press("Home")
     await times.press("Enter")
     await expect(position).to_have_attribute("aria-valuetext", "0:00.0")
-    # Without colours, too, each line is told from the others.
+    # Without colours, too, each line differs from the others.
     assert len(await pane.evaluate(LINES)) == 1
     await page.emulate_media(contrast="more")
     await page.wait_for_function(f"() => ({LINES})(document).length === 2")

@@ -1,4 +1,4 @@
-"""States are told apart where the system has its own colours, or a person sees none."""
+"""States can be distinguished where the system has its own colours, or a person sees none."""
 
 import json
 import re

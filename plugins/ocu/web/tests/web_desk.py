@@ -164,7 +164,7 @@ def executive(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
 async def signed_in(
     chromium: Browser, executive: Served, name: str, **screen: Any
 ) -> AsyncIterator[Desk]:
-    """The desk of somebody who has a browser profile of their own and has just signed in.
+    """The desk of a person who has a browser profile of their own and has just signed in.
 
     `screen`: as for `page_at`.
     """

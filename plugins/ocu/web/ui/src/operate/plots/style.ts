@@ -1,4 +1,4 @@
-// Lines that can be told apart: by colour, and by dashes where there are more of them than colours;
+// Lines that can be distinguished: by colour, and by dashes where there are more of them than colours;
 // by dashes and widths alone in high contrast, and where the system has its own colours (forced colours).
 import { computed, signal } from "@preact/signals";
 import { theme } from "../../shared/theme";
