@@ -134,6 +134,32 @@ def _run_resumed(view: RunView, record: r.RunResumed) -> _Sentence:
     return f"{view.run} resumed{_by(record)}", Importance.NORMAL
 
 
+def _breakpoints_set(view: RunView, record: r.BreakpointsSet) -> _Sentence:
+    if record.step:
+        return f"{view.run} makes one step{_by(record)}", Importance.DETAIL
+    where = [view.label(each) for each in record.elements]
+    where += [f"when {each}" for each in record.conditions]
+    text = f"breakpoints: {', '.join(where)}" if where else "no breakpoints any more"
+    return f"{text}{_by(record)}", Importance.NORMAL
+
+
+_REACHED = {
+    r.StopReason.BREAKPOINT: "breakpoint at {place}",
+    r.StopReason.CONDITION: "{condition} has become true; next is {place}",
+    r.StopReason.STEP: "next is {place}",
+}
+
+
+def _breakpoint_reached(view: RunView, record: r.BreakpointReached) -> _Sentence:
+    place = view.label(record.element) if record.element else "what comes from outside"
+    text = _REACHED[record.reason].format(place=place, condition=record.condition)
+    return text, Importance.WARNING
+
+
+def _operator_set_data(view: RunView, record: r.OperatorSetData) -> _Sentence:
+    return f"data of {view.label(record.element)} changed{_by(record)}", Importance.WARNING
+
+
 def _run_ended(view: RunView, record: r.RunEnded) -> _Sentence:
     good = record.outcome in (r.RunOutcome.COMPLETED, r.RunOutcome.TERMINATED)
     text = f"{view.run} {record.outcome.value}{_after_colon(record.detail)}"
@@ -457,6 +483,9 @@ _SENTENCES: dict[type, Callable[[RunView, Any], _Sentence]] = {
     r.RunClaimed: _run_claimed,
     r.RunPaused: _run_paused,
     r.RunResumed: _run_resumed,
+    r.BreakpointsSet: _breakpoints_set,
+    r.BreakpointReached: _breakpoint_reached,
+    r.OperatorSetData: _operator_set_data,
     r.RunEnded: _run_ended,
     r.InputIgnored: _input_ignored,
     r.InputDeferred: _input_deferred,
@@ -517,6 +546,8 @@ _KINDS: dict[type, Kind] = {
             r.RunClaimed,
             r.RunPaused,
             r.RunResumed,
+            r.BreakpointsSet,
+            r.BreakpointReached,
             r.RunEnded,
             r.RunYielded,
             r.InputIgnored,
@@ -529,6 +560,7 @@ _KINDS: dict[type, Kind] = {
             r.ControlRequested,
             r.ControlRequestEnded,
             r.OperatorNote,
+            r.OperatorSetData,
             r.GeometryReceived,
         ),
         Kind.BEHAVIORS: (

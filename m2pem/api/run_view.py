@@ -203,6 +203,10 @@ class RunView:
         """Mission time of the last record."""
         self.newest: deque[StampedRecord] = deque(maxlen=NEWEST)
         self.paused_by = ""
+        self.breakpoints: r.BreakpointsSet | None = None
+        """Where the run is paused to look at it; None: nowhere."""
+        self.reached: r.BreakpointReached | None = None
+        """The breakpoint at which the run is paused."""
         self.elements: dict[Place, ElementState] = {}
         self.scopes: dict[int, Scope] = {}
         self.tokens: dict[int, Token] = {}
@@ -361,7 +365,14 @@ class RunView:
         self._paused_us += max(0, record.at_us - self._paused_at_us)
         self._paused_at_us = 0
         self.paused_by = ""
+        self.reached = None
         self._update(status=RunStatus.RUNNING)
+
+    def _set_breakpoints(self, record: r.BreakpointsSet) -> None:
+        self.breakpoints = record if record.elements or record.conditions else None
+
+    def _reach_breakpoint(self, record: r.BreakpointReached) -> None:
+        self.reached = record
 
     def _end(self, record: r.RunEnded) -> None:
         self._update(
@@ -651,6 +662,8 @@ _FOLDS: dict[type, Callable[[RunView, Any], None]] = {
     r.RunClaimed: RunView._claim,
     r.RunPaused: RunView._pause,
     r.RunResumed: RunView._resume,
+    r.BreakpointsSet: RunView._set_breakpoints,
+    r.BreakpointReached: RunView._reach_breakpoint,
     r.RunEnded: RunView._end,
     r.OperatorTookControl: RunView._take,
     r.OperatorGaveControlBack: RunView._give_back,

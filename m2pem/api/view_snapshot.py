@@ -49,6 +49,8 @@ class _Snapshot(msgspec.Struct, array_like=True):
     seq: int
     t_s: float
     paused_by: str
+    breakpoints: r.BreakpointsSet | None
+    reached: r.BreakpointReached | None
     paused_us: int
     paused_at_us: int
     elements: list[tuple[Place, ElementState]]
@@ -82,6 +84,8 @@ def snapshot_of(view: RunView) -> bytes:
             view.seq,
             view.t_s,
             view.paused_by,
+            view.breakpoints,
+            view.reached,
             view._paused_us,
             view._paused_at_us,
             list(view.elements.items()),
@@ -118,6 +122,7 @@ def view_of(
     view = RunView(read.summary, mission, names)
     view.seq, view.t_s = read.seq, read.t_s
     view.paused_by = read.paused_by
+    view.breakpoints, view.reached = read.breakpoints, read.reached
     view._paused_us, view._paused_at_us = read.paused_us, read.paused_at_us
     view.elements = dict(read.elements)
     view.scopes = read.scopes

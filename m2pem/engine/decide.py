@@ -11,6 +11,7 @@ from typing import Any
 from m2pem.engine import inputs as i
 from m2pem.engine import records as r
 from m2pem.engine.arming import arm_entered, next_timer
+from m2pem.engine.breakpoints import set_breakpoints, set_data
 from m2pem.engine.data import flatten
 from m2pem.engine.elements.activities import complete
 from m2pem.engine.elements.allocations import resources_chosen, resources_not_free
@@ -31,7 +32,7 @@ from m2pem.engine.lifecycle import Admission, admission
 from m2pem.engine.records import RunOutcome
 from m2pem.engine.resolving import resolve_incident, why_refused
 from m2pem.engine.scopes import end_run
-from m2pem.engine.state import BehaviorPhase
+from m2pem.engine.state import BehaviorPhase, RunStatus
 from m2pem.engine.steps import Steps
 from m2pem.engine.throwing import throw_error
 from m2pem.engine.triggering import (
@@ -43,7 +44,15 @@ from m2pem.engine.triggering import (
 )
 from m2pem.mission.elements import Activity
 
-_THROW_NOTHING = (i.Continue, i.StopRun, i.PauseRun, i.ClaimRun, i.GeometrySet, i.OperatorNoted)
+_THROW_NOTHING = (
+    i.Continue,
+    i.StopRun,
+    i.PauseRun,
+    i.SetBreakpoints,
+    i.ClaimRun,
+    i.GeometrySet,
+    i.OperatorNoted,
+)
 
 
 def decide(x: Steps, item: i.Input) -> None:
@@ -88,6 +97,9 @@ def _start(x: Steps, item: i.StartRun) -> None:
         x.ignore(f"the mission has no process {item.process!r}")
         return
     x.emit(r.RunStarted(process.id, x.now_us, item.by))
+    if item.step:
+        x.emit(r.BreakpointsSet(step=True, by=item.by))
+        x.look_for_breakpoints()
     for resource, holder in item.taken.items():
         x.emit(r.OperatorTookControl(resource, holder))
     x.emit(r.ScopeOpened(1, process.id, process.id))
@@ -114,13 +126,32 @@ def _pause(x: Steps, item: i.PauseRun) -> None:
     x.emit(r.RunPaused(x.now_us, item.by))
 
 
-def _resume(x: Steps, item: i.ResumeRun) -> None:
+def _resume(x: Steps, item: i.ResumeRun, steps: int = 0) -> None:
     deferred = list(x.state.deferred)
     x.emit(r.RunResumed(x.now_us, item.by))
+    x.look_for_breakpoints()
+    if x.pausing is not None:
+        x.pausing.steps = steps
     x.reload_queue()
+    # A breakpoint may have paused it before these were looked at, and an operator may have changed
+    # data since; another process may go on with it.
+    x.joins_to_check.update(x.state.scopes)
+    x.data_changed = True
     for late in deferred:
         x.run_steps()
         decide(x, late)
+
+
+def _step(x: Steps, item: i.StepRun) -> None:
+    there = x.state.breakpoints
+    elements, conditions = (sorted(there.elements), there.conditions) if there else ((), ())
+    x.emit(r.BreakpointsSet(tuple(elements), conditions, True, item.by))
+    _resume(x, i.ResumeRun(item.by), steps=1)
+
+
+def _set_breakpoints(x: Steps, item: i.SetBreakpoints) -> None:
+    set_breakpoints(x, item)
+    x.look_for_breakpoints()
 
 
 def _continue(x: Steps, item: i.Continue) -> None:
@@ -135,7 +166,7 @@ def _tick(x: Steps, item: i.Tick) -> None:
         fired = True
         trigger(x, due[1], {})
         x.run_steps()
-        if x.queue or x.entered:
+        if x.queue or x.entered or x.state.status is not RunStatus.RUNNING:
             return
     if not fired:
         x.ignore("no timer is due")
@@ -280,6 +311,9 @@ _DECIDERS: dict[type, Callable[[Steps, Any], None]] = {
     i.StopRun: _stop,
     i.PauseRun: _pause,
     i.ResumeRun: _resume,
+    i.SetBreakpoints: _set_breakpoints,
+    i.StepRun: _step,
+    i.SetData: set_data,
     i.Tick: _tick,
     i.Continue: _continue,
     i.GiveUp: _give_up,

@@ -97,6 +97,8 @@ class Execution:
         "_reach",
         "_receivable",
         "_triggered_starts",
+        "at_breakpoints",
+        "breakpoints",
         "data_changed",
         "ended_instances",
         "entered",
@@ -122,6 +124,8 @@ class Execution:
         self.entered: deque[Token] = deque()  # at elements that wait: they come before the queue
         self.ended_instances: deque[tuple[Token, TokenOutcome]] | None = None
         self.joins_to_check: set[int] = set()  # scopes whose inclusive joins must be checked
+        self.breakpoints: frozenset[str] = frozenset()
+        self.at_breakpoints: list[Token] = []  # they have entered elements with breakpoints
         self.steps_left = 0  # steps that the batch still allows
         self.data_changed = False  # whether conditions must be evaluated before the next step
         self.process_ids = [node.container.process.id for node in self.mission.nodes]
@@ -207,6 +211,8 @@ class Execution:
             )
         )
         entered = self.state.tokens[token]
+        if node.id in self.breakpoints:
+            self.at_breakpoints.append(entered)
         if instance is None and node not in self.waits:
             self.queue.append(entered)
         else:
@@ -316,8 +322,11 @@ class Execution:
 
     def write_in(self, scope: Scope, node: FlowNode, data: dict[str, Value]) -> None:
         """Write values for a node without a token, as seen from a scope."""
+        self.write_at(scope, self.process_ids[node.index], node.id, data)
+
+    def write_at(self, scope: Scope, process: str, element: str, data: dict[str, Value]) -> None:
+        """The same for an element by its id, which may be the scope's own process."""
         self.data_changed = True
-        process = self.process_ids[node.index]
         for key, value in data.items():
             for name, item in flatten(key, value):
                 place = store_for(scope, name)
@@ -326,7 +335,7 @@ class Execution:
                     own, store = place.id, place.scope.id
                 elif isinstance(place, Scope):
                     store = place.id
-                self.emit(r.DataWritten(0, process, node.id, scope.id, name, item, store, own))
+                self.emit(r.DataWritten(0, process, element, scope.id, name, item, store, own))
 
     def write_all(self, token: Token, data: dict[str, Value]) -> None:
         """Write several values."""

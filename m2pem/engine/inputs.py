@@ -39,13 +39,15 @@ class _Input(
 class StartRun(_Input, frozen=True):
     """Begin: one token for each start event of the process, and the data given at start.
 
-    `taken`: resources that operators have at that moment, and who has each.
+    `taken`: resources that operators have at that moment, and who has each. `step`: the run is
+    paused before its first step.
     """
 
     process: str
     data: dict[str, Value] = msgspec.field(default_factory=dict)
     by: str = ""
     taken: dict[str, str] = msgspec.field(default_factory=dict)
+    step: bool = False
 
 
 class ClaimRun(_Input, frozen=True):
@@ -76,6 +78,31 @@ class PauseRun(_Input, frozen=True):
 class ResumeRun(_Input, frozen=True):
     """Go on after a pause."""
 
+    by: str = ""
+
+
+class SetBreakpoints(_Input, frozen=True):
+    """Pause the run from now on where a token has come to one of `elements`, and when one of
+    `conditions` (expressions over the data of any active process or subprocess) has become true;
+    in place of those that were set before."""
+
+    elements: tuple[str, ...] = ()
+    conditions: tuple[str, ...] = ()
+    by: str = ""
+
+
+class StepRun(_Input, frozen=True):
+    """Go on after a pause for one step of a token: the run is paused again before the next."""
+
+    by: str = ""
+
+
+class SetData(_Input, frozen=True):
+    """An operator writes `data` where the scope sees it, while the run is paused. `scope`: 0 is the
+    process that the run began with."""
+
+    data: dict[str, Value]
+    scope: int = 0
     by: str = ""
 
 
@@ -301,6 +328,9 @@ Input: TypeAlias = Union[
     StopRun,
     PauseRun,
     ResumeRun,
+    SetBreakpoints,
+    StepRun,
+    SetData,
     Tick,
     Continue,
     GiveUp,

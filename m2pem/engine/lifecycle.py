@@ -1,12 +1,12 @@
 """The life cycle of a run, and which inputs it takes in which status.
 
-    NEW --StartRun--> RUNNING <--PauseRun / ResumeRun--> PAUSED
+    NEW --StartRun--> RUNNING <--PauseRun, a breakpoint / ResumeRun, StepRun--> PAUSED
     RUNNING, PAUSED --StopRun, or what the mission does--> ENDED
 
 * NEW takes only StartRun.
-* PAUSED takes ResumeRun, StopRun, GiveUp and what changes nothing in the mission (a claim, a
-  geometry, a note). It ignores ticks. Every other input is deferred: journaled now, decided at
-  resume.
+* PAUSED takes ResumeRun, StepRun, StopRun, GiveUp, what is changed for debugging (breakpoints,
+  data), and what changes nothing in the mission (a claim, a geometry, a note). It ignores ticks.
+  Every other input is deferred: journaled now, decided at resume.
 * ENDED takes only claims, and what ends behaviors that are still being cancelled.
 * An input that is not taken is ignored with a reason; it is never an error.
 
@@ -27,7 +27,10 @@ from m2pem.engine.inputs import (
     PauseRun,
     ResourceFault,
     ResumeRun,
+    SetBreakpoints,
+    SetData,
     StartRun,
+    StepRun,
     StopRun,
     Tick,
 )
@@ -44,13 +47,21 @@ class Admission(Enum):
 
 _EXCEPTIONS: dict[RunStatus, dict[type, Admission]] = {
     RunStatus.NEW: {StartRun: Admission.DECIDE},
-    RunStatus.RUNNING: {StartRun: Admission.IGNORE, ResumeRun: Admission.IGNORE},
+    RunStatus.RUNNING: {
+        StartRun: Admission.IGNORE,
+        ResumeRun: Admission.IGNORE,
+        StepRun: Admission.IGNORE,
+        SetData: Admission.IGNORE,
+    },
     RunStatus.PAUSED: {
         StartRun: Admission.IGNORE,
         PauseRun: Admission.IGNORE,
         Tick: Admission.IGNORE,
         Continue: Admission.IGNORE,
         ResumeRun: Admission.DECIDE,
+        SetBreakpoints: Admission.DECIDE,
+        StepRun: Admission.DECIDE,
+        SetData: Admission.DECIDE,
         StopRun: Admission.DECIDE,
         GiveUp: Admission.DECIDE,
         ClaimRun: Admission.DECIDE,

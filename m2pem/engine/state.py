@@ -355,6 +355,14 @@ class KeptMessage:
     keys: dict[str, Value]
 
 
+@dataclass(frozen=True, slots=True)
+class Breakpoints:
+    """Where a run is paused. Fields as in record `BreakpointsSet`."""
+
+    elements: frozenset[str]
+    conditions: tuple[str, ...]
+
+
 @dataclass(slots=True, eq=False)
 class RunState:
     """The state of a run. Times are microseconds: `_us` since the Unix epoch unless said
@@ -420,6 +428,9 @@ class RunState:
     kept_messages: dict[str, list[KeptMessage]] = field(default_factory=dict)
     """Messages that no receiver waits for yet, by message id; first come first."""
 
+    breakpoints: Breakpoints | None = None
+    stepping: bool = False
+    """It is paused before the next step."""
     geometries: dict[str, dict[str, Value]] = field(default_factory=dict)
     deferred: list[Input] = field(default_factory=list)
     yielded: tuple[int, ...] = ()

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 
 from m2pem.engine import records as r
 from m2pem.engine.arming import arm_next, condition_fires
+from m2pem.engine.breakpoints import Pausing
 from m2pem.engine.elements import HANDLERS
 from m2pem.engine.elements.activities import activate_later
 from m2pem.engine.elements.gateways import fire_joins
@@ -23,7 +24,7 @@ _ACTIVATE = {kind: handler.activate for kind, handler in HANDLERS.items()}
 class Steps(Execution):
     """An execution with its loop. `batch`: steps that one input may cause before a yield."""
 
-    __slots__ = ("batch", "steps_done")
+    __slots__ = ("batch", "pausing", "steps_done")
 
     handlers = HANDLERS
 
@@ -32,13 +33,21 @@ class Steps(Execution):
         self.batch = batch
         self.steps_left = batch
         self.steps_done = 0
+        self.pausing: Pausing | None = None  # a run that is not debugged has none
 
     def begin(self, now_us: int) -> None:
         """Prepare for an input that came at `now_us`; steps left over come first."""
         self.now_us = now_us
         self.steps_left = self.batch
+        self.look_for_breakpoints()
         if self.state.yielded and self.state.status is RunStatus.RUNNING:
             self.reload_queue()
+
+    def look_for_breakpoints(self) -> None:
+        """Follow the breakpoints that the state has from now on."""
+        there = self.state.breakpoints
+        self.breakpoints = there.elements if there is not None else frozenset()
+        self.pausing = Pausing(self) if there is not None or self.state.stepping else None
 
     def run_steps(self) -> None:
         """Execute tokens until none can move, or the batch is used up."""
@@ -47,6 +56,8 @@ class Steps(Execution):
             while queue or entered or self.data_changed:
                 # Tokens that are armed at once count, too: their number may double at each turn.
                 if self.steps_left <= 0 and self._has_steps():
+                    if self.pausing is not None:
+                        self.pausing.pauses(queue)
                     return
                 if entered:
                     self.steps_left -= 1
@@ -56,6 +67,8 @@ class Steps(Execution):
                     self.data_changed = False
                     self._fire_conditions()
                     continue
+                if self.pausing is not None and self.pausing.pauses_before(queue):
+                    return
                 if not queue:
                     break
                 item = queue.popleft()
@@ -68,6 +81,8 @@ class Steps(Execution):
                     assert isinstance(item, Scope)
                     self.steps_left -= 1
                     check_scope(self, item)
+            if self.pausing is not None and self.pausing.pauses_before(queue):
+                return
             if not fire_joins(self):
                 return
 

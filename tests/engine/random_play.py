@@ -114,6 +114,7 @@ class RandomPlay:
     def finish(self) -> None:
         """Let all that is awaited come well, in order, until the run ends or waits for an event."""
         state = self.play.run.state
+        self.give(i.SetBreakpoints())
         for _ in range(60):
             if state.status is RunStatus.ENDED or self.play.run.wants_continue:
                 return
@@ -178,6 +179,14 @@ class RandomPlay:
         add(i.PauseRun())
         add(i.ResumeRun())
         add(i.ResumeRun())
+        elements = [node.id for node in self.play.mission.nodes]
+        add(i.SetBreakpoints(tuple(elements[len(self.play.steps) % len(elements) :: 3])))
+        add(i.SetBreakpoints((), ("a == 2", "b > 1")))
+        add(i.SetBreakpoints())
+        add(i.StepRun())
+        add(i.StepRun())
+        add(i.SetData({"a": 2, "b": 0}))
+        add(i.SetData({"a": 1}, max(state.scopes, default=0)))
         add(i.ClaimRun(state.epoch + 1))
         add(i.Tick())
         add(i.GeometrySet("alpha", {"type": "Point", "coordinates": [1.0, 2.0]}))

@@ -6,6 +6,7 @@ from typing import Any
 from m2pem.engine.state import (
     AllocationRequest,
     Behavior,
+    Breakpoints,
     Compensation,
     CompletedActivity,
     DataStores,
@@ -71,7 +72,7 @@ def _plain(value: object) -> object:
         return value.id
     if isinstance(value, _OBJECTS):
         return f"{type(value).__name__} {value.id}"
-    if isinstance(value, (KeptMessage, Loop, Loss, LostWork, OutOfReach, DataStores)):
+    if isinstance(value, (Breakpoints, KeptMessage, Loop, Loss, LostWork, OutOfReach, DataStores)):
         return [(each.name, _plain(getattr(value, each.name))) for each in fields(value)]
     if isinstance(value, Join):
         return _plain(value.by_flow)

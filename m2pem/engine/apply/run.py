@@ -3,6 +3,7 @@
 from m2pem.engine import records as r
 from m2pem.engine.apply.tasks import end_loss
 from m2pem.engine.state import (
+    Breakpoints,
     ControlRequest,
     RunState,
     RunStatus,
@@ -29,12 +30,21 @@ def run_claimed(state: RunState, record: r.RunClaimed) -> None:
 def run_paused(state: RunState, record: r.RunPaused) -> None:
     state.status = RunStatus.PAUSED
     state.paused_at_us = record.at_us
+    state.stepping = False
 
 
 def run_resumed(state: RunState, record: r.RunResumed) -> None:
     state.status = RunStatus.RUNNING
     state.paused_total_us += record.at_us - state.paused_at_us
     state.deferred.clear()
+
+
+def breakpoints_set(state: RunState, record: r.BreakpointsSet) -> None:
+    wanted = record.elements or record.conditions
+    state.breakpoints = (
+        Breakpoints(frozenset(record.elements), record.conditions) if wanted else None
+    )
+    state.stepping = record.step
 
 
 def run_ended(state: RunState, record: r.RunEnded) -> None:

@@ -1,8 +1,18 @@
 """Records about the run as a whole."""
 
+from enum import StrEnum
+
 from m2pem.engine.inputs import Input, RequestOutcome
 from m2pem.engine.records.base import BaseRecord, RunOutcome
 from m2pem.mission.values import Value
+
+
+class StopReason(StrEnum):
+    """Why a run is paused that is being debugged."""
+
+    BREAKPOINT = "breakpoint"
+    CONDITION = "condition"
+    STEP = "step"
 
 
 class RunStarted(BaseRecord, frozen=True):
@@ -33,6 +43,38 @@ class RunPaused(BaseRecord, frozen=True):
 
 class RunResumed(BaseRecord, frozen=True):
     at_us: int
+    by: str = ""
+
+
+class BreakpointsSet(BaseRecord, frozen=True):
+    """Where the run is paused from now on, in place of what was set before. `step`: also before the
+    next step."""
+
+    elements: tuple[str, ...] = ()
+    conditions: tuple[str, ...] = ()
+    step: bool = False
+    by: str = ""
+
+
+class BreakpointReached(BaseRecord, frozen=True):
+    """The run is paused next, as a token is on an element with a breakpoint, as a condition has
+    become true, or because it was to make one step. `token`, `process`, `element`, `scope`: what
+    would be executed now; 0 and "": nothing would. `condition`: what has become true."""
+
+    reason: StopReason
+    token: int = 0
+    process: str = ""
+    element: str = ""
+    scope: int = 0
+    condition: str = ""
+
+
+class OperatorSetData(BaseRecord, frozen=True):
+    """An operator has changed the data of a paused run; `DataWritten` follows for each value."""
+
+    process: str
+    element: str
+    scope: int
     by: str = ""
 
 
