@@ -36,6 +36,7 @@ COMMANDS = {
     "check": "Check a mission file, alone or against a fleet.",
     "verify": "Prove properties and requirements of a mission, or show a run that violates them.",
     "simulate": "Rehearse a mission on a virtual clock.",
+    "debug": "Rehearse a mission step by step: stop, look, change, go back.",
     "runs": "List the runs of a journal.",
     "export": "Export runs for other programs.",
     "journal": "Show the state of a journal, check it, back it up, salvage or compact it.",

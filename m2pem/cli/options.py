@@ -1,6 +1,6 @@
 """Options that several commands have."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -78,7 +78,12 @@ process_option = click.option(
 )
 
 
-def _read_data(_: click.Context, __: click.Parameter, words: tuple[str, ...]) -> "dict[str, Value]":
+def read_data(words: Sequence[str]) -> "dict[str, Value]":
+    """Return what words NAME=VALUE say; a value is YAML 1.2.
+
+    Raises:
+        click.BadParameter: one is wrong, or a name is given twice.
+    """
     if not words:
         return {}
     from m2pem.api.data_text import named_value
@@ -101,7 +106,7 @@ def _data_option(data: str) -> Callable[[F], F]:
         "--data",
         metavar="NAME=VALUE",
         multiple=True,
-        callback=_read_data,
+        callback=lambda _, __, words: read_data(words),
         help=f"Data that {data}; the value is YAML 1.2. Can be given again.",
     )
 

@@ -414,10 +414,19 @@ class Executive:
         return self._starter.approvals
 
     async def begin(
-        self, loaded: Mission, process_id: str, data: Mapping[str, Value] | None, by: str
+        self,
+        loaded: Mission,
+        process_id: str,
+        data: Mapping[str, Value] | None,
+        by: str,
+        *,
+        step: bool = False,
     ) -> RunId:
-        """Begin a run of a mission that was admitted. Returns when its beginning is durable."""
-        return await self._starter.begin(loaded, process_id, data, by)
+        """Begin a run of a mission that was admitted. Returns when its beginning is durable.
+
+        `step`: it is paused before its first step.
+        """
+        return await self._starter.begin(loaded, process_id, data, by, step=step)
 
     def expect_interrupted(self, runs: Sequence[RunId]) -> None:
         """Say, before it connects, which runs are taken up first: none begins before that."""

@@ -234,13 +234,14 @@ class RunStarter:
         still: Callable[[], bool] = lambda: True,
         lent: Collection[ResourceId] = (),
         direct: bool = False,
+        step: bool = False,
     ) -> RunId:
         """Begin a run of a mission that was admitted. Returns when its beginning is durable.
 
         `started`: the new state of the entry of the schedule that starts it. `still`: whether it
         may begin, asked when the journal has created it. `lent`: what the operator who starts it
         has taken, and lets it command. `direct`: it is one behavior that is commanded from outside
-        of a mission, which nobody approves.
+        of a mission, which nobody approves. `step`: it is paused before its first step.
 
         Raises:
             NotApprovedError: persons must approve it before.
@@ -281,7 +282,7 @@ class RunStarter:
         run = MissionRun(loaded, supervisor.fleet, number, supervisor.settings.steps_at_once)
         runner = supervisor.add(run, 1)
         begun = runner.submit(
-            StartRun(process_id, dict(data or {}), by, supervisor.handover.by_name(lent))
+            StartRun(process_id, dict(data or {}), by, supervisor.handover.by_name(lent), step)
         )
         for geometry in supervisor.geometries_given(loaded):
             runner.post(geometry)

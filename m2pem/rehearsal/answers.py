@@ -68,6 +68,14 @@ class Answers:
         self._resolving = 0
         self._to_send = len(self.model.signals) + len(self.model.messages)
 
+    def script_next(self, run: str, change: AnswersModel) -> None:
+        """Let the next visits of elements in a run go as `change` says; then comes what the file
+        says of visits that were to be next. Signals and messages are left out."""
+        for section in ("answers", "services", "behaviors", "incidents"):
+            for key, entries in getattr(change, section).items():
+                place = len(self._visits.get((run, section, key), {}))
+                getattr(self.model, section).setdefault(key, [])[place:place] = entries
+
     # --- visits ---------------------------------------------------------------------------------
 
     def seen(self, run: str, records: Sequence[Record]) -> None:

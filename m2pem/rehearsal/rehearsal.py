@@ -5,11 +5,13 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
+from typing import Protocol
 
 from m2pem.api.authoring import MissionSource
 from m2pem.api.clock import VirtualClock, run_virtual
 from m2pem.api.runs import RunStatus, RunSummary, SimulationResult, StampedRecord, TelemetrySample
 from m2pem.api.telemetry import PayloadState, VehicleState
+from m2pem.engine.incidents import incident_holding
 from m2pem.engine.inputs import GiveUp
 from m2pem.engine.run import MissionRun
 from m2pem.engine.state import BehaviorPhase
@@ -37,6 +39,7 @@ from m2pem.plugins import PluginManager
 from m2pem.rehearsal.answers import Answers, check_answers, load_answers
 from m2pem.rehearsal.answers_file import ServiceEntry
 from m2pem.rehearsal.scripted import ScriptedPlugins
+from m2pem.simulation.arbiters import SimArbiter
 from m2pem.units import US_PER_S
 
 NO_FLEET = Fleet("", "no fleet", {})
@@ -188,9 +191,9 @@ def rehearse(
         refuse_commands(loaded)
         fleet = NO_FLEET
     script = answers if isinstance(answers, Answers) else _load(answers)
-    _refuse_misfits(script, loaded)
+    refuse_misfits(script, loaded)
     collected: list[StampedRecord] = []
-    rehearsal = _Rehearsal(
+    rehearsal = Rehearsal(
         loaded,
         fleet,
         plugins,
@@ -210,13 +213,29 @@ def _load(answers: Path | str | bytes | None) -> Answers:
     return Answers() if answers is None else load_answers(answers)
 
 
-def _refuse_misfits(answers: Answers, mission: Mission) -> None:
+def refuse_misfits(answers: Answers, mission: Mission) -> None:
+    """Refuse answers for elements, decisions, signals and messages that a mission does not have.
+
+    Raises:
+        AnswersError: with every finding.
+    """
     findings = check_answers(answers, mission)
     if has_errors(findings):
         raise AnswersError(f"{answers.source.file} does not fit {mission.file}", findings)
 
 
-class _Rehearsal:
+class Debugger(Protocol):
+    """Steers a rehearsal from outside: `m2pem.rehearsal.debugging`."""
+
+    def acts(self, runner: Runner, simulated: Sequence[SimArbiter], now_us: int) -> bool:
+        """Is called when nothing is ready, before time advances. Whether it has posted an input.
+
+        `now_us`: microseconds since the Unix epoch, by the virtual clock.
+        """
+        ...
+
+
+class Rehearsal:
     """One rehearsed run, from its beginning to its end."""
 
     def __init__(
@@ -229,8 +248,11 @@ class _Rehearsal:
         on_record: OnRecord,
         observed: bool,
         telemetry_every_s: float | None,
+        debugger: "Debugger | None" = None,
     ) -> None:
         self.samples: Sequence[TelemetrySample] = ()
+        self._debugger = debugger
+        self._holding: list[asyncio.Future[None]] = []
         self._every_s = telemetry_every_s
         self._mission = mission
         self._fleet = fleet
@@ -260,8 +282,12 @@ class _Rehearsal:
         )
         process_id, _ = executive.admit(self._mission, process, data)
         async with executive:
-            run = await executive.begin(self._mission, process_id, data, "")
+            step = self._debugger is not None
+            run = await executive.begin(self._mission, process_id, data, "", step=step)
             runner = executive.runner(run)
+            if self._debugger is not None:
+                state = runner.run.state
+                self._scripted.holds_wait = lambda: state.status is EngineStatus.PAUSED
             sampler = self._sampler(clock)
 
             def before_a_jump(ahead_s: float | None) -> bool:
@@ -308,6 +334,11 @@ class _Rehearsal:
     def _give_up(self, executive: Executive, runner: Runner, ahead_s: float | None) -> bool:
         """Called when nothing is ready: end the run if nothing that is scheduled can change it."""
         status = runner.run.state.status
+        if self._debugger is not None:
+            if self._hold_for_incidents(runner):
+                return True
+            if self._debugger.acts(runner, self._scripted.simulated, executive.clock.now_us()):
+                return True
         if status is EngineStatus.PAUSED and ahead_s is None and not self._answers.to_send:
             runner.post(GiveUp("the run is paused, and nothing resumes it"))
             return True
@@ -324,6 +355,15 @@ class _Rehearsal:
                 return False
         runner.post(GiveUp("nothing that is scheduled can happen any more"))
         return True
+
+    def _hold_for_incidents(self, runner: Runner) -> bool:
+        """Whether there was something to hold that is held beyond the pause."""
+        waiting = self._scripted.not_held
+        wanted = [each for each in waiting if incident_holding(runner.run.state, each)]
+        self._holding = [
+            asyncio.ensure_future(waiting.pop(resource).hold(resource)) for resource in wanted
+        ]
+        return bool(wanted)
 
     def _expects(self, executive: Executive, runner: Runner) -> bool:
         state = runner.run.state

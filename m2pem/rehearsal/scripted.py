@@ -35,6 +35,11 @@ class ScriptedPlugins:
     ) -> None:
         self.simulated: list[SimArbiter] = []
         self.ending = 0
+        self.holds_wait: Callable[[], bool] = lambda: False
+        """Whether nothing is held now, as time does not advance: the run is paused to be debugged.
+        A hold would change how its vehicles go on."""
+        self.not_held: dict[ResourceId, Arbiter] = {}
+        """Resources of holds that wait."""
         self._plugins = plugins
         self._answers = answers
         self._unscripted = unscripted
@@ -49,7 +54,8 @@ class ScriptedPlugins:
             arbiter = make(connections, context)
             if isinstance(arbiter, SimArbiter):
                 self.simulated.append(arbiter)
-            return cast("Arbiter", ScriptedArbiter(arbiter, self._answers, context.logger))
+            scripted = ScriptedArbiter(arbiter, self._answers, context.logger, self)
+            return cast("Arbiter", scripted)
 
         return make_scripted
 
@@ -86,14 +92,33 @@ class ScriptedArbiter:
     for each element.
     """
 
-    def __init__(self, arbiter: Arbiter, answers: Answers, logger: logging.Logger) -> None:
+    def __init__(
+        self,
+        arbiter: Arbiter,
+        answers: Answers,
+        logger: logging.Logger,
+        plugins: ScriptedPlugins,
+    ) -> None:
         self._arbiter = arbiter
+        self._plugins = plugins
         self._answers = answers
         self._logger = logger
         self._warned: set[str] = set()
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._arbiter, name)
+
+    async def hold(self, resource: ResourceId) -> None:
+        """Hold a resource, if time advances."""
+        if self._plugins.holds_wait():
+            self._plugins.not_held[resource] = self._arbiter
+        else:
+            await self._arbiter.hold(resource)
+
+    async def resume(self, resource: ResourceId) -> None:
+        """Let a resource that was held go on."""
+        if self._plugins.not_held.pop(resource, None) is None:
+            await self._arbiter.resume(resource)
 
     async def start(self, request: BehaviorRequest) -> None:
         """Start a behavior, or a member's part of a team's, after saying how it ends."""
