@@ -4,6 +4,7 @@ from typing import Protocol
 
 from m2pem.api.mission_control.alerts import AlertControl
 from m2pem.api.mission_control.authoring import AuthoringControl
+from m2pem.api.mission_control.debugging import DebugControl
 from m2pem.api.mission_control.executive import ExecutiveControl
 from m2pem.api.mission_control.geometries import GeometryControl
 from m2pem.api.mission_control.operators import OperatorControl
@@ -15,6 +16,7 @@ from m2pem.api.mission_control.watching import WatchControl
 
 class MissionControl(
     RunControl,
+    DebugControl,
     ScheduleControl,
     ResourceControl,
     OperatorControl,

@@ -221,6 +221,22 @@ class EndPresence(Params, frozen=True):
     client: str
 
 
+class SetBreakpoints(OfRun, frozen=True):
+    """As `MissionControl.set_breakpoints`."""
+
+    elements: list[str] = msgspec.field(default_factory=list)
+    conditions: list[str] = msgspec.field(default_factory=list)
+
+
+class SetData(Params, frozen=True):
+    """As `MissionControl.set_data`."""
+
+    run: str
+    data: dict[str, Value]
+    scope: int = 0
+    by: str = ""
+
+
 class AddNote(Params, frozen=True):
     """As `MissionControl.add_note`."""
 
@@ -413,6 +429,9 @@ OPERATIONS: dict[str, Operation] = {
         Operation("switch_over", SwitchOver, ExecutiveAddress, alone=True),
         Operation("pause", OfRun, alone=True),
         Operation("resume", OfRun),
+        Operation("set_breakpoints", SetBreakpoints),
+        Operation("step", OfRun),
+        Operation("set_data", SetData),
         Operation("set_geometry", Geometry),
         Operation("delete_geometry", DeleteGeometry),
         Operation("geometry_versions", OfGeometry, list[GeometryVersion]),

@@ -1,5 +1,6 @@
 """The top command `m2pem`: its lazily loaded commands, its log, and its exit status."""
 
+import builtins
 import logging
 import os
 import sys
@@ -55,6 +56,9 @@ COMMANDS = {
     "stop": "Stop a run that is running on this host, or all of them.",
     "pause": "Pause a run that is running on this host.",
     "continue": "Let a run on this host go on after a pause.",
+    "break": "Set the breakpoints of a run that is running on this host.",
+    "step": "Execute one step of a paused run on this host.",
+    "set": "Change data of a paused run on this host.",
     "hand-over": "Give a vehicle or payload to the operator who asks for it, or refuse.",
     "operators": "List the operators who are present, and who asks whom for what.",
     "note": "Write a note into the log of a run that is running on this host.",
@@ -77,14 +81,16 @@ _MODULES = {
     "give-back": "take",
     "acknowledge": "alerts",
     "own": "alerts",
+    **dict.fromkeys(("break", "step", "set"), "breakpoints"),
     "hand-over": "take",
 }
 
 
 def built_in(name: str) -> click.Command:
-    """Return the built-in command of that name; the function `continue_` is `m2pem continue`."""
+    """Return the built-in command of that name; the function `continue_` is `m2pem continue`, and
+    `set_` is `m2pem set`."""
     module = _MODULES.get(name, name.replace("-", "_"))
-    function = f"{name}_" if iskeyword(name) else name.replace("-", "_")
+    function = f"{name}_" if iskeyword(name) or hasattr(builtins, name) else name.replace("-", "_")
     command = getattr(import_module(f"m2pem.cli.{module}"), function)
     assert isinstance(command, click.Command)
     return command

@@ -2,6 +2,7 @@
 
 from m2pem.executive.mission_control.alerts import AlertOperations
 from m2pem.executive.mission_control.authoring import AuthoringOperations
+from m2pem.executive.mission_control.debugging import DebugOperations
 from m2pem.executive.mission_control.executive import ExecutiveOperations
 from m2pem.executive.mission_control.geometries import GeometryOperations
 from m2pem.executive.mission_control.operators import OperatorOperations
@@ -13,6 +14,7 @@ from m2pem.executive.mission_control.watching import WatchOperations
 
 class Control(
     RunOperations,
+    DebugOperations,
     ScheduleOperations,
     ResourceOperations,
     OperatorOperations,

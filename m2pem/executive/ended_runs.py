@@ -112,6 +112,8 @@ def in_words(item: Input, reason: str) -> str:
     words: dict[tuple[type[Input], RunStatus], str] = {
         (i.PauseRun, RunStatus.PAUSED): "it is paused already",
         (i.ResumeRun, RunStatus.RUNNING): "it is not paused",
+        (i.StepRun, RunStatus.RUNNING): "it is not paused",
+        (i.SetData, RunStatus.RUNNING): "it is not paused: data is changed in a pause",
     }
     for (kind, status), text in words.items():
         if isinstance(item, kind) and reason == f"{kind.__name__} while the run is {status.value}":

@@ -212,6 +212,7 @@ class Fleet:
     videos: Mapping[ResourceId, Video] = field(default_factory=dict)
     terrain_folder: str = ""
     clearance_m: float | None = None
+    debugging: bool = False
 
     @property
     def detectors(self) -> tuple[ResourceId, ...]:

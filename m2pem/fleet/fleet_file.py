@@ -328,6 +328,7 @@ def _build(source: YamlSource, model: FleetModel, geometries: dict[str, Geometry
         battery_cost_s=costs.battery,
         switching_cost_s=costs.switching,
         on_error=ErrorPolicy(model.on_error),
+        debugging=model.debugging,
         unattended=later.unattended,
         start_warning_s=later.warning,
         preemption=costs.preemption,

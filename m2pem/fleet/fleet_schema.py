@@ -410,6 +410,13 @@ class FleetModel(_Model):
             "which an operator decides. What a process of the mission says comes first."
         ),
     ] = "end"
+    debugging: Annotated[
+        bool,
+        Field(
+            description="Operators may set breakpoints in runs, execute single steps and change "
+            "data, although vehicles are not simulated."
+        ),
+    ] = False
     incident_role: Annotated[
         Text | None,
         Field(

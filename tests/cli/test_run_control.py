@@ -23,6 +23,14 @@ CALLS = [
     ("note r1 windy", "add_note", {"text": "windy"}, "r1: the note is written"),
     ("pause r1", "pause", {}, "r1 is paused"),
     ("continue r1", "resume", {}, "r1 goes on"),
+    (
+        "break r1 Drive Ask --when n>3",
+        "set_breakpoints",
+        {"elements": ["Drive", "Ask"], "conditions": ["n>3"]},
+        "r1: breakpoints: Drive, Ask, when n>3",
+    ),
+    ("step r1", "step", {}, "r1 makes one step"),
+    ("set r1 a=3", "set_data", {"data": {"a": 3}, "scope": 1}, "r1: changed: a"),
     ("stop r1 --reason rain", "stop", {"reason": "rain"}, "stopped: r1"),
 ]
 

@@ -45,6 +45,13 @@ COMMANDS: dict[str, tuple[str, str, Any]] = {
     "stop": ("POST", "/api/runs/r1/stop", {"reason": "rain"}),
     "stop_all": ("POST", "/api/stop-all", {"reason": "rain"}),
     "pause": ("POST", "/api/runs/r1/pause", None),
+    "set_breakpoints": (
+        "PUT",
+        "/api/runs/r1/breakpoints",
+        {"elements": ["a"], "conditions": ["n > 3"]},
+    ),
+    "step": ("POST", "/api/runs/r1/step", None),
+    "set_data": ("POST", "/api/runs/r1/data", {"data": {"a": 1}, "scope": 2}),
     "resume": ("POST", "/api/runs/r1/resume", None),
     "set_geometry": (
         "PUT",
@@ -73,6 +80,9 @@ SENT = {
     "even_if_stuck": True,
     "signal": "s",
     "message": "m",
+    "elements": ["a"],
+    "conditions": ["n > 3"],
+    "scope": 2,
     "data": {"a": 1},
     "reason": "rain",
     "name": "gate",

@@ -1,0 +1,105 @@
+"""Runs that are debugged: which fleets allow it, and what vehicles do at a breakpoint."""
+
+from dataclasses import replace
+
+import pytest
+
+from m2pem.api.runs import RunStatus
+from m2pem.errors import OperatorError
+from tests.executive.conftest import World, behavior, fleet, flow, mission, question, sequence
+
+DRIVES = mission(
+    sequence(
+        ("Ask", question("Ask")),
+        ("Drive", behavior("Drive", "drive_stop", "ugv1")),
+        ("Again", behavior("Again", "drive_stop", "ugv1")),
+    )
+)
+BOTH = mission(
+    '<process id="P" isExecutable="true"><startEvent id="S"/><parallelGateway id="F"/>'
+    f'{behavior("Drive", "drive_stop", "ugv1")}{question("Ask")}<task id="T"/>'
+    f"{flow('S', 'F')}{flow('F', 'Drive')}{flow('F', 'Ask')}{flow('Ask', 'T')}</process>"
+)
+DEBUGGED = replace(fleet("ugv1"), debugging=True)
+
+
+async def asked(world: World, source: bytes = DRIVES) -> str:
+    run = await world.executive.control.start(source)
+    await world.clock.sleep(1.0)
+    return run
+
+
+def test_a_vehicle_is_not_commanded_before_its_breakpoint_is_left(play):
+    async def story(world: World):
+        control = world.executive.control
+        run = await asked(world)
+        await control.set_breakpoints(run, ["Drive"], by="anna")
+        await control.answer(run, "p1", "yes")
+        await world.clock.sleep(60.0)
+        (summary,) = await control.runs()
+        before = summary.status, world.fake.count("start")
+        await control.resume(run, by="anna")
+        await world.clock.sleep(1.0)
+        return before, world.fake.count("start")
+
+    assert play(story, fleet=DEBUGGED) == ((RunStatus.PAUSED, 0), 1)
+
+
+def test_vehicles_at_work_are_held_at_a_breakpoint_and_go_on(play):
+    async def story(world: World):
+        control = world.executive.control
+        run = await asked(world, BOTH)
+        await control.set_breakpoints(run, ["T"])
+        await control.answer(run, "p1", "yes")
+        await world.clock.sleep(1.0)
+        held = world.fake.count("hold", "ugv1"), world.fake.count("resume", "ugv1")
+        await control.step(run)
+        await world.clock.sleep(1.0)
+        return held, (world.fake.count("hold", "ugv1"), world.fake.count("resume", "ugv1"))
+
+    assert play(story, fleet=DEBUGGED) == ((1, 0), (1, 1))
+
+
+def test_data_is_changed_and_noted_with_who_did_it(play):
+    async def story(world: World):
+        control = world.executive.control
+        run = await asked(world)
+        await control.pause(run)
+        await control.set_data(run, {"a": {"b": 3}}, by="anna")
+        with pytest.raises(OperatorError, match="scope 9 is not open"):
+            await control.set_data(run, {"a": 1}, scope=9)
+        await control.resume(run)
+        return [str(each) for each in world.seen if "SetData" in type(each).__name__]
+
+    (noted,) = play(story, fleet=DEBUGGED)
+    assert "by='anna'" in noted
+
+
+def test_a_fleet_with_real_vehicles_does_not_allow_it(play):
+    async def story(world: World):
+        control = world.executive.control
+        run = await asked(world)
+        for call in (
+            control.set_breakpoints(run, ["Drive"]),
+            control.step(run),
+            control.set_data(run, {"a": 1}),
+        ):
+            with pytest.raises(OperatorError, match=r"debugging: true.*`m2pem debug`"):
+                await call
+        await control.set_breakpoints(run)
+
+    play(story, "ugv1")
+
+
+def test_what_cannot_be_done_is_said(play):
+    async def story(world: World):
+        control = world.executive.control
+        run = await asked(world)
+        with pytest.raises(OperatorError, match="no 'Driv': did you mean 'Drive'"):
+            await control.set_breakpoints(run, ["Driv"])
+        with pytest.raises(OperatorError, match="'n >' is no condition"):
+            await control.set_breakpoints(run, [], ["n >"])
+        with pytest.raises(OperatorError, match="it is not paused"):
+            await control.step(run)
+
+    play(story, fleet=DEBUGGED)
