@@ -3,6 +3,7 @@
 import logging
 from collections.abc import Mapping
 from math import isfinite
+from typing import cast
 
 from m2pem.api.arbiter import BehaviorReport
 from m2pem.engine.inputs import BehaviorReported
@@ -65,12 +66,20 @@ def _outputs(
 
 
 def _can_be_kept(value: object) -> bool:
+    # What is left of a route has hundreds of numbers, and is reported often.
+    kind = type(value)
+    if kind is float:
+        return isfinite(cast("float", value))
+    if kind is list:
+        return all(map(_can_be_kept, cast("list[object]", value)))
     match value:
         case None | bool() | int():
             return True
         case float():
             return isfinite(value)
         case str():
+            if value.isascii():
+                return True
             return not any("\ud800" <= character <= "\udfff" for character in value)
         case list():
             return all(map(_can_be_kept, value))

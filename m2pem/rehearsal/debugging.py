@@ -36,10 +36,9 @@ from m2pem.rehearsal.answers import Answers
 from m2pem.rehearsal.answers_file import AnswersModel
 from m2pem.rehearsal.rehearsal import (
     MAX_STEPS,
-    NO_FLEET,
     START_US,
     Rehearsal,
-    refuse_commands,
+    Rehearser,
     refuse_misfits,
 )
 from m2pem.simulation.arbiters import SimArbiter
@@ -100,15 +99,10 @@ class DebugSession:
         Raises:
             MissionError, AnswersError, FleetError: as `rehearse`.
         """
-        if fleet is None:
-            refuse_commands(mission)
-            fleet = NO_FLEET
+        self._rehearser = Rehearser(mission, fleet, plugins, process)
         self._answers = answers or Answers()
         refuse_misfits(self._answers, mission)
         self.mission = mission
-        self._fleet = fleet
-        self._plugins = plugins
-        self._process = process
         self._data = data
         self._start_us = start_us
         self._max_steps = max_steps
@@ -325,9 +319,7 @@ class _Rehearsed:
     def _run(self) -> None:
         session = self._session
         rehearsal = Rehearsal(
-            session.mission,
-            session._fleet,
-            session._plugins,
+            session._rehearser,
             self._answers,
             session._max_steps,
             self._see,
@@ -337,8 +329,7 @@ class _Rehearsed:
         )
         try:
             summary = run_virtual(
-                lambda clock: rehearsal.run(clock, session._process, session._data),
-                session._start_us,
+                lambda clock: rehearsal.run(clock, session._data), session._start_us
             )
         except BaseException as error:  # whoever waits for the next stop gets it
             self._answered.put(error)

@@ -187,26 +187,81 @@ def rehearse(
         FleetError: the fleet cannot be simulated.
     """
     loaded = mission if isinstance(mission, Mission) else load_source(mission, search_path)
-    if fleet is None:
-        refuse_commands(loaded)
-        fleet = NO_FLEET
-    script = answers if isinstance(answers, Answers) else _load(answers)
-    refuse_misfits(script, loaded)
-    collected: list[StampedRecord] = []
-    rehearsal = Rehearsal(
-        loaded,
-        fleet,
-        plugins,
-        script,
-        max_steps,
-        on_record or collected.append,
-        observed,
-        telemetry_every_s,
+    return Rehearser(loaded, fleet, plugins, process).rehearse(
+        data=data,
+        answers=answers,
+        start_us=start_us,
+        max_steps=max_steps,
+        on_record=on_record,
+        observed=observed,
+        telemetry_every_s=telemetry_every_s,
     )
-    summary = run_virtual(lambda clock: rehearsal.run(clock, process, data), start_us)
-    return RehearsalResult(
-        summary, tuple(collected), tuple(rehearsal.samples), tuple(loaded.files())
-    )
+
+
+class Rehearser:
+    """Rehearses one mission with one fleet, as often as wanted: both are checked once.
+
+    Raises:
+        MissionError: the mission needs a fleet, and gets None.
+        FleetError: the fleet cannot be simulated.
+    """
+
+    def __init__(
+        self,
+        mission: Mission,
+        fleet: Fleet | None,
+        plugins: PluginManager,
+        process: str | None = None,
+    ) -> None:
+        if fleet is None:
+            refuse_commands(mission)
+            fleet = NO_FLEET
+        self.mission = mission
+        seen = {"telemetry_hz": SPACE_HZ} if waits_for_space(fleet) else {}
+        # A script answers: it may answer what any operator may.
+        self.fleet = simulated_fleet(replace(fleet, operators={}), {**SETTINGS, **seen})
+        self.plugins = plugins
+        self._process = process
+        self._admitted: dict[frozenset[str], str] = {}
+
+    def rehearse(
+        self,
+        *,
+        data: Mapping[str, Value] | None = None,
+        answers: Answers | Path | str | bytes | None = None,
+        start_us: int = START_US,
+        max_steps: int = MAX_STEPS,
+        on_record: OnRecord | None = None,
+        observed: bool = True,
+        telemetry_every_s: float | None = None,
+    ) -> RehearsalResult:
+        """Rehearse it once; see the function `rehearse`."""
+        script = answers if isinstance(answers, Answers) else _load(answers)
+        refuse_misfits(script, self.mission)
+        collected: list[StampedRecord] = []
+        rehearsal = Rehearsal(
+            self,
+            script,
+            max_steps,
+            on_record or collected.append,
+            observed,
+            telemetry_every_s,
+        )
+        summary = run_virtual(lambda clock: rehearsal.run(clock, data), start_us)
+        return RehearsalResult(
+            summary, tuple(collected), tuple(rehearsal.samples), tuple(self.mission.files())
+        )
+
+    def admit(self, executive: Executive, data: Mapping[str, Value] | None) -> str:
+        """Return the process to begin with. Data of the same names are checked once.
+
+        Raises:
+            MissionError: with every finding.
+        """
+        names = frozenset(data or ())
+        if names not in self._admitted:
+            self._admitted[names], _ = executive.admit(self.mission, self._process, data)
+        return self._admitted[names]
 
 
 def _load(answers: Path | str | bytes | None) -> Answers:
@@ -240,9 +295,7 @@ class Rehearsal:
 
     def __init__(
         self,
-        mission: Mission,
-        fleet: Fleet,
-        plugins: PluginManager,
+        rehearser: Rehearser,
         answers: Answers,
         max_steps: int,
         on_record: OnRecord,
@@ -254,24 +307,19 @@ class Rehearsal:
         self._debugger = debugger
         self._holding: list[asyncio.Future[None]] = []
         self._every_s = telemetry_every_s
-        self._mission = mission
-        self._fleet = fleet
+        self._rehearser = rehearser
         self._answers = answers
-        self._scripted = ScriptedPlugins(plugins, answers, _unscripted)
+        self._scripted = ScriptedPlugins(rehearser.plugins, answers, _unscripted)
         self._limit = StepLimit(max_steps)
         self._observed = observed
         self._on_record = on_record
         self._quiet_since_us: int | None = None
 
-    async def run(
-        self, clock: VirtualClock, process: str | None, data: Mapping[str, Value] | None
-    ) -> RunSummary:
+    async def run(self, clock: VirtualClock, data: Mapping[str, Value] | None) -> RunSummary:
         journal = _NotifyingJournal(self._on_record)
-        seen = {"telemetry_hz": SPACE_HZ} if waits_for_space(self._fleet) else {}
-        # A script answers: it may answer what any operator may.
-        fleet = replace(self._fleet, operators={})
+        mission = self._rehearser.mission
         executive = Executive(
-            simulated_fleet(fleet, {**SETTINGS, **seen}),
+            self._rehearser.fleet,
             journal,
             self._scripted,
             clock,
@@ -280,10 +328,10 @@ class Rehearsal:
             limit=self._limit,
             on_records=self._answers.seen,
         )
-        process_id, _ = executive.admit(self._mission, process, data)
+        process_id = self._rehearser.admit(executive, data)
         async with executive:
             step = self._debugger is not None
-            run = await executive.begin(self._mission, process_id, data, "", step=step)
+            run = await executive.begin(mission, process_id, data, "", step=step)
             runner = executive.runner(run)
             if self._debugger is not None:
                 state = runner.run.state

@@ -54,6 +54,7 @@ class EventQueue:
         self._sleeper: asyncio.Task[None] | None = None
         self._sleeping_until = 0
         self._awake = False
+        self._calling = False
         self.expected = 0
         self.due_us = 0
 
@@ -101,10 +102,15 @@ class EventQueue:
     def _background_over(self) -> None:
         pass
 
-    def _arm(self) -> None:
+    def _forget_cancelled(self) -> None:
         while self._entries and self._entries[0].call is None:
             heapq.heappop(self._entries)
-        if not self._awake:
+
+    def _arm(self) -> None:
+        """Let the sleeper sleep until the first call that is due. While it makes calls itself, it
+        looks again afterwards."""
+        self._forget_cancelled()
+        if not self._awake or self._calling:
             return
         if not self._entries:
             if self._sleeper is not None:
@@ -117,10 +123,17 @@ class EventQueue:
                 return
             self._sleeper.cancel()
         self._sleeping_until = due
-        self._sleeper = asyncio.get_running_loop().create_task(self._sleep(due))
+        self._sleeper = asyncio.get_running_loop().create_task(self._sleep())
 
-    async def _sleep(self, until_us: int) -> None:
-        await self._clock.sleep_until(until_us)
+    async def _sleep(self) -> None:
+        while self._entries:
+            await self._clock.sleep_until(self._sleeping_until)
+            self._calling = True
+            try:
+                self.run_due(self._clock.now_us())
+            finally:
+                self._calling = False
+            self._forget_cancelled()
+            if self._entries:
+                self._sleeping_until = self._entries[0].at_us
         self._sleeper = None
-        self.run_due(self._clock.now_us())
-        self._arm()

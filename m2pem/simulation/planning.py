@@ -3,6 +3,7 @@
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 from msgspec.structs import replace
@@ -55,6 +56,7 @@ _BY_KIND: Mapping[str, frozenset[str]] = {
 }
 
 
+@cache
 def vehicle_behaviors(domain: str) -> tuple[BehaviorSpec, ...]:
     """What a vehicle of the domain can do alone. Teams are made of that, as everywhere."""
     alone = _BY_DOMAIN.get(domain, _BY_DOMAIN["ground"])
@@ -65,6 +67,7 @@ def vehicle_behaviors(domain: str) -> tuple[BehaviorSpec, ...]:
     )
 
 
+@cache
 def payload_behaviors(kind: str) -> tuple[BehaviorSpec, ...]:
     """What a payload can do; of no kind: all that payloads can."""
     names = _BY_KIND.get(kind)

@@ -60,6 +60,19 @@ class Profile(msgspec.Struct, frozen=True):
             return min(self.length, gone + (self.v_peak + speed) / 2 * t), speed
         return self.length, self.v_out
 
+    def when(self, gone: float) -> float:
+        """The time after the start at which that distance is gone, but for rounding."""
+        t_up, t_cruise = self.accelerating_s, self.cruising_s
+        up = (self.v_in + self.v_peak) / 2 * t_up
+        if gone < up:
+            root = math.sqrt(self.v_in**2 + 2 * self.accel * max(0.0, gone))
+            return (root - self.v_in) / self.accel
+        down = up + self.v_peak * t_cruise
+        if gone < down:
+            return t_up + (gone - up) / self.v_peak
+        slower = math.sqrt(max(0.0, self.v_peak**2 - 2 * self.decel * (gone - down)))
+        return t_up + t_cruise + min(self.braking_s, (self.v_peak - slower) / self.decel)
+
 
 def fit(
     length: float, limit: float, *, v_in: float, v_out: float, accel: float, decel: float

@@ -14,6 +14,8 @@ from m2pem.units import US_PER_S
 
 _NOTHING_S = 1e-9
 _SOON_S = 0.01
+_ROUNDING_S = 1e-3
+"""Much more than what rounding may change in the time at which a distance is gone."""
 
 
 class Slowable(Protocol):
@@ -91,23 +93,43 @@ class Plan(Generic[S]):
 
     def level_m_left(self, t: float) -> float:
         """Return the length on the map from plan time `t` to the plan's end."""
-        if not self._level_m_after:
-            lengths = [_level_m(phase, 0.0) for phase in self.phases[:0:-1]]
-            self._level_m_after = [*accumulate(lengths, initial=0.0)][::-1]
+        after_m = self._level_m_after_each()
         index, inside, _ = self._find(t)
-        return _level_m(self.phases[index], inside) + self._level_m_after[index]
+        return _level_m(self.phases[index], inside) + after_m[index]
 
     def when_level_m_left(self, level_m: float) -> float:
         """Return the plan time from which on the length on the map to the plan's end is no more
         than that; the plan must end."""
+        after_m = self._level_m_after_each()
+        if level_m < 0:
+            return self.duration_s
+        # The phase within which it becomes so; before it there is more left, after it less.
+        last = len(self.phases) - 1
+        within = bisect.bisect_left(after_m, -level_m, key=lambda left_m: -left_m)
+        begin_s = self._ends[within - 1] if within else 0.0
+        end_s = self._ends[within] if within < last else math.inf
+        phase = self.phases[within]
+        about_s = begin_s + _when_level_m(phase, level_m - after_m[within])
         low, high = 0.0, self.duration_s
         while high - low > _SOON_S:
             middle = (low + high) / 2
-            if self.level_m_left(middle) > level_m:
+            if abs(middle - about_s) > _ROUNDING_S:
+                before = middle < about_s
+            else:
+                left_m = _level_m(phase, middle - begin_s) + after_m[within]
+                before = middle < begin_s or (middle < end_s and left_m > level_m)
+            if before:
                 low = middle
             else:
                 high = middle
         return high
+
+    def _level_m_after_each(self) -> list[float]:
+        """Return the length on the map after each phase."""
+        if not self._level_m_after:
+            lengths = [_level_m(phase, 0.0) for phase in self.phases[:0:-1]]
+            self._level_m_after = [*accumulate(lengths, initial=0.0)][::-1]
+        return self._level_m_after
 
     def _find(self, t: float) -> tuple[int, float, float]:
         laps_work = 0.0
@@ -124,14 +146,24 @@ class Plan(Generic[S]):
 
 def _level_m(phase: object, from_s: float) -> float:
     """Return the length on the map of a phase from a time after its start."""
-    match phase:
-        case Travel():
-            share = math.hypot(*phase.direction[:2])
-        case Curve():
-            share = phase.radius * abs(phase.sweep) / phase.profile.length
-        case _:
-            return 0.0
-    return share * (phase.profile.length - phase.profile.at(from_s)[0])
+    if not isinstance(phase, Travel | Curve):
+        return 0.0
+    return _level_share(phase) * (phase.profile.length - phase.profile.at(from_s)[0])
+
+
+def _when_level_m(phase: object, level_m: float) -> float:
+    """Return the time after a phase's start at which its length on the map from there is that, but
+    for rounding."""
+    if not isinstance(phase, Travel | Curve) or not (share := _level_share(phase)):
+        return 0.0
+    return phase.profile.when(phase.profile.length - level_m / share)
+
+
+def _level_share(phase: Travel | Curve) -> float:
+    """Return which part of a way's length is its length on the map."""
+    if isinstance(phase, Travel):
+        return math.hypot(*phase.direction[:2])
+    return phase.radius * abs(phase.sweep) / phase.profile.length
 
 
 class Warp(msgspec.Struct, frozen=True):

@@ -22,6 +22,7 @@ from m2pem.engine.records import (
     DataWritten,
     EscalationThrown,
     FlowTaken,
+    PromptOpened,
     Record,
     RunEnded,
     RunPaused,
@@ -32,6 +33,7 @@ from m2pem.engine.records import (
 )
 from m2pem.errors import AnswersError, MissionError, OperatorError
 from m2pem.executive.executive import Executive
+from m2pem.executive.loading import load_source
 from m2pem.fleet.fleet import Domain, Fleet, Payload, Vehicle, simulated_fleet
 from m2pem.fleet.fleet_file import load_fleet
 from m2pem.journal.memory import MemoryJournal
@@ -39,7 +41,13 @@ from m2pem.mission.catalogue import ResourceId
 from m2pem.plugins import PluginManager
 from m2pem.rehearsal import rehearsal
 from m2pem.rehearsal.answers import load_answers
-from m2pem.rehearsal.rehearsal import START_US, RehearsalResult, Sampler, rehearse
+from m2pem.rehearsal.rehearsal import (
+    START_US,
+    RehearsalResult,
+    Rehearser,
+    Sampler,
+    rehearse,
+)
 from m2pem.rehearsal.worker import rehearse_in_subprocess
 
 SAMPLED_FROM_US = 1_000_000_000
@@ -318,6 +326,25 @@ def test_the_papers_example_commands_the_vehicle_and_writes_the_data() -> None:
         (5.0, "detection.type", "camera"),
         (9.0, "detection.type", "gpr"),
     ]
+
+
+def test_many_rehearsals_of_a_mission_checked_once_are_as_each_by_itself() -> None:
+    fleet = load_fleet(VIGNETTE_FLEET)
+    rehearser = Rehearser(load_source(VIGNETTE), fleet, PLUGINS)
+    for name in ("detection", "abort", "route", "detection"):
+        answers = ANSWERS / f"vignette1_{name}.yaml"
+        alone = rehearse(VIGNETTE, fleet, plugins=PLUGINS, answers=answers)
+        assert rehearser.rehearse(answers=answers).records == alone.records
+
+
+def test_each_rehearsal_of_a_rehearser_has_its_own_data() -> None:
+    choose = '<exclusiveGateway id="G" default="G_E"/>'
+    flows = flow("S", "G") + flow("G", "Ask", "speed &gt; 1") + flow("G", "E") + flow("Ask", "E")
+    mission = load_source(process(choose + question("Ask")[1] + flows))
+    rehearser = Rehearser(mission, None, PLUGINS)
+    for speed, asked in ((2, 1), (0, 0)):
+        result = rehearser.rehearse(data={"speed": speed})
+        assert len(list(of(result, PromptOpened))) == asked
 
 
 # --- the world outside ----------------------------------------------------------------------------

@@ -93,3 +93,25 @@ def test_what_may_go_on_for_ever_is_not_counted_as_expected() -> None:
         assert event_queue.expected == 0
 
     run_virtual(main, 0)
+
+
+def test_a_call_that_schedules_the_next_one_is_followed_by_it_in_time() -> None:
+    async def main(clock: VirtualClock) -> None:
+        event_queue = EventQueue(clock, LOGGER)
+        calls: list[int] = []
+
+        def call(at_us: int) -> None:
+            calls.append(clock.now_us())
+            if at_us < 50:
+                event_queue.at(at_us + 10, call)
+                event_queue.at(at_us + 5, calls.append).cancel()
+
+        event_queue.wake()
+        event_queue.at(10, call)
+        await asyncio.sleep(1)
+        assert calls == [10, 20, 30, 40, 50]
+        event_queue.at(clock.now_us() + 7, call)  # when it had nothing to wait for
+        await asyncio.sleep(1)
+        assert calls[-1] == 1_000_007
+
+    run_virtual(main, 0)

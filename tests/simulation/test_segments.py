@@ -55,3 +55,12 @@ def test_length_for_a_time_is_driven_in_that_time(
     length = rest_to_rest_length(seconds, speed, accel, decel)
     profile = fit(length, speed, v_in=0.0, v_out=0.0, accel=accel, decel=decel)
     assert profile.duration_s == pytest.approx(seconds, rel=1e-6)
+
+
+@given(pieces, st.floats(0.1, 5), st.floats(0.1, 5), st.floats(0, 1))
+def test_the_time_of_a_distance_is_when_it_is_gone(
+    ways: list[tuple[float, float]], accel: float, decel: float, share: float
+) -> None:
+    for profile in chain(ways, accel, decel):
+        gone = share * profile.length
+        assert profile.at(profile.when(gone))[0] == pytest.approx(gone, rel=1e-6, abs=1e-6)

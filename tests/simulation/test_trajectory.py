@@ -272,3 +272,30 @@ def test_what_repeats_without_a_stop_is_left_as_it_is() -> None:
     course = Course(craft).circle((0.0, 0.0))
     plan: Plan[Pose] = course.plan(course.steps - 1)
     assert retimed(plan, 5.0, plan.at(5.0).speed, 2.0, AIR) is None
+
+
+@given(
+    st.lists(
+        st.tuples(st.floats(0.5, 400), st.sampled_from([0.0, 0.7, 1.0]), st.booleans()),
+        min_size=1,
+        max_size=6,
+    ),
+    st.floats(-1, 1.1),
+)
+def test_the_time_at_which_so_much_is_left_is_that_of_a_search_by_halves(
+    ways: list[tuple[float, float, bool]], share: float
+) -> None:
+    phases: list[Travel | Stand] = []
+    for length, level, waits in ways:
+        profile = fit(length, 5.0, v_in=0.0, v_out=0.0, accel=1.0, decel=2.0)
+        direction = (level, 0.0, math.sqrt(1 - level * level))
+        phases.append(Travel((0.0, 0.0, 0.0), direction, 0.0, profile))
+        if waits:
+            phases.append(Stand((0.0, 0.0, 0.0), 0.0, 7.0, 0.0))
+    plan: Plan[Pose] = Plan(phases)
+    level_m = share * plan.level_m_left(0.0)
+    low, high = 0.0, plan.duration_s
+    while high - low > 0.01:
+        middle = (low + high) / 2
+        low, high = (middle, high) if plan.level_m_left(middle) > level_m else (low, middle)
+    assert plan.when_level_m_left(level_m) == high
