@@ -189,6 +189,11 @@ _TABLE = (
             Attribute("pattern", Type.NAME, "a pattern of requirements"),
             Attribute("text", Type.TEXT, "the requirement in words"),
             Attribute("fair", Type.BOOLEAN, "whether decisions are assumed to be fair"),
+            Attribute(
+                "assume",
+                Type.TEXT,
+                "what is [assumed](requirements.md#assumptions), such as `no-failures`",
+            ),
         ),
         ("arg",),
         places=("process",),
@@ -263,6 +268,18 @@ EXTENSIONS = (
         ),
     ),
     OwnAttributes(
+        "Checked",
+        ("process",),
+        (
+            Attribute(
+                "assume",
+                Type.TEXT,
+                "what `m2pem verify` [assumes](requirements.md#assumptions) of all runs that begin "
+                "with this process, such as `no-failures`",
+            ),
+        ),
+    ),
+    OwnAttributes(
         "Choice",
         ("adHocSubProcess",),
         (Attribute("activeElements", Type.EXPRESSION, "the list of ids to begin"),),
@@ -287,9 +304,13 @@ EXTENSIONS = (
 """m2pem's attributes of BPMN elements."""
 
 ATTRIBUTES: dict[str, frozenset[str]] = {
-    place: frozenset(attribute.name for attribute in each.attributes)
-    for each in EXTENSIONS
-    for place in each.places
+    place: frozenset(
+        attribute.name
+        for each in EXTENSIONS
+        if place in each.places
+        for attribute in each.attributes
+    )
+    for place in {place for each in EXTENSIONS for place in each.places}
 }
 """Names of m2pem's attributes by the BPMN element's local name."""
 

@@ -4,6 +4,7 @@ import signal
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -44,6 +45,13 @@ if TYPE_CHECKING:
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
     metavar="FILE",
     help="Requirements (YAML) beside those in the mission's own file.",
+)
+@click.option(
+    "--assume",
+    metavar="ASSUMPTION",
+    multiple=True,
+    help="What all runs are taken to do: no-failures, 'failures <= 2', 'reliable(uav1)', "
+    "operators-answer, 'messages-within 30 s'. Can be given again.",
 )
 @click.option("--strict", is_flag=True, help="Warnings are violations.")
 @click.option(
@@ -105,6 +113,7 @@ def verify(
     search_path: tuple[Path, ...],
     data: "dict[str, Value]",
     spec: Path | None,
+    assume: tuple[str, ...],
     strict: bool,
     engine: str,
     storage: str,
@@ -135,6 +144,7 @@ def verify(
         data,
         spec,
         timers_in_order=timers == "in-order",
+        assume=assume,
     )
     if emit is not None:
         _emit(promela(asked), emit.partition("=")[2])
@@ -197,7 +207,8 @@ def promela(asked: "SearchRequest") -> str:
     from m2pem.verify.spin.promela import text_of
     from m2pem.verify.translate import translate
 
-    system = translate(asked.mission, asked.fleet, process=asked.process, options=asked.options)
+    options = replace(asked.options, assumed=asked.assumed)
+    system = translate(asked.mission, asked.fleet, process=asked.process, options=options)
     return text_of(simplify(system)).text
 
 

@@ -173,7 +173,7 @@ def known_data(data: Mapping[str, object] | None) -> tuple[str, ...]:
     return tuple(data or ())
 
 
-_ELEMENT = b"requirement"
+_WRITTEN = (b"requirement", b"assume")
 
 
 def requirement_findings(
@@ -183,15 +183,22 @@ def requirement_findings(
     data: Iterable[str] = (),
 ) -> list[Finding]:
     """All of them. `data`: names given at start; `arbiters` None: a fleet is made up."""
-    if _ELEMENT not in mission.source:
+    if not any(each in mission.source for each in _WRITTEN):
         return []  # most have none, and what reads them takes time to load
-    from m2pem.verify.requirements import Names, collect  # noqa: PLC0415
+    from m2pem.verify.requirements import Names, collect, read_assumptions  # noqa: PLC0415
     from m2pem.verify.requirements.requirement import RequirementsError  # noqa: PLC0415
 
     writes = plugins.service_writes()
     fleet = arbiters.fleet if arbiters is not None else fleet_for(mission)
+    names = Names(mission, fleet, writes, data)
+    found: list[Finding] = []
+    for process in mission.processes:
+        try:
+            read_assumptions(names, process)
+        except RequirementsError as error:
+            found += error.findings
     try:
-        collect(Names(mission, fleet, writes, data))
+        collect(names)
     except RequirementsError as error:
-        return [replace(finding, severity=Severity.WARNING) for finding in error.findings]
-    return []
+        found += error.findings
+    return [replace(each, severity=Severity.WARNING) for each in found]

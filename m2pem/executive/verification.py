@@ -1,6 +1,6 @@
 """Verification of a mission against a fleet: the search request, the search and its findings."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,15 +12,23 @@ from m2pem.fleet.fleet import Fleet
 from m2pem.mission.elements import ErrorPolicy
 from m2pem.mission.mission import Mission
 from m2pem.mission.values import Value
+from m2pem.verify.assumptions import NOTHING, Assumptions
 from m2pem.verify.check import Report, check
 from m2pem.verify.report.findings import Findings, findings_of
-from m2pem.verify.requirements import Names, Requirement, collect
+from m2pem.verify.requirements import (
+    Names,
+    Requirement,
+    assumptions_given,
+    collect,
+    read_assumptions,
+)
 from m2pem.verify.requirements.results import with_requirements
 from m2pem.verify.search.explore import Limits, Progress
 from m2pem.verify.spin.queries import Storage
 from m2pem.verify.translate.context import behavior_of, may_be_preempted
 from m2pem.verify.translate.options import Options
 from m2pem.verify.translate.ways import KnownWays
+from m2pem.verify.under_assumptions import check_under_assumptions
 
 if TYPE_CHECKING:
     from m2pem.plugins import Plugins
@@ -54,7 +62,9 @@ def known_ways(fleet: Fleet, mission: Mission) -> KnownWays | None:
 
 @dataclass(frozen=True, slots=True)
 class SearchRequest:
-    """What is searched. `process`: None for the main one; `data`: what a run begins with."""
+    """What is searched. `process`: None for the main one; `data`: what a run begins with.
+    `assumed`: what the whole check assumes.
+    """
 
     mission: Mission
     fleet: Fleet
@@ -62,6 +72,7 @@ class SearchRequest:
     data: Mapping[str, Value]
     options: Options
     requirements: Sequence[Requirement] = ()
+    assumed: Assumptions = NOTHING
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,11 +93,13 @@ def search_request(
     spec: Path | bytes | None = None,
     *,
     timers_in_order: bool = False,
+    assume: Iterable[str] = (),
 ) -> SearchRequest:
     """What is to be searched, if `m2pem check` finds no errors in it.
 
     `arbiters` None: a fleet is made up, and the mission's roles are not checked. `spec`: more
-    requirements, a file or its text.
+    requirements, a file or its text. `assume`: what the whole check assumes, beside what the
+    mission's file says.
 
     Raises:
         MissionError: there are errors; it has all of them.
@@ -103,8 +116,11 @@ def search_request(
         catalogue=arbiters.offered if arbiters is not None else None,
         ways=known_ways(fleet, mission),
     )
-    requirements = collect(Names(mission, fleet, writes, data), spec)
-    return SearchRequest(mission, fleet, process, data, options, requirements)
+    names = Names(mission, fleet, writes, data)
+    assumed = assumptions_given(assume, names)
+    assumed &= read_assumptions(names, mission.process(process))
+    requirements = collect(names, spec)
+    return SearchRequest(mission, fleet, process, data, options, requirements, assumed)
 
 
 def search(
@@ -115,17 +131,15 @@ def search(
     progress: Callable[[Progress], None] | None = None,
 ) -> Findings:
     """Search, and return what was found."""
-    report = with_requirements(
-        _report(request, engine, progress),
-        request.mission,
-        request.fleet,
+    report = check_under_assumptions(
+        _Checks(request, engine, progress),
         request.requirements,
-        process=request.process,
-        options=request.options,
-        limits=engine.limits,
-        storage=Storage(engine.storage),
-        progress=progress,
+        request.assumed,
+        engine.limits,
+        short=_Checks(request, replace(engine, name="builtin", storage="exact"), progress),
     )
+    if request.assumed:
+        report = replace(report, notes=(*report.notes, _assumed(request.assumed)))
     if request.options.timers_in_order:
         report = replace(report, notes=(*report.notes, IN_ORDER))
     if _opens_incidents(request):
@@ -136,6 +150,13 @@ def search(
     return findings_of(request.mission, report, strict=strict, given=request.data)
 
 
+def _assumed(assumed: Assumptions) -> str:
+    return (
+        f"assumed: {assumed.english}; where nothing else is said, a verdict is the same without "
+        "that"
+    )
+
+
 def _opens_incidents(request: SearchRequest) -> bool:
     said = [process.on_error for process in request.mission.processes]
     return ErrorPolicy.INCIDENT in said or (
@@ -143,26 +164,51 @@ def _opens_incidents(request: SearchRequest) -> bool:
     )
 
 
-def _report(
-    request: SearchRequest, engine: SearchEngine, progress: Callable[[Progress], None] | None
-) -> Report:
-    if engine.name == "spin":
-        from m2pem.verify.spin.check import check_with_spin  # noqa: PLC0415  # seldom wanted
+@dataclass(frozen=True, slots=True)
+class _Checks:
+    """The checks of a request by one engine."""
 
-        return check_with_spin(
+    request: SearchRequest
+    engine: SearchEngine
+    progress: Callable[[Progress], None] | None
+
+    def properties(self, assumed: Assumptions, limits: Limits) -> Report:
+        """Check every property of missions."""
+        request = self.request
+        if self.engine.name == "spin":
+            from m2pem.verify.spin.check import check_with_spin  # noqa: PLC0415  # seldom wanted
+
+            return check_with_spin(
+                request.mission,
+                request.fleet,
+                process=request.process,
+                options=replace(request.options, assumed=assumed),
+                limits=limits,
+                storage=Storage(self.engine.storage),
+                progress=self.progress,
+            )
+        return check(
             request.mission,
             request.fleet,
             process=request.process,
-            options=request.options,
-            limits=engine.limits,
-            storage=Storage(engine.storage),
-            progress=progress,
+            options=replace(request.options, assumed=assumed),
+            limits=limits,
+            progress=self.progress,
         )
-    return check(
-        request.mission,
-        request.fleet,
-        process=request.process,
-        options=request.options,
-        limits=engine.limits,
-        progress=progress,
-    )
+
+    def requirements(
+        self, report: Report, asked: Sequence[Requirement], assumed: Assumptions, limits: Limits
+    ) -> Report:
+        """Return the report with the results of requirements added."""
+        request = self.request
+        return with_requirements(
+            report,
+            request.mission,
+            request.fleet,
+            asked,
+            process=request.process,
+            options=replace(request.options, assumed=assumed),
+            limits=limits,
+            storage=Storage(self.engine.storage),
+            progress=self.progress,
+        )

@@ -118,10 +118,11 @@ def search_request(
     requirements: Path | bytes | None = None,
     *,
     timers_in_order: bool = False,
+    assume: Iterable[str] = (),
 ) -> SearchRequest:
     """Return the search of a mission in which `check` finds no errors.
 
-    `requirements`: a file of more of them, or its text.
+    `requirements`: a file of more of them, or its text. `assume`: what the whole check assumes.
 
     Raises:
         MissionError: there are errors; it lists all.
@@ -131,7 +132,14 @@ def search_request(
     plugins = PluginManager()
     arbiters = arbiters_of(fleet_of(fleet, mission), plugins) if fleet is not None else None
     return verification.search_request(
-        mission, arbiters, plugins, process, data, requirements, timers_in_order=timers_in_order
+        mission,
+        arbiters,
+        plugins,
+        process,
+        data,
+        requirements,
+        timers_in_order=timers_in_order,
+        assume=assume,
     )
 
 
@@ -144,6 +152,7 @@ def verify(
     requirements: str | Path | bytes | None = None,
     strict: bool = False,
     timers_in_order: bool = False,
+    assume: str | Iterable[str] = (),
     engine: Literal["builtin", "spin"] = "builtin",
     storage: Literal["exact", "collapse", "bitstate"] = "exact",
     max_states: int = MAX_STATES,
@@ -154,10 +163,11 @@ def verify(
     """Prove properties and requirements of a mission, or find runs that violate them.
 
     As `m2pem verify`, whose options these are. `fleet` None: one is made up. `requirements`: a
-    YAML file, or its text as bytes, beside those in the mission's own file. `strict`: warnings are
-    violations. `engine`: `builtin` or `spin`; `storage`, of Spin alone: `exact`, `collapse` or
-    `bitstate`. `max_states` and `max_seconds` end a search undecided; so does an interrupt of the
-    kernel (Ctrl-C), with what has been searched. `on_progress` is called now and then.
+    YAML file, or its text as bytes, beside those in the mission's own file. `assume`: what all runs
+    are taken to do, such as "no-failures". `strict`: warnings are violations. `engine`: `builtin`
+    or `spin`; `storage`, of Spin alone: `exact`, `collapse` or `bitstate`. `max_states` and
+    `max_seconds` end a search undecided; so does an interrupt of the kernel (Ctrl-C), with what has
+    been searched. `on_progress` is called now and then.
 
     Raises:
         MissionError: `check` finds errors; it lists all.
@@ -172,7 +182,13 @@ def verify(
     loaded = load_mission(mission, search_path)
     more = Path(requirements) if isinstance(requirements, str) else requirements
     request = search_request(
-        loaded, fleet, process, data or {}, more, timers_in_order=timers_in_order
+        loaded,
+        fleet,
+        process,
+        data or {},
+        more,
+        timers_in_order=timers_in_order,
+        assume=(assume,) if isinstance(assume, str) else assume,
     )
     limits = Limits(states=max_states, seconds=max_seconds, tokens=TOKENS_ON_A_PLACE)
     search_engine = SearchEngine(engine, storage, limits)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from m2pem.fleet.default_fleet import fleet_for
 from m2pem.fleet.fleet import Fleet
 from m2pem.mission.mission import Mission
+from m2pem.verify.assumptions import NOTHING, Assumptions
 from m2pem.verify.net.petri_net import PetriNet, Place, Role, Scope
 from m2pem.verify.net.simplify import simplify
 from m2pem.verify.net.size_limit import MOST_TRANSITIONS
@@ -33,7 +34,8 @@ class Report:
 
     `states`: how many states were seen; `found` may hold fewer, if another engine saw the rest.
     `notes`: remarks on the answers. `watched`: the net that also notes which vehicles are
-    interrupted; `asked`: the net that requirements were checked on.
+    interrupted; `asked`: the net that requirements were checked on. `assumed`: what the whole check
+    assumes; `without`: the same check where nothing is assumed.
     """
 
     net: PetriNet
@@ -44,9 +46,13 @@ class Report:
     states: int = 0
     notes: tuple[str, ...] = ()
     asked: PetriNet | None = None
+    assumed: Assumptions = NOTHING
+    without: "Report | None" = None
 
     def transitions_of(self, result: Result) -> PetriNet:
         """The net whose transitions the runs of a result number."""
+        if result.net is not None:
+            return result.net
         if result.required:
             return self.asked or self.net
         return (self.watched or self.net) if result.property == INTERRUPTED else self.net

@@ -5,6 +5,7 @@ from random import Random
 
 import pytest
 
+from m2pem.verify.assumptions import NO_FAILURES
 from m2pem.verify.check import Report, check
 from m2pem.verify.net.petri_net import Action, Exactness
 from m2pem.verify.net.simplify import simplify
@@ -36,7 +37,7 @@ from tests.verify.test_spin_agreement import one_answer, same
 from tests.verify.trace_mapping import TooManyStatesError
 
 CLOSED = replace(OPEN, open_world=False)
-WITHOUT_FAILURES = replace(CLOSED, failures=False)
+WITHOUT_FAILURES = replace(CLOSED, assumed=NO_FAILURES)
 
 
 def kept(text: str, vehicles: int = 2, *, failures: bool = True) -> Report:
@@ -167,7 +168,7 @@ def test_it_is_kept_however_its_scope_ends() -> None:
     s -> P -> e
     b -> B -> o
     """
-    report = report_of(text, replace(OPEN, failures=False), uav1="red")
+    report = report_of(text, replace(OPEN, assumed=NO_FAILURES), uav1="red")
     assert verdict(report, "errors-caught") is Verdict.HOLDS
 
 
@@ -200,7 +201,7 @@ def test_what_an_event_subprocess_interrupts_is_still_kept(ends: str, expected: 
         first="X -> " if ends else "",
         other=_task("B", "uav1"),
     )
-    report = report_of(text, replace(OPEN, failures=False), uav1="red")
+    report = report_of(text, replace(OPEN, assumed=NO_FAILURES), uav1="red")
     assert verdict(report, "errors-caught") is expected
     found = next(each for each in report.results if each.property == "errors-caught").violations
     labels = {report.net.transitions[number].element for each in found for number in each.run}
@@ -326,7 +327,7 @@ def test_a_vehicle_that_is_kept_and_interrupted_is_commanded_again_or_it_is_a_vi
     <boundaryEvent id="b" attachedToRef="P">signal stop</boundaryEvent>
     s -> P -> e
     """
-    options = replace(OPEN, failures=False)
+    options = replace(OPEN, assumed=NO_FAILURES)
     left = f"{text}\nb -> o"
     report = report_of(left, options, uav1="red", uav2="red")
     found = messages(left, report, "interrupted-commanded-again")

@@ -2,6 +2,7 @@ import pytest
 
 from m2pem.fleet.default_fleet import fleet_for
 from m2pem.mission.mission import Mission
+from m2pem.verify.assumptions import NO_FAILURES
 from m2pem.verify.ltl import parse, propositions
 from m2pem.verify.ltl.model_check import Result
 from m2pem.verify.net.petri_net import Action
@@ -14,7 +15,7 @@ from tests.verify.answers import check_mission
 from tests.verify.missions import approval, in_a_row, pair, survey, task
 
 HOLDS, VIOLATED, UNDECIDED = Result.HOLDS, Result.VIOLATED, Result.UNDECIDED
-CERTAIN = Options(failures=False)
+CERTAIN = Options(assumed=NO_FAILURES)
 TWO_EACH = (
     "{id: a, pattern: visits_at_least, args: {resource: each, behavior: area_survey, times: 2}}"
 )
@@ -104,7 +105,7 @@ def test_the_next_step_is_the_next_transition() -> None:
 
 def test_data_that_the_run_is_started_with_is_known() -> None:
     mission = in_a_row(survey("North", "uav1", "${mission.area}"))
-    options = Options(data={"mission.area": "north"}, failures=False)
+    options = Options(data={"mission.area": "north"}, assumed=NO_FAILURES)
     assert ltl(mission, "[] mission.area == 'north'", options).result is HOLDS
     assert ltl(mission, "[] mission.area == 'south'", options).result is VIOLATED
     answer = ltl(mission, "[] mission.area == 'north'")

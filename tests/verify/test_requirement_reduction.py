@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 
 from m2pem.fleet.default_fleet import fleet_for
 from m2pem.mission.mission import Mission
+from m2pem.verify.assumptions import NO_FAILURES
 from m2pem.verify.ltl import parse
 from m2pem.verify.ltl.formula import Active, Completed, Formula, Proposition, rebuilt
 from m2pem.verify.ltl.model_check import Result
@@ -27,7 +28,7 @@ from tests.verify.missions import ask
 from tests.verify.missions import mission as build
 from tests.verify.models import branches as user_tasks
 
-CERTAIN = Options(failures=False)
+CERTAIN = Options(assumed=NO_FAILURES)
 
 
 def about(formula: Formula, atoms: dict[Proposition, Proposition]) -> Formula:

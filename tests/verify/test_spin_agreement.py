@@ -14,6 +14,7 @@ from m2pem.bpmn import read_mission
 from m2pem.fleet.default_fleet import fleet_for
 from m2pem.fleet.fleet import Fleet
 from m2pem.mission.mission import Mission
+from m2pem.verify.assumptions import NO_FAILURES
 from m2pem.verify.check import check
 from m2pem.verify.ltl import Formula, propositions
 from m2pem.verify.ltl.formula import (
@@ -260,7 +261,7 @@ def test_no_more_is_asked_when_the_time_is_over(monkeypatch: pytest.MonkeyPatch)
 
 def answers(mission: Mission, required: Sequence[Requirement]) -> list[tuple[Result, Result]]:
     fleet = fleet_for(mission)
-    options = Options(failures=False, conditions=conditions(required))
+    options = Options(assumed=NO_FAILURES, conditions=conditions(required))
     net = translate(mission, fleet, options=options)
     found, spins = explore(net), search(net)
     return [

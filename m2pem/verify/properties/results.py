@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from m2pem.mission.mission import Mission
+from m2pem.verify.assumptions import NOTHING, Assumptions
 from m2pem.verify.net.petri_net import PetriNet, Role
 from m2pem.verify.search.explore import Exploration
 
@@ -52,6 +53,14 @@ class Result:
     """
     required: bool = False
     author: str = ""
+    assumed: Assumptions = NOTHING
+    """What the verdict assumes."""
+    without: "Result | None" = None
+    """The answer to the same where nothing is assumed."""
+    would_hold_if: Assumptions = NOTHING
+    """Violated, where nothing is assumed: it holds under this assumption."""
+    net: PetriNet | None = None
+    """The net whose transitions the runs number; None: as `Report.transitions_of` says."""
 
 
 MOST_VIOLATIONS = 10

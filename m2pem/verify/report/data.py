@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from hashlib import sha256
 from typing import Any
 
+from m2pem.verify.properties.results import Result
+from m2pem.verify.report.conditions import condition_of
 from m2pem.verify.report.findings import DescribedViolation, Findings
 from m2pem.verify.report.run_steps import RunStep, Token
 
@@ -24,6 +26,7 @@ def as_data(findings: Findings) -> dict[str, Any]:
         "data": dict(findings.given),
         "verdict": findings.verdict.value,
         "strict": findings.strict,
+        "assumed": str(findings.assumed),
         "engine": coverage.engine,
         "coverage": {
             "states": coverage.states,
@@ -41,6 +44,10 @@ def as_data(findings: Findings) -> dict[str, Any]:
                 "note": answer.covered,
                 "required": answer.required,
                 "author": answer.author,
+                "assumed": str(answer.assumed),
+                "condition": condition_of(findings, answer),
+                "without": _without(findings, answer),
+                "would_hold_if": str(answer.would_hold_if),
             }
             for answer in findings.results
         ],
@@ -50,6 +57,18 @@ def as_data(findings: Findings) -> dict[str, Any]:
             {"element": each.element, "exactness": each.exactness.value, "what": each.what}
             for each in findings.net.approximations
         ],
+    }
+
+
+def _without(findings: Findings, answer: Result) -> dict[str, Any] | None:
+    """The answer where nothing is assumed."""
+    if answer.without is None:
+        return None
+    violation = findings.violation_without(answer)
+    return {
+        "verdict": answer.without.verdict.value,
+        "note": answer.without.covered,
+        "violation": _violation(violation) if violation is not None else None,
     }
 
 

@@ -8,6 +8,7 @@ from m2pem.mission import elements as e
 from m2pem.mission.events import CompensateEventDefinition
 from m2pem.mission.mission import Mission
 from m2pem.mission.values import Value
+from m2pem.verify.assumptions import NOTHING, Assumptions
 from m2pem.verify.check import Report
 from m2pem.verify.net.petri_net import Action, PetriNet
 from m2pem.verify.properties.results import Result, Verdict, Violation
@@ -64,7 +65,8 @@ class Findings:
     """What was found about a mission. `violations`: errors first, then warnings.
 
     `unreached`: elements that no run reaches, as far as that is known. `given`: the data that the
-    run begins with.
+    run begins with. `assumed`: what the whole check assumes; `without`: the first violation of each
+    answer to what assumes something, where nothing is assumed.
     """
 
     mission: Mission
@@ -76,6 +78,12 @@ class Findings:
     unreached: frozenset[str] = frozenset()
     strict: bool = False
     given: Mapping[str, Value] = field(default_factory=dict)
+    assumed: Assumptions = NOTHING
+    without: tuple[DescribedViolation, ...] = ()
+
+    def violation_without(self, answer: Result) -> DescribedViolation | None:
+        """The violation of an answer's property where nothing is assumed."""
+        return next((each for each in self.without if each.answer is answer.without), None)
 
     def counts(self, answer: Result) -> bool:
         """Whether a violation of this property is an error, and not a warning."""
@@ -101,7 +109,7 @@ def findings_of(
         net = report.transitions_of(result)
         run_step += [_describe(net, element_names, result, each) for each in result.violations]
     run_step.sort(key=lambda each: (each.answer.warning, _follows(each.answer)))
-    found = report.found
+    found, plain = report.found, report.without or report
     stopped = found.stopped.value if found.stopped is not None else ""
     return Findings(
         mission,
@@ -117,9 +125,15 @@ def findings_of(
             report.notes,
         ),
         tuple(run_step),
-        frozenset() if stopped else _unreached(mission, report),
+        frozenset() if plain.found.stopped is not None else _unreached(mission, plain),
         strict,
         given or {},
+        report.assumed,
+        tuple(
+            _describe(each.net, element_names, each, each.violations[0])
+            for result in report.results
+            if (each := result.without) is not None and each.violations and each.net is not None
+        ),
     )
 
 

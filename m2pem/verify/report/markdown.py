@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from xml.sax.saxutils import escape
 
 from m2pem.verify.properties.results import Verdict
+from m2pem.verify.report.conditions import condition_of
 from m2pem.verify.report.findings import DescribedViolation, Findings
 from m2pem.verify.report.run_steps import RunStep
 from m2pem.verify.report.text import covered
@@ -28,6 +29,8 @@ def _lines(findings: Findings, pictures: Mapping[int, Sequence[str]]) -> Iterato
         if answer.verdict is Verdict.VIOLATED and not findings.counts(answer):
             verdict = "warning"
         said = [answer.text, *([f"({answer.covered})"] if answer.covered else [])]
+        condition = condition_of(findings, answer)
+        said += [_sentence(condition)] if condition else []
         said += [f"For: {answer.author}"] if answer.author else []
         yield f"| `{answer.property}` | {verdict} | {_plain(' '.join(said))} |"
     for number, violation in enumerate(findings.violations):

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator
 
 from m2pem.verify.net.petri_net import Exactness
 from m2pem.verify.properties.results import Result, Verdict
+from m2pem.verify.report.conditions import assumes, condition_of
 from m2pem.verify.report.findings import Coverage, DescribedViolation, Findings
 from m2pem.verify.report.run_steps import RunStep
 
@@ -55,6 +56,8 @@ def _properties(findings: Findings, paint: Paint) -> Iterator[str]:
         note = f" ({answer.covered})" if answer.covered else ""
         run_step = _shown(f"{answer.property:<{width}}  {answer.text}{note}")
         yield f"{paint(f'{word:<9}', colour)}  {run_step}"
+        if condition := condition_of(findings, answer):
+            yield f"{'':<{width + 13}}{_shown(condition)}"
         if answer.author:
             yield f"{'':<{width + 13}}for: {_shown(answer.author)}"
 
@@ -103,7 +106,7 @@ def _summary(findings: Findings, paint: Paint) -> str:
     verdict = findings.verdict
     colour = {"holds": "green", "violated": "red", "undecided": "yellow"}[verdict.value]
     said = {
-        Verdict.HOLDS: "everything holds",
+        Verdict.HOLDS: "everything holds" + (" as assumed" if assumes(findings) else ""),
         Verdict.VIOLATED: "violated",
         Verdict.UNDECIDED: "undecided",
     }[verdict]

@@ -3,8 +3,10 @@ a spec file.
 """
 
 from m2pem.verify.requirements.collection import (
+    assumptions_given,
     collect,
     parse_spec,
+    read_assumptions,
     read_mission_requirements,
     read_spec,
 )
@@ -15,8 +17,10 @@ __all__ = [
     "Names",
     "Requirement",
     "RequirementsError",
+    "assumptions_given",
     "collect",
     "parse_spec",
+    "read_assumptions",
     "read_mission_requirements",
     "read_spec",
 ]

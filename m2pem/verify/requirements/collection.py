@@ -4,6 +4,8 @@ The BPMN file has `m2pem:requirement` in a process's extension elements; the spe
 (`m2pem verify --spec FILE`).
 """
 
+from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +14,16 @@ from lxml import etree
 from m2pem.bpmn.xml import BPMN, M2PEM, Document, parse_xml
 from m2pem.findings import Finding, Severity
 from m2pem.fleet.yaml_source import KeyPath, YamlSource, dotted, parse_yaml, read_yaml
+from m2pem.mission import elements as e
 from m2pem.suggestions import suggest
+from m2pem.verify.assumptions import NOTHING, Assumptions
 from m2pem.verify.requirements.names import Names
-from m2pem.verify.requirements.reader import UnusableError, WrittenRequirement, requirements_of
+from m2pem.verify.requirements.reader import (
+    UnusableError,
+    WrittenRequirement,
+    assumptions_of,
+    requirements_of,
+)
 from m2pem.verify.requirements.requirement import Requirement, RequirementsError, misread
 
 
@@ -97,10 +106,34 @@ def _written(
         None if element.get("fair") is None else element.get("fair") == "true",
         file,
         document.line(element),
+        element.get("assume", ()),
     )
 
 
-_KEYS = ("id", "text", "ltl", "pattern", "args", "fair")
+def read_assumptions(names: Names, process: e.Process) -> Assumptions:
+    """What the mission's file assumes of all runs that begin with a process: its `m2pem:assume`.
+
+    Raises:
+        RequirementsError: it cannot be used.
+    """
+    mission = names.mission
+    if process.file:
+        return NOTHING  # another file's
+    document = parse_xml(mission.source)
+    for element in document.root.iter(BPMN + "process"):
+        text = element.get(M2PEM + "assume")
+        if text is None or element.get("id") != process.id:
+            continue
+        try:
+            return assumptions_of(text, names)
+        except UnusableError as error:
+            line = document.line(element)
+            where = (mission.file, line, process.id, "assumption", error.message, error.remedy)
+            raise RequirementsError([Finding(Severity.ERROR, *where)]) from None
+    return NOTHING
+
+
+_KEYS = ("id", "text", "ltl", "pattern", "args", "fair", "assume")
 
 
 def read_spec(path: Path, names: Names) -> list[Requirement]:
@@ -121,6 +154,7 @@ def _requirements(source: YamlSource, names: Names) -> list[Requirement]:
     found: list[Requirement] = []
     if not source.findings:
         entries = _entries(source)
+        of_all = _assumed_of_all(source, names)
         seen: dict[str, int] = {}
         for number, entry in enumerate(entries):
             path: KeyPath = ("requirements", number)
@@ -137,7 +171,10 @@ def _requirements(source: YamlSource, names: Names) -> list[Requirement]:
                 continue
             seen[written.id] = written.line
             try:
-                found += requirements_of(written, names)
+                found += (
+                    replace(each, assumed=each.assumed & of_all)
+                    for each in requirements_of(written, names)
+                )
             except UnusableError as error:
                 where = (*path, *error.where.split(".", 1)) if error.where else path
                 _note(source, where, written.id, error)
@@ -168,9 +205,29 @@ def _entries(source: YamlSource) -> list[Any]:
         return []
     assert isinstance(data, dict)
     for key in data:
-        if key != "requirements":
+        if key not in ("requirements", "assume"):
             source.error((key,), "requirement", f"'{key}' means nothing here", "delete it")
     return entries
+
+
+def _assumed_of_all(source: YamlSource, names: Names) -> Assumptions:
+    """What a file assumes of all its requirements."""
+    data = source.data
+    text: Any = data.get("assume", ()) if isinstance(data, dict) else ()
+    if not _is_assumption(text):
+        source.error(("assume",), "assumption", "'assume' is no text and no list of texts")
+        return NOTHING
+    try:
+        return assumptions_of(text, names)
+    except UnusableError as error:
+        source.error(("assume",), "assumption", error.message, error.remedy)
+        return NOTHING
+
+
+def _is_assumption(value: Any) -> bool:
+    """Whether it is a text, or a list of texts."""
+    listed = value if isinstance(value, list | tuple) else [value]
+    return all(isinstance(each, str) for each in listed)
 
 
 def _item(source: YamlSource, path: KeyPath, entry: Any) -> WrittenRequirement | None:
@@ -202,6 +259,9 @@ def _item(source: YamlSource, path: KeyPath, entry: Any) -> WrittenRequirement |
     if not isinstance(entry.get("fair", False), bool):
         wrong = True
         source.error((*path, "fair"), "requirement", "'fair' is true or false")
+    if not _is_assumption(entry.get("assume", ())):
+        wrong = True
+        source.error((*path, "assume"), "requirement", "'assume' is no text and no list of texts")
     if wrong:
         return None
     return WrittenRequirement(
@@ -213,7 +273,27 @@ def _item(source: YamlSource, path: KeyPath, entry: Any) -> WrittenRequirement |
         entry.get("fair"),
         source.file,
         source.line(path),
+        entry.get("assume", ()),
     )
+
+
+def assumptions_given(texts: Iterable[str], names: Names) -> Assumptions:
+    """What `--assume` says, once or several times.
+
+    Raises:
+        RequirementsError: it cannot be used.
+    """
+    found = NOTHING
+    findings: list[Finding] = []
+    for text in texts:
+        try:
+            found &= assumptions_of(text, names)
+        except UnusableError as error:
+            where = ("--assume", 0, "", "assumption", error.message, error.remedy)
+            findings.append(Finding(Severity.ERROR, *where))
+    if findings:
+        raise RequirementsError(findings)
+    return found
 
 
 TEXT_NAME = "requirements.yaml"

@@ -1,12 +1,14 @@
 """The reader of requirements: what spec files and BPMN files have in common."""
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from m2pem.errors import ExpressionSyntaxError, M2pemError
 from m2pem.suggestions import did_you_mean, suggest
+from m2pem.verify.assumptions import AssumptionError, Assumptions, refuse_unknown
+from m2pem.verify.assumptions import parse as parse_assumptions
 from m2pem.verify.ltl import parse
 from m2pem.verify.ltl.formula import Completed, Formula, negated
 from m2pem.verify.ltl.observer import Observer
@@ -45,7 +47,9 @@ class UnusableError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class WrittenRequirement:
-    """A requirement as written. `arguments`: texts, numbers, flags and lists of texts, by name."""
+    """A requirement as written. `arguments`: texts, numbers, flags and lists of texts, by name.
+    `assume`: a text, or a list of texts.
+    """
 
     id: str
     ltl: str | None = None
@@ -55,6 +59,7 @@ class WrittenRequirement:
     fair: bool | None = None
     file: str = ""
     line: int = 0
+    assume: str | Sequence[str] = ()
 
 
 def requirements_of(written: WrittenRequirement, names: Names) -> Iterator[Requirement]:
@@ -67,6 +72,7 @@ def requirements_of(written: WrittenRequirement, names: Names) -> Iterator[Requi
         raise UnusableError(
             "", "a requirement has either 'ltl' or 'pattern'", "write one of the two"
         )
+    assumed = assumptions_of(written.assume, names)
     if written.ltl is not None:
         if written.arguments:
             raise UnusableError("args", "only a pattern takes arguments", "delete them")
@@ -80,6 +86,7 @@ def requirements_of(written: WrittenRequirement, names: Names) -> Iterator[Requi
                 fair=bool(written.fair),
                 file=written.file,
                 line=written.line,
+                assumed=assumed,
             ),
             "ltl",
         )
@@ -89,11 +96,25 @@ def requirements_of(written: WrittenRequirement, names: Names) -> Iterator[Requi
     if pattern is None:
         hint = suggest(written.pattern, PATTERNS, "patterns")
         raise UnusableError("pattern", f"there is no pattern '{written.pattern}'", hint)
-    yield from _of_pattern(written, pattern, names)
+    yield from _of_pattern(written, pattern, names, assumed)
+
+
+def assumptions_of(text: str | Iterable[str], names: Names) -> Assumptions:
+    """Read what is assumed.
+
+    Raises:
+        UnusableError: it is no assumption, or names what the fleet lacks.
+    """
+    try:
+        found = parse_assumptions(text)
+        refuse_unknown(found, names.fleet)
+    except AssumptionError as error:
+        raise UnusableError("assume", error.message, error.remedy) from None
+    return found
 
 
 def _of_pattern(
-    written: WrittenRequirement, pattern: Pattern, names: Names
+    written: WrittenRequirement, pattern: Pattern, names: Names, assumed: Assumptions
 ) -> Iterator[Requirement]:
     values, scope = _values(written, pattern, names)
     resource = pattern.argument("resource")
@@ -123,6 +144,7 @@ def _of_pattern(
                 pattern.fair if written.fair is None else written.fair,
                 written.file,
                 written.line,
+                assumed,
             ),
             "args",
         )

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from m2pem.errors import FindingsError
 from m2pem.findings import Finding, Severity
+from m2pem.verify.assumptions import NOTHING, Assumptions
 from m2pem.verify.ltl.formula import Formula
 
 _MOST_SHOWN = 90
@@ -61,6 +62,7 @@ class Requirement:
     `text`: the author's description, "" if there is none; `english`: the formula in words.
     `pattern`: the name of its pattern, "" for a formula as written. `resource`: the vehicle it was
     made for, if it was made for each. `fair`: only fair runs count. `line` counts from 1.
+    `assumed`: only runs count in which that is so.
     """
 
     id: str
@@ -72,3 +74,4 @@ class Requirement:
     fair: bool = False
     file: str = ""
     line: int = 0
+    assumed: Assumptions = NOTHING

@@ -1,6 +1,7 @@
 """Translate a mission into a net: its processes, outside triggers, and the end of the run."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from m2pem.fleet.default_fleet import fleet_for
 from m2pem.fleet.fleet import Fleet
@@ -17,6 +18,7 @@ from m2pem.verify.net.petri_net import Action, Exactness, Kind, PetriNet, Role, 
 from m2pem.verify.net.size_limit import SizeLimit
 from m2pem.verify.translate import activities, events, gateways, subprocesses
 from m2pem.verify.translate.activities import translate_contention
+from m2pem.verify.translate.assumed import restrict
 from m2pem.verify.translate.compensation import release_claims
 from m2pem.verify.translate.context import Catcher, TranslationContext, what_and_ref
 from m2pem.verify.translate.events import after, awaited
@@ -61,9 +63,10 @@ def translate(
     """
     root = mission.process(process)
     size_limit = size_limit or SizeLimit()
-    context = TranslationContext(
-        mission, root, fleet or fleet_for(mission), options or Options(), size_limit
-    )
+    fleet, options = fleet or fleet_for(mission), options or Options()
+    reliable = options.assumed.resources(fleet)
+    options = replace(options, distinguished=reliable.union(options.distinguished))
+    context = TranslationContext(mission, root, fleet, options, size_limit)
     context.build_node = build_node
     context.root = context.net.scope(root, context.everything, step=root.id, frame=(root.id,))
     context.data.follow(context.root.frame)
@@ -86,13 +89,14 @@ def translate(
         put_in_order(context)
     _completes(context)
     initial = follow_order(context, enter_at_once(context.net, initial))
-    return context.net.finish(
+    net = context.net.finish(
         mission.file,
         root.id,
         tuple(context.data.variables),
         initial,
         (context.completed, context.terminated, context.failed),
     )
+    return restrict(net, mission, fleet, options.assumed)
 
 
 def _completes(context: TranslationContext) -> None:

@@ -13,11 +13,13 @@ from dataclasses import replace
 from m2pem.mission import elements as e
 from m2pem.mission.behavior import Behavior
 from m2pem.mission.catalogue import ResourceId
-from m2pem.verify.net.petri_net import Action, Exactness, Kind, Role, Step
+from m2pem.verify.net.petri_net import Action, Exactness, Kind, Place, Role, Step
 from m2pem.verify.translate.context import ActivityInstance, TranslationContext
 from m2pem.verify.translate.net_builder import Effect
 from m2pem.verify.translate.pools import Pool
 from m2pem.verify.translate.space import Departure, Group, Move, Mover, SpacePlan, Spaces
+
+_REFUSED = ":refused"
 
 
 def movers_of(
@@ -274,7 +276,12 @@ def space_place(context: TranslationContext, name: str) -> int:
 
 def refused_place(context: TranslationContext, instance: ActivityInstance) -> int:
     """Return the place of a token while a behavior has begun that is going to be rejected."""
-    return context.net.place(instance.node, instance.inside, Role.CONTROL, ":refused")
+    return context.net.place(instance.node, instance.inside, Role.CONTROL, _REFUSED)
+
+
+def is_refused(place: Place) -> bool:
+    """Whether a token on a place says that a behavior has begun that is going to be rejected."""
+    return place.role is Role.CONTROL and place.name.endswith(_REFUSED)
 
 
 def may_be_refused(context: TranslationContext, instance: ActivityInstance) -> bool:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from m2pem.fleet.graph import Catalogue
 from m2pem.mission.expression import Expression
 from m2pem.mission.values import Value
+from m2pem.verify.assumptions import NOTHING, Assumptions
 from m2pem.verify.translate.ways import KnownWays
 
 
@@ -18,11 +19,11 @@ class Options:
     signal and message may come from outside, not only those that operators are expected to send.
     `instances`: how many parallel instances of an activity, and of a process that triggers start,
     are modelled when the mission does not state their number. `calls`: how often a process may be
-    called within itself. `failures`: behaviors and services may fail. `timers_in_order`: of timers
-    that begin to run together, the one that is due first fires first. `catalogue`: what each
-    resource offers; None: all that the mission asks for. `distinguished`: resources that
-    requirements are about. `ways`: where vehicles go, so that shared space is followed; None: it is
-    taken to be free.
+    called within itself. `assumed`: what is taken not to happen. `timers_in_order`: of timers that
+    begin to run together, the one that is due first fires first. `catalogue`: what each resource
+    offers; None: all that the mission asks for. `distinguished`: resources that requirements are
+    about. `ways`: where vehicles go, so that shared space is followed; None: it is taken to be
+    free.
     """
 
     data: Mapping[str, Value] = field(default_factory=dict)
@@ -30,7 +31,7 @@ class Options:
     open_world: bool = False
     instances: int = 2
     calls: int = 1
-    failures: bool = True
+    assumed: Assumptions = NOTHING
     timers_in_order: bool = False
     conditions: Sequence[Expression] = ()
     """Conditions of requirements on the data of the process that the run begins with."""
@@ -39,3 +40,8 @@ class Options:
     ways: KnownWays | None = None
     most_instances: int = 8
     """Most instances of a number that the mission states; above, `instances` are checked."""
+
+    @property
+    def failures(self) -> bool:
+        """Whether behaviors and services may fail."""
+        return self.assumed.failures != 0

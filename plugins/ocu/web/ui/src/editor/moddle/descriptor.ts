@@ -74,7 +74,7 @@ export const m2pemDescriptor = {
       name: "Requirement",
       superClass: ["Element"],
       properties: [
-        ...["id", "ltl", "pattern", "text", "fair"].map(attribute),
+        ...["id", "ltl", "pattern", "text", "fair", "assume"].map(attribute),
         children("args", "Arg"),
       ],
     },
@@ -100,6 +100,7 @@ export const m2pemDescriptor = {
       extends: ["bpmn:Process"],
       properties: ["onError", "incidentRole"].map(attribute),
     },
+    { name: "Checked", extends: ["bpmn:Process"], properties: [attribute("assume")] },
     {
       name: "Choice",
       extends: ["bpmn:AdHocSubProcess"],

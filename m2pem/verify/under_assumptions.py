@@ -1,0 +1,208 @@
+"""Answer each property and requirement under its assumptions, and without them.
+
+The answer that counts is the one under the assumptions. Beside it is the answer where nothing is
+assumed, with the run that violates it. Where nothing is assumed and something is violated because a
+behavior fails, a short search says whether it would hold if no behavior failed.
+"""
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+from m2pem.verify.assumptions import NO_FAILURES, NOTHING, Assumptions
+from m2pem.verify.check import Report
+from m2pem.verify.net.petri_net import Trigger
+from m2pem.verify.properties.results import Result, Verdict
+from m2pem.verify.requirements.requirement import Requirement
+from m2pem.verify.search.explore import Limits, Stopped
+
+REACHABLE = "no-dead-element"
+"""The property that is judged without assumptions: what follows a failure is not dead because an
+author assumes that nothing fails."""
+
+WOULD_HOLD = frozenset(
+    {"no-deadlock", "proper-completion", "can-complete", "completes-if-fair", "no-livelock"}
+)
+"""Properties of every mission of which it is said whether they would hold if no behavior failed.
+Of the others that is no news: they are about failures, or about what is drawn."""
+
+SMALL_STATES = 20_000
+"""States up to which that is searched."""
+SMALL_SECONDS = 5.0
+
+
+class Checks(Protocol):
+    """The checks of one mission by one engine."""
+
+    def properties(self, assumed: Assumptions, limits: Limits) -> Report:
+        """Check every property of missions."""
+        ...
+
+    def requirements(
+        self, report: Report, asked: Sequence[Requirement], assumed: Assumptions, limits: Limits
+    ) -> Report:
+        """Return the report with the results of requirements added."""
+        ...
+
+
+def check_under_assumptions(
+    checks: Checks,
+    requirements: Sequence[Requirement],
+    assumed: Assumptions,
+    limits: Limits,
+    *,
+    short: Checks | None = None,
+) -> Report:
+    """Check all of a mission. `assumed`: what the whole check assumes; each requirement may assume
+    more. `short`: the engine of short searches; None: that of all.
+
+    All searches together end at the limit of time. An interrupted search is the last one.
+    """
+    return _Check(checks, short or checks, requirements, assumed, limits).report()
+
+
+@dataclass(slots=True)
+class _Check:
+    checks: Checks
+    short: Checks
+    asked: Sequence[Requirement]
+    assumed: Assumptions
+    limits: Limits
+    began: float = 0.0
+
+    def report(self) -> Report:
+        self.began = time.monotonic()
+        groups: dict[Assumptions, list[Requirement]] = {self.assumed: []}
+        for each in self.asked:
+            groups.setdefault(self.assumed & each.assumed, []).append(each)
+        report = self.checks.properties(self.assumed, self.limits)
+        for assumed, group in groups.items():
+            report = self._answer(report, group, assumed)
+        results = [self._with_net(report, each) for each in report.results]
+        without = self._without(report)
+        if without is not None:
+            plain = {_key(each): self._with_net(without, each) for each in without.results}
+            results = [_beside(each, plain.get(_key(each))) for each in results]
+        elif self.assumed:
+            results = [_not_begun(each) for each in results]
+        order = {each.id: n for n, each in enumerate(self.asked)}
+        results.sort(key=lambda each: order[each.property] if each.required else -1)
+        report = replace(report, results=tuple(results), assumed=self.assumed)
+        if self.assumed:
+            report = replace(report, without=without)
+        return self._with_hints(report)
+
+    def _answer(self, report: Report, group: Sequence[Requirement], under: Assumptions) -> Report:
+        """Add the answers to requirements that make the same assumptions."""
+        if not group:
+            return report
+        known = [self._with_net(report, each) for each in report.results]
+        report = replace(report, results=tuple(known))
+        found = self.checks.requirements(report, group, under, self._rest())
+        own = [
+            replace(self._with_net(found, each), assumed=under)
+            for each in found.results[len(known) :]
+        ]
+        return replace(found, results=(*known, *own))
+
+    def _with_net(self, report: Report, result: Result) -> Result:
+        """Note what a result numbers, and what it assumes: other searches follow."""
+        net = result.net or report.transitions_of(result)
+        assumed = result.assumed if result.required else self.assumed
+        return replace(result, net=net, assumed=assumed)
+
+    def _without(self, report: Report) -> Report | None:
+        """Check what assumes something once more, without that; None: nothing does, or a person has
+        ended the search."""
+        asked = [each for each in self.asked if self.assumed & each.assumed]
+        if _interrupted(report) or not (self.assumed or asked):
+            return None
+        if self.assumed:
+            plain = self.checks.properties(NOTHING, self._rest())
+        else:
+            plain = replace(report, results=())
+        if not asked:
+            return plain
+        known = plain.results
+        found = self.checks.requirements(plain, asked, NOTHING, self._rest())
+        own = found.results[len(known) :]
+        with_nets = (replace(each, net=found.transitions_of(each)) for each in own)
+        return replace(found, results=(*known, *with_nets))
+
+    def _rest(self) -> Limits:
+        seconds = max(0.0, self.limits.seconds - (time.monotonic() - self.began))
+        return replace(self.limits, seconds=seconds)
+
+    # --- what would hold if no behavior failed ----------------------------------------------------
+
+    def _with_hints(self, report: Report) -> Report:
+        doubtful = {_key(each) for each in report.results if self._may_hold_without_failures(each)}
+        rest = self._rest()
+        if not doubtful or _interrupted(report) or report.states > SMALL_STATES or not rest.seconds:
+            return report
+        small = replace(
+            rest,
+            states=min(rest.states, SMALL_STATES),
+            seconds=min(rest.seconds, SMALL_SECONDS),
+        )
+        found = replace(report, results=(), engine="builtin")
+        if any(not required for _, required in doubtful):
+            found = self.short.properties(NO_FAILURES, small)
+        asked = [each for each in self.asked if (each.id, True) in doubtful]
+        found = self.short.requirements(found, asked, NO_FAILURES, small)
+        holding = {_key(each) for each in found.results if each.verdict is Verdict.HOLDS}
+        return replace(
+            report,
+            results=tuple(
+                replace(each, would_hold_if=NO_FAILURES)
+                if _key(each) in doubtful & holding
+                else each
+                for each in report.results
+            ),
+        )
+
+    def _may_hold_without_failures(self, result: Result) -> bool:
+        """Whether all runs that are known to violate it have a failure, and nothing is assumed."""
+        if result.assumed or not (result.required or result.property in WOULD_HOLD):
+            return False
+        net = result.net
+        return (
+            result.verdict is Verdict.VIOLATED
+            and net is not None
+            and all(
+                any(
+                    net.transitions[n].trigger is Trigger.FAILS
+                    for n in (*violation.run, *violation.cycle)
+                )
+                for violation in result.violations
+            )
+        )
+
+
+def _key(result: Result) -> tuple[str, bool]:
+    return result.property, result.required
+
+
+def _beside(result: Result, without: Result | None) -> Result:
+    """Put the answer without assumptions beside the one that counts."""
+    if without is None:
+        return result
+    without = replace(without, assumed=NOTHING)
+    if not result.required and result.property == REACHABLE:
+        return without
+    return replace(result, without=without)
+
+
+def _not_begun(result: Result) -> Result:
+    if result.required or result.property != REACHABLE:
+        return result
+    why = f"not begun without the assumptions, after {Stopped.INTERRUPTED}"
+    return replace(result, verdict=Verdict.UNDECIDED, violations=(), covered=why, assumed=NOTHING)
+
+
+def _interrupted(report: Report) -> bool:
+    """Whether a person has ended a search."""
+    return report.found.stopped is Stopped.INTERRUPTED or any(
+        each.covered.endswith(Stopped.INTERRUPTED) for each in report.results
+    )
