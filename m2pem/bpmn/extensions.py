@@ -280,6 +280,17 @@ EXTENSIONS = (
         ),
     ),
     OwnAttributes(
+        "Pools",
+        ("collaboration",),
+        (
+            Attribute(
+                "allPools",
+                Type.BOOLEAN,
+                "`true`: `m2pem verify` [begins all pools together](verification.md#pools)",
+            ),
+        ),
+    ),
+    OwnAttributes(
         "Choice",
         ("adHocSubProcess",),
         (Attribute("activeElements", Type.EXPRESSION, "the list of ids to begin"),),

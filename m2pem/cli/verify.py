@@ -53,6 +53,11 @@ if TYPE_CHECKING:
     help="What all runs are taken to do: no-failures, 'failures <= 2', 'reliable(uav1)', "
     "operators-answer, 'messages-within 30 s'. Can be given again.",
 )
+@click.option(
+    "--all-pools",
+    is_flag=True,
+    help="Begin all pools of a collaboration together, not only one process.",
+)
 @click.option("--strict", is_flag=True, help="Warnings are violations.")
 @click.option(
     "--engine",
@@ -114,6 +119,7 @@ def verify(
     data: "dict[str, Value]",
     spec: Path | None,
     assume: tuple[str, ...],
+    all_pools: bool,
     strict: bool,
     engine: str,
     storage: str,
@@ -145,6 +151,7 @@ def verify(
         spec,
         timers_in_order=timers == "in-order",
         assume=assume,
+        all_pools=all_pools,
     )
     if emit is not None:
         _emit(promela(asked), emit.partition("=")[2])

@@ -1,6 +1,6 @@
 """Verification of a mission against a fleet: the search request, the search and its findings."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,6 +19,7 @@ from m2pem.verify.requirements import (
     Names,
     Requirement,
     assumptions_given,
+    begins_all_pools,
     collect,
     read_assumptions,
 )
@@ -27,6 +28,7 @@ from m2pem.verify.search.explore import Limits, Progress
 from m2pem.verify.spin.queries import Storage
 from m2pem.verify.translate.context import behavior_of, may_be_preempted
 from m2pem.verify.translate.options import Options
+from m2pem.verify.translate.participants import begun_by_nothing, participants
 from m2pem.verify.translate.ways import KnownWays
 from m2pem.verify.under_assumptions import check_under_assumptions
 
@@ -94,12 +96,14 @@ def search_request(
     *,
     timers_in_order: bool = False,
     assume: Iterable[str] = (),
+    all_pools: bool = False,
 ) -> SearchRequest:
     """What is to be searched, if `m2pem check` finds no errors in it.
 
     `arbiters` None: a fleet is made up, and the mission's roles are not checked. `spec`: more
     requirements, a file or its text. `assume`: what the whole check assumes, beside what the
-    mission's file says.
+    mission's file says. `all_pools`: the pools that nothing triggers begin with the run, also if
+    the file does not say so.
 
     Raises:
         MissionError: there are errors; it has all of them.
@@ -113,6 +117,7 @@ def search_request(
         data=data,
         service_writes=writes,
         timers_in_order=timers_in_order,
+        all_pools=all_pools or begins_all_pools(mission),
         catalogue=arbiters.offered if arbiters is not None else None,
         ways=known_ways(fleet, mission),
     )
@@ -142,12 +147,39 @@ def search(
         report = replace(report, notes=(*report.notes, _assumed(request.assumed)))
     if request.options.timers_in_order:
         report = replace(report, notes=(*report.notes, IN_ORDER))
+    report = replace(report, notes=(*report.notes, *_pools(request)))
     if _opens_incidents(request):
         report = replace(report, notes=(*report.notes, ENDS_THE_RUN))
     behaviors = map(behavior_of, request.mission.activities())
     if any(may_be_preempted(request.fleet, each) for each in behaviors):
         report = replace(report, notes=(*report.notes, PREEMPTED_AT_ANY_TIME))
-    return findings_of(request.mission, report, strict=strict, given=request.data)
+    return replace(
+        findings_of(request.mission, report, strict=strict, given=request.data),
+        together=_together(request),
+    )
+
+
+def _pools(request: SearchRequest) -> Iterator[str]:
+    """Say which processes are not begun, and which only here."""
+    mission = request.mission
+    root = mission.process(request.process)
+    pools = {each.process_id: each for each in mission.participants}
+    together = _together(request)
+    for each in begun_by_nothing(mission, root):
+        pool = pools.get(each.id)
+        name = f"pool {pool.name or pool.id} (process {each.id})" if pool else f"process {each.id}"
+        if each.id in together:
+            yield f"{name} begins with the run here; a run of the executive does not begin it"
+            continue
+        why = f"a run begins with {root.id}, nothing calls {each.id}, and it has no trigger"
+        yield f"{name} is not begun: {why}{'; --all-pools begins it, too' if pool else ''}"
+
+
+def _together(request: SearchRequest) -> tuple[str, ...]:
+    """The ids of the processes that begin with the run."""
+    root = request.mission.process(request.process)
+    begun = participants(request.mission, root) if request.options.all_pools else []
+    return tuple(each.id for each in begun)
 
 
 def _assumed(assumed: Assumptions) -> str:

@@ -119,10 +119,12 @@ def search_request(
     *,
     timers_in_order: bool = False,
     assume: Iterable[str] = (),
+    all_pools: bool = False,
 ) -> SearchRequest:
     """Return the search of a mission in which `check` finds no errors.
 
     `requirements`: a file of more of them, or its text. `assume`: what the whole check assumes.
+    `all_pools`: the pools that nothing triggers begin with the run.
 
     Raises:
         MissionError: there are errors; it lists all.
@@ -140,6 +142,7 @@ def search_request(
         requirements,
         timers_in_order=timers_in_order,
         assume=assume,
+        all_pools=all_pools,
     )
 
 
@@ -153,6 +156,7 @@ def verify(
     strict: bool = False,
     timers_in_order: bool = False,
     assume: str | Iterable[str] = (),
+    all_pools: bool = False,
     engine: Literal["builtin", "spin"] = "builtin",
     storage: Literal["exact", "collapse", "bitstate"] = "exact",
     max_states: int = MAX_STATES,
@@ -164,10 +168,11 @@ def verify(
 
     As `m2pem verify`, whose options these are. `fleet` None: one is made up. `requirements`: a
     YAML file, or its text as bytes, beside those in the mission's own file. `assume`: what all runs
-    are taken to do, such as "no-failures". `strict`: warnings are violations. `engine`: `builtin`
-    or `spin`; `storage`, of Spin alone: `exact`, `collapse` or `bitstate`. `max_states` and
-    `max_seconds` end a search undecided; so does an interrupt of the kernel (Ctrl-C), with what has
-    been searched. `on_progress` is called now and then.
+    are taken to do, such as "no-failures". `all_pools`: the pools of a collaboration that nothing
+    triggers begin with the run. `strict`: warnings are violations. `engine`: `builtin` or `spin`;
+    `storage`, of Spin alone: `exact`, `collapse` or `bitstate`. `max_states` and `max_seconds` end
+    a search undecided; so does an interrupt of the kernel (Ctrl-C), with what has been searched.
+    `on_progress` is called now and then.
 
     Raises:
         MissionError: `check` finds errors; it lists all.
@@ -189,6 +194,7 @@ def verify(
         more,
         timers_in_order=timers_in_order,
         assume=(assume,) if isinstance(assume, str) else assume,
+        all_pools=all_pools,
     )
     limits = Limits(states=max_states, seconds=max_seconds, tokens=TOKENS_ON_A_PLACE)
     search_engine = SearchEngine(engine, storage, limits)

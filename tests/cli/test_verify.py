@@ -161,6 +161,15 @@ def test_a_run_that_the_engine_does_not_follow_ends_with_1(invoke: Invoke, repor
     assert "the engine does not follow" in err
 
 
+def test_a_run_in_which_all_pools_begin_is_not_played(invoke: Invoke, report: Path) -> None:
+    found = json.loads(report.read_bytes())
+    found["together"] = ["Other"]
+    report.write_text(json.dumps(found), encoding="utf-8")
+    status, _, err = invoke("replay", "--counterexample", report)
+    assert status == 2
+    assert "all pools begin with the run (Other)" in err
+
+
 @pytest.mark.parametrize(("text", "why"), [("[]", "no report"), ("{", "no JSON")])
 def test_a_file_that_is_no_report_is_refused(
     invoke: Invoke, tmp_path: Path, text: str, why: str

@@ -27,6 +27,7 @@ def as_data(findings: Findings) -> dict[str, Any]:
         "verdict": findings.verdict.value,
         "strict": findings.strict,
         "assumed": str(findings.assumed),
+        "together": [*findings.together],
         "engine": coverage.engine,
         "coverage": {
             "states": coverage.states,

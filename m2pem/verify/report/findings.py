@@ -66,7 +66,8 @@ class Findings:
 
     `unreached`: elements that no run reaches, as far as that is known. `given`: the data that the
     run begins with. `assumed`: what the whole check assumes; `without`: the first violation of each
-    answer to what assumes something, where nothing is assumed.
+    answer to what assumes something, where nothing is assumed. `together`: ids of processes that
+    begin with the run, unlike in a run of the executive.
     """
 
     mission: Mission
@@ -80,6 +81,7 @@ class Findings:
     given: Mapping[str, Value] = field(default_factory=dict)
     assumed: Assumptions = NOTHING
     without: tuple[DescribedViolation, ...] = ()
+    together: tuple[str, ...] = ()
 
     def violation_without(self, answer: Result) -> DescribedViolation | None:
         """The violation of an answer's property where nothing is assumed."""

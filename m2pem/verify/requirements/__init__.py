@@ -4,6 +4,7 @@ a spec file.
 
 from m2pem.verify.requirements.collection import (
     assumptions_given,
+    begins_all_pools,
     collect,
     parse_spec,
     read_assumptions,
@@ -18,6 +19,7 @@ __all__ = [
     "Requirement",
     "RequirementsError",
     "assumptions_given",
+    "begins_all_pools",
     "collect",
     "parse_spec",
     "read_assumptions",

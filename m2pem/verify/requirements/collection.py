@@ -15,6 +15,7 @@ from m2pem.bpmn.xml import BPMN, M2PEM, Document, parse_xml
 from m2pem.findings import Finding, Severity
 from m2pem.fleet.yaml_source import KeyPath, YamlSource, dotted, parse_yaml, read_yaml
 from m2pem.mission import elements as e
+from m2pem.mission.mission import Mission
 from m2pem.suggestions import suggest
 from m2pem.verify.assumptions import NOTHING, Assumptions
 from m2pem.verify.requirements.names import Names
@@ -275,6 +276,17 @@ def _item(source: YamlSource, path: KeyPath, entry: Any) -> WrittenRequirement |
         source.line(path),
         entry.get("assume", ()),
     )
+
+
+def begins_all_pools(mission: Mission) -> bool:
+    """Whether the mission's file says that all pools begin together: `m2pem:allPools` of a
+    collaboration. Not used in a rehearsal or a run.
+    """
+    if b"allPools" not in mission.source:
+        return False
+    root = parse_xml(mission.source).root
+    collaborations = root.iterchildren(BPMN + "collaboration")
+    return any(each.get(M2PEM + "allPools") == "true" for each in collaborations)
 
 
 def assumptions_given(texts: Iterable[str], names: Names) -> Assumptions:

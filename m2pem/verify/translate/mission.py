@@ -33,6 +33,13 @@ from m2pem.verify.translate.net_builder import (
 )
 from m2pem.verify.translate.options import Options
 from m2pem.verify.translate.parallel_multiple import AWAITED, all_must_come, trigger_places
+from m2pem.verify.translate.participants import (
+    alive,
+    begin_together,
+    participants,
+    triggers_of,
+    without_entries,
+)
 from m2pem.verify.translate.scopes import begin
 from m2pem.verify.translate.subprocesses import build, translate_choices
 from m2pem.verify.translate.throwing import (
@@ -74,9 +81,11 @@ def translate(
     others = _triggered_processes(context)
     for other in others:
         _instances(context, other)
+    together = participants(mission, root) if options.all_pools else ()
+    begun = [place for each in together for place in begin_together(context, each)]
     first = begin(context, root, context.root)
     standing = initial_places(context)
-    initial = (context.running, *context.free_resources(), *standing, *first.produce)
+    initial = (context.running, *context.free_resources(), *standing, *first.produce, *begun)
     for late in context.later:
         late()
     translate_contention(context)
@@ -120,7 +129,7 @@ def _triggered_processes(context: TranslationContext) -> list[e.Process]:
 
 def _instances(context: TranslationContext, process: e.Process) -> None:
     """Translate a process once for each instance that may be active at a time."""
-    starts = [start for entry in process.entries for start in _triggered(entry)]
+    starts = [start for entry in process.entries for start in triggers_of(entry)]
     if not starts:
         return
     context.net.approximate(
@@ -133,27 +142,10 @@ def _instances(context: TranslationContext, process: e.Process) -> None:
         step = f"{process.id}#{number + 1}"
         scope = context.net.scope(process, context.everything, step=step, frame=(process.id, step))
         build(context, process, scope)
-        alive = context.net.place(process, scope, Role.CONTROL, ":alive")
-        notes = context.notes_scopes.get(scope.index, scope)
-        over = Effect(
-            steps=(Step(process.id, Action.COMPLETED),),
-            consume=(alive,),
-            reset_scopes=frozenset({scope.index, notes.index}),
-            empty_scopes=frozenset({scope.index}),
-        )
-        context.net.transition(over)
-        scopes.append((scope, alive))
+        scopes.append((scope, alive(context, process, scope)))
     for start in starts:
         for definition in awaited(start):
             _begun_by(context, process, start, definition, scopes)
-
-
-def _triggered(entry: e.FlowNode) -> list[e.FlowNode]:
-    if isinstance(entry, e.EventBasedGateway):
-        return [flow.target for flow in entry.outgoing]
-    if isinstance(entry, e.StartEvent):
-        return [entry] if entry.definitions else []
-    return [entry] if isinstance(entry, e.ReceiveTask) and entry.instantiate else []
 
 
 def _begun_by(
@@ -165,14 +157,14 @@ def _begun_by(
 ) -> None:
     brings = isinstance(definition, SignalEventDefinition | MessageEventDefinition)
     ways: list[Effect] = []
-    for number, (scope, alive) in enumerate(scopes):
+    for number, (scope, on) in enumerate(scopes):
         free = Effect(
             steps=(Step(start.id, Action.TRIGGERED),),
             read=frozenset(other for _, other in scopes[:number]),
-            inhibit=frozenset({alive}),
-            produce=(alive,),
+            inhibit=frozenset({on}),
+            produce=(on,),
         )
-        inside = [Effect(produce=tuple(begin_without_entries(context, process, scope)))]
+        inside = [Effect(produce=tuple(without_entries(context, process, scope)))]
         if isinstance(start, e.StartEvent) and all_must_come(start):
             more = [_first_of_several(context, start, definition, scope)]
         elif isinstance(start, e.StartEvent):
@@ -181,7 +173,7 @@ def _begun_by(
             more = after(context, start, scope)
         come = context.data.receive([free], scope, start) if brings else [free]
         ways += product(product(come, inside), more)
-    full = Effect(read=frozenset(alive for _, alive in scopes))
+    full = Effect(read=frozenset(on for _, on in scopes))
     match definition:
         case SignalEventDefinition() | MessageEventDefinition():
             what, ref = what_and_ref(definition)
@@ -212,14 +204,6 @@ def _first_of_several(
         for each, there, yet in zip(triggers, places.came, places.awaited, strict=True)
     ]
     return Effect(produce=(waiting, *came))
-
-
-def begin_without_entries(
-    context: TranslationContext, process: e.Process, scope: ScopeDraft
-) -> list[int]:
-    """The places with a token when an instance begins, without that of its start event."""
-    entries = {entry_place(context.net, entry, scope) for entry in process.entries}
-    return [n for n in begin(context, process, scope).produce if n not in entries]
 
 
 # --- signals and messages from outside ----------------------------------------------------------

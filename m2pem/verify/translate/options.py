@@ -22,8 +22,8 @@ class Options:
     called within itself. `assumed`: what is taken not to happen. `timers_in_order`: of timers that
     begin to run together, the one that is due first fires first. `catalogue`: what each resource
     offers; None: all that the mission asks for. `distinguished`: resources that requirements are
-    about. `ways`: where vehicles go, so that shared space is followed; None: it is taken to be
-    free.
+    about. `all_pools`: the pools of a collaboration that nothing triggers begin with the run.
+    `ways`: where vehicles go, so that shared space is followed; None: it is taken to be free.
     """
 
     data: Mapping[str, Value] = field(default_factory=dict)
@@ -37,6 +37,7 @@ class Options:
     """Conditions of requirements on the data of the process that the run begins with."""
     catalogue: Catalogue | None = None
     distinguished: Collection[str] = ()
+    all_pools: bool = False
     ways: KnownWays | None = None
     most_instances: int = 8
     """Most instances of a number that the mission states; above, `instances` are checked."""

@@ -100,6 +100,7 @@ export const m2pemDescriptor = {
       extends: ["bpmn:Process"],
       properties: ["onError", "incidentRole"].map(attribute),
     },
+    { name: "Pools", extends: ["bpmn:Collaboration"], properties: [attribute("allPools")] },
     { name: "Checked", extends: ["bpmn:Process"], properties: [attribute("assume")] },
     {
       name: "Choice",
