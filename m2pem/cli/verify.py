@@ -23,9 +23,11 @@ from m2pem.cli.options import (
 )
 
 if TYPE_CHECKING:
+    from m2pem.cli.verify_lines import ResultLines
     from m2pem.executive.verification import SearchEngine, SearchRequest
     from m2pem.mission.values import Value
     from m2pem.verify.report.findings import DescribedViolation, Findings
+    from m2pem.verify.report.text import Paint
     from m2pem.verify.search.explore import Progress
 
 
@@ -110,6 +112,12 @@ if TYPE_CHECKING:
     show_default=True,
     help="Time after which the search ends undecided.",
 )
+@click.option(
+    "--exhaustive",
+    is_flag=True,
+    help="Search on after a violation, to the end or to these limits. Otherwise a large search "
+    "ends soon after it.",
+)
 @format_option
 def verify(
     mission: str,
@@ -128,6 +136,7 @@ def verify(
     reports: tuple[Path, ...],
     max_states: int,
     max_seconds: float,
+    exhaustive: bool,
     output: str,
 ) -> int:
     """Prove properties and requirements of a mission, or show a run that violates them.
@@ -141,7 +150,8 @@ def verify(
     from m2pem.executive.verification import SearchEngine
     from m2pem.scripting.verification import TOKENS_ON_A_PLACE, search_request
     from m2pem.verify.report.data import as_data
-    from m2pem.verify.search.explore import Limits
+    from m2pem.verify.report.text import as_text
+    from m2pem.verify.search.explore import AFTER_VIOLATION_STATES, Limits
 
     asked = search_request(
         load_source(mission, search_path),
@@ -156,14 +166,20 @@ def verify(
     if emit is not None:
         _emit(promela(asked), emit.partition("=")[2])
         return 0
-    limits = Limits(states=max_states, seconds=max_seconds, tokens=TOKENS_ON_A_PLACE)
-    found = findings(asked, SearchEngine(engine, storage, limits), strict=strict)
+    limits = Limits(
+        states=max_states,
+        seconds=max_seconds,
+        tokens=TOKENS_ON_A_PLACE,
+        after_violation=None if exhaustive else AFTER_VIOLATION_STATES,
+    )
+    lines = None if output == "json" else _lines(asked, strict=strict)
+    found = findings(asked, SearchEngine(engine, storage, limits), strict=strict, lines=lines)
     for file in reports:
         write(file, found)
-    if output == "json":
+    if lines is None:
         click.echo(as_json(as_data(found)))
     else:
-        click.echo(_text(found))
+        click.echo(as_text(found, _paint(), printed=lines.printed))
     return found.exit_status
 
 
@@ -191,21 +207,43 @@ def _emit(text: str, file: str) -> None:
         raise UnusableError(f"{file} cannot be written: {error.strerror}") from error
 
 
-def _text(found: "Findings") -> str:
+def _lines(asked: "SearchRequest", *, strict: bool) -> "ResultLines":
+    from m2pem.cli.verify_lines import ResultLines
+    from m2pem.verify.properties import NAMES
+
+    names = [*NAMES, *(each.id for each in asked.requirements)]
+    return ResultLines(names, _paint(), strict=strict)
+
+
+def _paint() -> "Paint":
     from m2pem.cli.output import wants_colour
-    from m2pem.verify.report.text import as_text
+    from m2pem.verify.report.text import plain
 
     if wants_colour(sys.stdout):
-        return as_text(found, lambda text, colour: click.style(text, fg=colour))
-    return as_text(found)
+        return lambda text, colour: click.style(text, fg=colour)
+    return plain
 
 
-def findings(asked: "SearchRequest", engine: "SearchEngine", *, strict: bool) -> "Findings":
-    """Search, and return the findings."""
+def findings(
+    asked: "SearchRequest",
+    engine: "SearchEngine",
+    *,
+    strict: bool,
+    lines: "ResultLines | None" = None,
+) -> "Findings":
+    """Search, and return the findings. `lines`: prints results as soon as they are certain."""
     from m2pem.executive.verification import search
 
     with _ended_as_by_hand(), progress() as show:
-        return search(asked, engine, strict=strict, progress=show)
+        if lines is None:
+            return search(asked, engine, strict=strict, progress=show)
+
+        def progressed(searched: "Progress") -> None:
+            lines.look()
+            if show is not None:
+                show(searched)
+
+        return search(asked, engine, strict=strict, progress=progressed, decided=lines.decided)
 
 
 def promela(asked: "SearchRequest") -> str:
@@ -251,6 +289,10 @@ def _line(searched: "Progress") -> str:
         said.append(f"{searched.states:,} states found")
     if searched.waiting:
         said.append(f"{searched.waiting:,} of them to be searched")
+    if searched.states and searched.seconds > 0:
+        said.append(f"{searched.states / searched.seconds:,.0f} a second")
+    if searched.memory_mb:
+        said.append(f"{searched.memory_mb:,.0f} MB")
     return ", ".join(said)
 
 

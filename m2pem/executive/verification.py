@@ -14,6 +14,7 @@ from m2pem.mission.mission import Mission
 from m2pem.mission.values import Value
 from m2pem.verify.assumptions import NOTHING, Assumptions
 from m2pem.verify.check import Report, check
+from m2pem.verify.properties.results import Result
 from m2pem.verify.report.findings import Findings, findings_of
 from m2pem.verify.requirements import (
     Names,
@@ -134,10 +135,16 @@ def search(
     *,
     strict: bool,
     progress: Callable[[Progress], None] | None = None,
+    decided: Callable[[Result], None] | None = None,
 ) -> Findings:
-    """Search, and return what was found."""
+    """Search, and return what was found.
+
+    `decided` gets each result as soon as it is certain; Spin's come at the end, and where something
+    is assumed, all do: beside each is its verdict without the assumptions.
+    """
+    assumes = bool(request.assumed) or any(each.assumed for each in request.requirements)
     report = check_under_assumptions(
-        _Checks(request, engine, progress),
+        _Checks(request, engine, progress, None if assumes else decided),
         request.requirements,
         request.assumed,
         engine.limits,
@@ -203,6 +210,7 @@ class _Checks:
     request: SearchRequest
     engine: SearchEngine
     progress: Callable[[Progress], None] | None
+    decided: Callable[[Result], None] | None = None
 
     def properties(self, assumed: Assumptions, limits: Limits) -> Report:
         """Check every property of missions."""
@@ -226,6 +234,7 @@ class _Checks:
             options=replace(request.options, assumed=assumed),
             limits=limits,
             progress=self.progress,
+            decided=self.decided,
         )
 
     def requirements(
@@ -243,4 +252,5 @@ class _Checks:
             limits=limits,
             storage=Storage(self.engine.storage),
             progress=self.progress,
+            decided=self.decided,
         )

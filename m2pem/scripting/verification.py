@@ -18,7 +18,7 @@ from m2pem.verify.report.data import as_data
 from m2pem.verify.report.findings import DescribedViolation, Findings
 from m2pem.verify.report.picture import pictures
 from m2pem.verify.report.text import as_text, covered
-from m2pem.verify.search.explore import Limits, Progress
+from m2pem.verify.search.explore import AFTER_VIOLATION_STATES, Limits, Progress
 
 MAX_STATES = 2_000_000
 MAX_SECONDS = 600.0
@@ -161,6 +161,7 @@ def verify(
     storage: Literal["exact", "collapse", "bitstate"] = "exact",
     max_states: int = MAX_STATES,
     max_seconds: float = MAX_SECONDS,
+    exhaustive: bool = False,
     on_progress: Callable[[Progress], None] | None = None,
     search_path: Iterable[str | Path] = (),
 ) -> VerificationResult:
@@ -172,7 +173,8 @@ def verify(
     triggers begin with the run. `strict`: warnings are violations. `engine`: `builtin` or `spin`;
     `storage`, of Spin alone: `exact`, `collapse` or `bitstate`. `max_states` and `max_seconds` end
     a search undecided; so does an interrupt of the kernel (Ctrl-C), with what has been searched.
-    `on_progress` is called now and then.
+    After a violation a large search ends soon, unless it is `exhaustive`. `on_progress` is called
+    now and then.
 
     Raises:
         MissionError: `check` finds errors; it lists all.
@@ -196,7 +198,12 @@ def verify(
         assume=(assume,) if isinstance(assume, str) else assume,
         all_pools=all_pools,
     )
-    limits = Limits(states=max_states, seconds=max_seconds, tokens=TOKENS_ON_A_PLACE)
+    limits = Limits(
+        states=max_states,
+        seconds=max_seconds,
+        tokens=TOKENS_ON_A_PLACE,
+        after_violation=None if exhaustive else AFTER_VIOLATION_STATES,
+    )
     search_engine = SearchEngine(engine, storage, limits)
     found = verification.search(request, search_engine, strict=strict, progress=on_progress)
     return VerificationResult(found)

@@ -12,9 +12,21 @@ from m2pem.verify.net.petri_net import PetriNet, Place, Role, Scope
 from m2pem.verify.net.simplify import simplify
 from m2pem.verify.net.size_limit import MOST_TRANSITIONS
 from m2pem.verify.properties import ALL, SearchedMission
-from m2pem.verify.properties.commands import INTERRUPTED, watch_interruptions
+from m2pem.verify.properties.commands import (
+    INTERRUPTED,
+    interrupted_commanded_again,
+    watch_interruptions,
+)
+from m2pem.verify.properties.early import EarlyInterruptions, EarlyResults
 from m2pem.verify.properties.results import Result, Verdict
-from m2pem.verify.search.explore import Exploration, Limits, Progress, Stopped, explore
+from m2pem.verify.search.explore import (
+    Exploration,
+    Limits,
+    Progress,
+    Stopped,
+    Watch,
+    explore,
+)
 from m2pem.verify.search.stubborn_sets import StubbornSets
 from m2pem.verify.translate import Options, SizeLimit, TooLargeError, translate
 
@@ -22,6 +34,8 @@ FULL_STATES = 100_000
 """States up to which a search uses no reduction: that gives the shortest runs."""
 FULL_TIME = 0.4
 """Share of the time limit for the search without reduction."""
+SHARE_REDUCED = 0.04
+"""A state takes about 25 times as long with a reduction as without."""
 _BYTES_A_TRANSITION = 2_500
 """Approximate memory of a transition, from its translation until the search is over."""
 _FEWER_BEYOND = 100
@@ -79,8 +93,12 @@ def check(
     options: Options | None = None,
     limits: Limits | None = None,
     progress: Callable[[Progress], None] | None = None,
+    decided: Callable[[Result], None] | None = None,
 ) -> Report:
     """Check every default property of a mission.
+
+    `decided` gets the result of each property once, as soon as it is certain. When one of them that
+    is no mere warning is violated, the search ends after a share more (`Limits.after_violation`).
 
     Raises:
         KeyError: the mission has no such process.
@@ -94,13 +112,18 @@ def check(
         net = simplify(net, size_limit=size_limit)
     except TooLargeError as error:
         return too_large(mission, error, process)
-    found = search(net, _rest(limits, began), progress)
+    early = EarlyResults(mission, net, decided)
+    early.begin(unsearched(net))
+    found = search(net, _rest(limits, began), progress, early)
     searched = SearchedMission(mission, net, found)
     watched = watch_interruptions(net, fleet.vehicles)
     if watched is not None and found.stopped is not Stopped.INTERRUPTED:
+        early.settle(each(searched) for each in ALL if each is not interrupted_commanded_again)
         searched.resources = watched[1]
-        searched.watched = search(watched[0], _rest(limits, began), progress)
-    results = tuple(each(searched) for each in ALL)
+        watch = EarlyInterruptions(mission, net, watched[1], violated=early.violated)
+        searched.watched = search(watched[0], _rest(limits, began), progress, watch)
+    results = tuple(early.merged(each(searched)) for each in ALL)
+    early.settle(results)
     return Report(
         net,
         found,
@@ -130,9 +153,8 @@ def too_large(mission: Mission, error: TooLargeError, process: str | None = None
     )
     scopes = (Scope(0, root.id, None, (root.id,)),)
     net = PetriNet(mission.file, root.id, scopes, places, (), (), ((0, 1),), 1, 2, 3)
-    found = explore(net)
+    found = unsearched(net)
     found.stopped = Stopped.TIME if error.late else Stopped.TRANSITIONS
-    found.terminals.clear()
     verdicts = (each(SearchedMission(mission, net, found, watched=found)) for each in ALL)
     results = tuple(
         replace(each, covered=f"too large to search: {error}")
@@ -143,25 +165,46 @@ def too_large(mission: Mission, error: TooLargeError, process: str | None = None
     return Report(net, found, results, states=len(found.states))
 
 
+def unsearched(net: PetriNet) -> Exploration:
+    """Return an exploration that has seen nothing but the initial state."""
+    found = explore(replace(net, transitions=()))
+    found.stopped = Stopped.STATES
+    found.terminals.clear()
+    found.expanded = 0
+    return found
+
+
 def search(
-    net: PetriNet, limits: Limits, progress: Callable[[Progress], None] | None = None
+    net: PetriNet,
+    limits: Limits,
+    progress: Callable[[Progress], None] | None = None,
+    watch: Watch | None = None,
 ) -> Exploration:
     """Explore a net completely if it is small, else with stubborn sets."""
     began = time.monotonic()
     whole = min(limits.states, full_states(net))
     beyond = limits.states > whole
     small = replace(
-        limits, states=whole, seconds=limits.seconds * FULL_TIME if beyond else limits.seconds
+        limits,
+        states=whole,
+        seconds=limits.seconds * FULL_TIME if beyond else limits.seconds,
+        after_violation=share(limits, full_states(net) / FULL_STATES),
     )
-    found = explore(net, small, progress=progress)
+    found = explore(net, small, progress=progress, watch=watch)
     if found.stopped not in (Stopped.STATES, Stopped.TIME) or not beyond:
         return found
     try:
         reduction = StubbornSets(net)
-        return explore(net, _rest(limits, began), reduction=reduction, progress=progress)
+        rest = replace(_rest(limits, began), after_violation=share(limits, SHARE_REDUCED))
+        return explore(net, rest, reduction=reduction, progress=progress, watch=watch)
     except KeyboardInterrupt:  # before the other search had begun
         found.stopped = Stopped.INTERRUPTED
         return found
+
+
+def share(limits: Limits, share: float) -> int | None:
+    """The states to search after a violation, where each takes longer."""
+    return None if limits.after_violation is None else int(limits.after_violation * share)
 
 
 def full_states(net: PetriNet) -> int:

@@ -2,6 +2,7 @@
 
 import json
 import re
+import signal
 from itertools import pairwise
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import pytest
 
 from tests.command_line import CommandLine
 from tests.terminal import CTRL_C, Terminal
+from tests.verify.models import unsafe
 
 ENGINES = ["builtin", "spin"]
 
@@ -94,7 +96,7 @@ def results(tmp_path: Path) -> str:
 def test_a_long_search_counts_up_on_a_terminal_and_wipes_its_line(
     tmp_path: Path, mission: Path
 ) -> None:
-    with at_terminal(tmp_path, mission, "--max-seconds", "3") as terminal:
+    with at_terminal(tmp_path, mission, "--max-seconds", "8") as terminal:
         first = terminal.until(r"searching for \d+ s, ([\d,]+) states found, [\d,]+ of them to be")
         terminal.until(r"searching for [2-9] s, ")
         assert terminal.rest() == 3
@@ -150,7 +152,7 @@ def test_ctrl_c_leaves_undecided_what_was_not_seen(tmp_path: Path, mission: Path
 def test_ctrl_c_keeps_the_violations_that_were_found_until_then(
     tmp_path: Path, unhandled: Path
 ) -> None:
-    with at_terminal(tmp_path, unhandled) as terminal:
+    with at_terminal(tmp_path, unhandled, "--exhaustive") as terminal:
         terminal.until("states found")
         terminal.press(CTRL_C)
         assert terminal.rest() == 1
@@ -196,3 +198,28 @@ def test_what_ends_m2pem_ends_spin_and_what_it_saw_is_told(
     assert re.search(r"^undecided  can-complete .*not begun, after an interruption", text, re.M)
     assert "the built-in search was not begun" in text
     assert "Traceback" not in terminal.shown + text
+
+
+def test_a_violation_is_printed_while_the_search_goes_on(
+    m2pem: CommandLine, tmp_path: Path
+) -> None:
+    mission = tmp_path / "unsafe.bpmn"
+    mission.write_bytes(unsafe(9).source)
+    program = m2pem.start("verify", mission, "--exhaustive")
+    program.until(lambda line: line.startswith("violated   one-token"))
+    program.send(signal.SIGINT)
+    assert program.rest() == (1, "")
+    said = [line for line in program.lines if line.startswith("violated   one-token")]
+    assert len(said) == 1
+    text = "\n".join(program.lines)
+    assert "one-token: Again gets a second token" in text
+    assert "then an interruption by hand ended the search" in text
+
+
+def test_after_a_violation_a_large_search_ends(m2pem: CommandLine, tmp_path: Path) -> None:
+    mission = tmp_path / "unsafe.bpmn"
+    mission.write_bytes(unsafe(12).source)
+    status, out, _ = m2pem.run("verify", mission)
+    assert status == 1
+    assert re.search(r"undecided  no-livelock .*stopped by a violation that was found before", out)
+    assert "then a violation that was found before ended the search" in out

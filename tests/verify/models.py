@@ -67,6 +67,24 @@ def branches(
     return parse_mission(text.encode(), "branches.bpmn")
 
 
+def unsafe(count: int) -> Mission:
+    """Parallel branches of tasks, and one more in which tokens meet again unjoined and go round."""
+    loop = (
+        '<exclusiveGateway id="In"/><parallelGateway id="Out"/><exclusiveGateway id="Back"/>'
+        '<sequenceFlow id="u0" sourceRef="f" targetRef="In"/>'
+        '<sequenceFlow id="u1" sourceRef="In" targetRef="Again"/>'
+        '<sequenceFlow id="u2" sourceRef="Again" targetRef="Out"/>'
+        '<sequenceFlow id="u3" sourceRef="Out" targetRef="In"/>'
+        '<sequenceFlow id="u4" sourceRef="Out" targetRef="Back"/>'
+        '<sequenceFlow id="u5" sourceRef="Back" targetRef="In"/>'
+        '<sequenceFlow id="u6" sourceRef="Back" targetRef="j"/>'
+        '<userTask id="Again"><extensionElements><m2pem:prompt>?</m2pem:prompt>'
+        '<m2pem:decision value="ok"/></extensionElements></userTask></process>'
+    )
+    text = branches(count).source.decode().replace("</process>", loop)
+    return parse_mission(text.encode(), "unsafe.bpmn")
+
+
 class Walk:
     """A run of the engine in which numbers choose what happens, followed by the net."""
 

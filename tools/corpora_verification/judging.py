@@ -11,6 +11,7 @@ from m2pem.errors import MissionError
 from m2pem.executive.loading import findings_for
 from m2pem.findings import Severity
 from m2pem.plugins import PluginManager
+from m2pem.verify.assumptions import NO_FAILURES
 from m2pem.verify.check import Report, check
 from m2pem.verify.properties.results import Verdict
 from m2pem.verify.search.explore import Limits
@@ -104,7 +105,7 @@ def judge(path: Path, terms: Terms) -> Judgement:
 def _options(terms: Terms) -> Options:
     if terms.as_drawn:
         return Options()
-    return Options(open_world=terms.open_world, service_writes={WORK: ()}, failures=False)
+    return Options(open_world=terms.open_world, service_writes={WORK: ()}, assumed=NO_FAILURES)
 
 
 def _rules(error: MissionError) -> tuple[str, ...]:

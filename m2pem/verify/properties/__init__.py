@@ -43,4 +43,23 @@ ALL: tuple[Callable[[SearchedMission], Result], ...] = (
     decisions_handled,
 )
 
-__all__ = ["ALL", "SearchedMission"]
+NAMES = (
+    "no-deadlock",
+    "proper-completion",
+    "can-complete",
+    "completes-if-fair",
+    "no-livelock",
+    "no-dead-element",
+    "one-token",
+    "can-be-triggered",
+    "is-caught",
+    "one-behavior",
+    "interrupted-commanded-again",
+    "errors-caught",
+    "failures-handled",
+    "prompts-have-decisions",
+    "decisions-handled",
+)
+"""The names of `ALL`."""
+
+__all__ = ["ALL", "NAMES", "SearchedMission"]

@@ -62,6 +62,7 @@ def one_behavior_each(searched: SearchedMission) -> Result:
         "one-behavior",
         "No vehicle or payload is commanded by two behaviors at once.",
         violations,
+        static=searched.never(Flag.CONFLICT),
     )
 
 
@@ -71,7 +72,10 @@ def errors_caught(searched: SearchedMission) -> Result:
         searched, Flag.UNCAUGHT, "error {what} of {element} is caught by nothing: the run fails"
     )
     return searched.result(
-        "errors-caught", "Every error that the model throws is caught.", violations
+        "errors-caught",
+        "Every error that the model throws is caught.",
+        violations,
+        static=searched.never(Flag.UNCAUGHT),
     )
 
 
@@ -87,6 +91,7 @@ def failures_handled(searched: SearchedMission) -> Result:
         "Work that may fail has an error boundary event.",
         violations,
         warning=True,
+        static=searched.never(Flag.UNCAUGHT_FAILURE),
     )
 
 

@@ -4,7 +4,7 @@ handled?
 
 from m2pem.mission import elements as e
 from m2pem.mission.events import MessageEventDefinition, RootElement, SignalEventDefinition
-from m2pem.verify.net.petri_net import Flag, Trigger
+from m2pem.verify.net.petri_net import Action, Flag, Step, Transition, Trigger
 from m2pem.verify.properties.results import Result, SearchedMission, Violation
 from m2pem.verify.translate.events import awaited
 from m2pem.verify.translate.mission import messages_from_black_box_pools
@@ -87,6 +87,7 @@ def is_caught(searched: SearchedMission) -> Result:
         "Every signal and escalation that is thrown can be caught.",
         violations,
         warning=True,
+        static=searched.never(Flag.UNHEARD),
     )
 
 
@@ -102,37 +103,43 @@ def prompts_have_decisions(searched: SearchedMission) -> Result:
     )
 
 
+def has_no_flow(transition: Transition) -> Step | None:
+    """The step in which a gateway has no flow to take; None: there is none."""
+    return next(
+        (s for s in transition.steps if s.action is Action.THROWN and s.detail == "NO_FLOW"), None
+    )
+
+
 def decisions_handled(searched: SearchedMission) -> Result:
     """No decision of an operator leads to a gateway without a flow for it."""
     found, transitions = searched.found, searched.net.transitions
     violations: list[Violation] = []
     seen: set[tuple[str, str]] = set()
     for transition, state in sorted(found.fired.items(), key=lambda each: each[1]):
-        thrown = [
-            s
-            for s in transitions[transition].steps
-            if s.action == "thrown" and s.detail == "NO_FLOW"
-        ]
-        if not thrown:
+        thrown = has_no_flow(transitions[transition])
+        if thrown is None:
             continue
         run = (*found.run_to(state), transition)
         asked = next(
             (transitions[r] for r in reversed(run) if transitions[r].trigger is Trigger.ANSWER),
             None,
         )
-        if asked is None or (asked.element, thrown[0].element) in seen:
+        if asked is None or (asked.element, thrown.element) in seen:
             continue
-        seen.add((asked.element, thrown[0].element))
+        seen.add((asked.element, thrown.element))
         violations.append(
             Violation(
                 f"after {asked.detail!r} at {searched.label(asked.element)}, no flow of"
-                f" {searched.label(thrown[0].element)} is true and it has no default",
-                (thrown[0].element, asked.element),
+                f" {searched.label(thrown.element)} is true and it has no default",
+                (thrown.element, asked.element),
                 run,
             )
         )
     return searched.result(
-        "decisions-handled", "Every decision of an operator is handled.", violations
+        "decisions-handled",
+        "Every decision of an operator is handled.",
+        violations,
+        static=bool(transitions) and not any(map(has_no_flow, transitions)),
     )
 
 

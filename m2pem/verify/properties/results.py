@@ -7,7 +7,7 @@ from enum import StrEnum
 
 from m2pem.mission.mission import Mission
 from m2pem.verify.assumptions import NOTHING, Assumptions
-from m2pem.verify.net.petri_net import PetriNet, Role
+from m2pem.verify.net.petri_net import Flag, PetriNet, Role
 from m2pem.verify.search.explore import Exploration
 
 
@@ -118,7 +118,12 @@ class SearchedMission:
         return target.id if target is not None else element
 
     def ended(self, state: int) -> bool:
-        return bool(self.found.marking(state).tokens.keys() & self.net.ends)
+        return bool(self.found.states[state] & self.found.encoding.places_mask(self.net.ends))
+
+    def never(self, flag: Flag) -> bool:
+        """Whether the net proves, without a search, that nothing of this flag fires."""
+        transitions = self.net.transitions
+        return bool(transitions) and all(each.flag is not flag for each in transitions)
 
     def result(
         self,

@@ -4,7 +4,17 @@ from collections.abc import Sequence
 
 from m2pem.mission import elements as e
 from m2pem.mission.events import CompensateEventDefinition
-from m2pem.verify.net.petri_net import UNASKED, Action, Exactness, Flag, Kind, Role, Trigger
+from m2pem.mission.mission import Mission
+from m2pem.verify.net.petri_net import (
+    UNASKED,
+    Action,
+    Exactness,
+    Flag,
+    Kind,
+    PetriNet,
+    Role,
+    Trigger,
+)
 from m2pem.verify.properties.results import Result, SearchedMission, Violation
 from m2pem.verify.search.fairness import FairCycles
 
@@ -52,6 +62,7 @@ def one_token_each(searched: SearchedMission) -> Result:
     )
 
 
+CAN_COMPLETE = "From everywhere, the end can be reached."
 FAIR = "It ends, if nothing that can happen again and again is put off for ever."
 IN_EACH_STATE = (
     "for runs in which that is so of each state that comes again and again: orders that lead to"
@@ -130,20 +141,14 @@ def _begins(searched: SearchedMission, transition: int) -> bool:
 
 
 def _lost(searched: SearchedMission, *, ends_only: bool) -> list[int]:
-    """States from which no end (or nothing that ends at all) can be reached, in their order."""
+    """States from which no end (or nothing that ends at all) can be reached, in their order.
+
+    Of an incomplete search: those of which that is certain.
+    """
     found = searched.found
     goals = [s for s in found.terminals if not ends_only or searched.ended(s)]
     if not found.complete:
-        done = len(found.edge_start) - 1 if found.edge_start is not None else 0
-        last = next(
-            (
-                n
-                for n in range(len(found.states))
-                if found.edge_start is not None and found.edge_start[n + 1] == found.edge_start[n]
-            ),
-            done,
-        )
-        goals += range(last, len(found.states))
+        goals += [*range(found.expanded, len(found.states)), *found.cut]
     marked = _reaching(searched, goals, asked=ends_only)
     return [state for state in range(len(found.states)) if not marked[state]]
 
@@ -173,13 +178,26 @@ def can_complete(searched: SearchedMission) -> Result:
     if lost:
         state = _shown(searched, lost)
         stuck = searched.where(state)
-        run = tuple(searched.found.run_to(state))
-        last = searched.net.transitions[run[-1]].element if run else ""
-        message = f"from {searched.labels(stuck)} on, the end cannot be reached any more"
-        if last:
-            message += f" (since {searched.label(last)})"
-        violations.append(Violation(message, stuck, run))
-    return searched.result("can-complete", "From everywhere, the end can be reached.", violations)
+        violations.append(_no_end(searched, stuck, tuple(searched.found.run_to(state))))
+    return searched.result("can-complete", CAN_COMPLETE, violations)
+
+
+def _no_end(searched: SearchedMission, where: tuple[str, ...], run: tuple[int, ...]) -> Violation:
+    last = searched.net.transitions[run[-1]].element if run else ""
+    message = f"from {searched.labels(where)} on, the end cannot be reached any more"
+    if last:
+        message += f" (since {searched.label(last)})"
+    return Violation(message, where, run)
+
+
+def following_from_deadlock(searched: SearchedMission, stuck: Violation) -> tuple[Result, Result]:
+    """Return what a deadlock violates as well: `can-complete` and `completes-if-fair`."""
+    return (
+        searched.result(
+            "can-complete", CAN_COMPLETE, [_no_end(searched, stuck.elements, stuck.run)]
+        ),
+        searched.result("completes-if-fair", FAIR, [stuck]),
+    )
 
 
 def completes_if_fair(searched: SearchedMission) -> Result:
@@ -298,17 +316,27 @@ def no_dead_element(searched: SearchedMission) -> Result:
     reached = {
         step.element for transition in found.fired for step in net.transitions[transition].steps
     }
-    unknown = {a.element for a in net.approximations if a.exactness is Exactness.BOUNDED}
+    wanted = to_be_reached(searched.mission, net)
+    everything = bool(wanted) and wanted.keys() <= reached
+    if not found.complete:  # what no transition reaches is dead all the same
+        reached = {step.element for each in net.transitions for step in each.steps}
     violations = [
         Violation(f"{searched.label(element)} is never reached", (element,))
-        for element in net.elements
+        for element in wanted
         if element not in reached
-        and element not in unknown
-        and not _undoes(searched.mission.elements.get(element))
     ]
-    if not found.complete:
-        violations = []
-    return searched.result("no-dead-element", "Every element is reached in some run.", violations)
+    text = "Every element is reached in some run."
+    return searched.result("no-dead-element", text, violations, static=everything)
+
+
+def to_be_reached(mission: Mission, net: PetriNet) -> dict[str, None]:
+    """Return the elements that a run must reach, in the order of the net."""
+    unknown = {a.element for a in net.approximations if a.exactness is Exactness.BOUNDED}
+    return dict.fromkeys(
+        element
+        for element in net.elements
+        if element not in unknown and not _undoes(mission.elements.get(element))
+    )
 
 
 def _undoes(element: object) -> bool:

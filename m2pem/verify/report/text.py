@@ -1,6 +1,6 @@
 """The report for a terminal: a line a property, then each violation with its run."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 
 from m2pem.verify.net.petri_net import Exactness
 from m2pem.verify.properties.results import Result, Verdict
@@ -18,13 +18,25 @@ _MEANING = {
 Paint = Callable[[str, str], str]
 """A text in a colour (`green`, `red`, `yellow`, `cyan`)."""
 
-_MARK = {Verdict.HOLDS: ("holds", "green"), Verdict.UNDECIDED: ("undecided", "yellow")}
+_MARK = {
+    Verdict.HOLDS: ("holds", "green"),
+    Verdict.VIOLATED: ("violated", "red"),
+    Verdict.UNDECIDED: ("undecided", "yellow"),
+}
 _MOST_STEPS = 40
 """Most steps of a run that are printed; the beginning of a longer one is left out."""
 
 
-def as_text(findings: Findings, paint: Paint = lambda text, _: text) -> str:
-    lines = [*_properties(findings, paint)]
+def plain(text: str, _: str) -> str:
+    """Return a text without colours."""
+    return text
+
+
+def as_text(
+    findings: Findings, paint: Paint = plain, *, printed: Collection[str] = frozenset()
+) -> str:
+    """Return the whole report. `printed`: properties and requirements without a line in it."""
+    lines = [*_properties(findings, paint, printed)]
     for violation in findings.violations:
         if violation.answer.warning and not findings.strict:
             continue
@@ -49,23 +61,34 @@ def _rough(findings: Findings) -> Iterator[str]:
         yield f"and {len(approximations) - _MOST_ROUGH} more like these"
 
 
-def _properties(findings: Findings, paint: Paint) -> Iterator[str]:
+def _properties(findings: Findings, paint: Paint, printed: Collection[str]) -> Iterator[str]:
     width = max(len(answer.property) for answer in findings.results)
     for answer in findings.results:
-        word, colour = _verdict(findings, answer)
-        note = f" ({answer.covered})" if answer.covered else ""
-        run_step = _shown(f"{answer.property:<{width}}  {answer.text}{note}")
-        yield f"{paint(f'{word:<9}', colour)}  {run_step}"
-        if condition := condition_of(findings, answer):
-            yield f"{'':<{width + 13}}{_shown(condition)}"
-        if answer.author:
-            yield f"{'':<{width + 13}}for: {_shown(answer.author)}"
+        condition = condition_of(findings, answer)
+        if answer.property not in printed:
+            yield from result_lines(answer, width, paint, strict=findings.strict, note=condition)
+        elif condition:
+            yield f"{answer.property}: {_shown(condition)}"
 
 
-def _verdict(findings: Findings, answer: Result) -> tuple[str, str]:
-    if answer.verdict is Verdict.VIOLATED:
-        return ("violated", "red") if findings.counts(answer) else ("warning", "yellow")
-    return _MARK[answer.verdict]
+def result_lines(
+    answer: Result, width: int, paint: Paint, *, strict: bool, note: str = ""
+) -> Iterator[str]:
+    """Return the line of a property or requirement, and what its author says of it.
+
+    `width`: of the column of names. `strict`: warnings are violations. `note`: on what its verdict
+    depends.
+    """
+    word, colour = _MARK[answer.verdict]
+    if answer.warning and not strict and answer.verdict is Verdict.VIOLATED:
+        word, colour = "warning", "yellow"
+    extent = f" ({answer.covered})" if answer.covered else ""
+    run_step = _shown(f"{answer.property:<{width}}  {answer.text}{extent}")
+    yield f"{paint(f'{word:<9}', colour)}  {run_step}"
+    if note:
+        yield f"{'':<{width + 13}}{_shown(note)}"
+    if answer.author:
+        yield f"{'':<{width + 13}}for: {_shown(answer.author)}"
 
 
 def _violation(violation: DescribedViolation, paint: Paint) -> Iterator[str]:

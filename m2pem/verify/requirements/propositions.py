@@ -219,6 +219,8 @@ class ExploredRuns:
         return (0,)
 
     def successors(self, state: int) -> Sequence[tuple[int, int]]:
+        if state in self._exploration.cut:  # not all of them are known
+            return ()
         return tuple(self._exploration.successors(state))
 
     def is_open(self, state: int) -> bool:

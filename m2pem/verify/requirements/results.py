@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 from m2pem.fleet.fleet import Fleet
 from m2pem.mission.mission import Mission
-from m2pem.verify.check import Report, full_states, size_limit_of
+from m2pem.verify.check import SHARE_REDUCED, Report, full_states, share, size_limit_of
 from m2pem.verify.ltl import model_check, propositions
 from m2pem.verify.ltl.formula import Active, Completed
 from m2pem.verify.net.petri_net import PetriNet
@@ -17,7 +17,14 @@ from m2pem.verify.requirements.check import (
     reduction_for,
 )
 from m2pem.verify.requirements.requirement import Requirement
-from m2pem.verify.search.explore import Exploration, Limits, Progress, Stopped, explore
+from m2pem.verify.search.explore import (
+    Exploration,
+    Limits,
+    Progress,
+    Stopped,
+    Watch,
+    explore,
+)
 from m2pem.verify.spin import ltl_claims
 from m2pem.verify.spin.queries import Storage
 from m2pem.verify.spin.search import SpinExploration, WantedRuns
@@ -25,6 +32,13 @@ from m2pem.verify.spin.search import search as search_with_spin
 from m2pem.verify.translate import Options, TooLargeError
 
 Show = Callable[[Progress], None] | None
+
+
+class _Violated:
+    """The `Watch` of searches after a property was violated: a share of each is searched."""
+
+    def look(self, _: Exploration) -> bool:
+        return True
 
 
 @dataclass(slots=True)
@@ -39,6 +53,7 @@ class _Asking:
     net: PetriNet
     limits: Limits
     progress: Show
+    watch: Watch | None = None
     small: Exploration | None = None
     whole: Exploration | None = None
     interrupted: bool = False
@@ -53,14 +68,17 @@ class _Asking:
         if self.small is None:
             least = min(self.limits.states, full_states(self.net))
             limits = replace(self.limits, states=least)
-            self.small = explore(self.net, limits, progress=self.progress)
+            self.small = explore(self.net, limits, progress=self.progress, watch=self.watch)
         if self.small.stopped is not Stopped.STATES or len(self.small.states) > self.limits.states:
             return self.small
         reduction = reduction_for(self.net, self.mission, self.fleet, requirement)
         if reduction is not None:
-            return explore(self.net, self.limits, reduction=reduction, progress=self.progress)
+            limits = replace(self.limits, after_violation=share(self.limits, SHARE_REDUCED))
+            return explore(
+                self.net, limits, reduction=reduction, progress=self.progress, watch=self.watch
+            )
         if self.whole is None:
-            self.whole = explore(self.net, self.limits, progress=self.progress)
+            self.whole = explore(self.net, self.limits, progress=self.progress, watch=self.watch)
         return self.whole
 
 
@@ -75,11 +93,14 @@ def with_requirements(
     limits: Limits | None = None,
     storage: Storage = Storage.EXACT,
     progress: Show = None,
+    decided: Callable[[Result], None] | None = None,
 ) -> Report:
     """Return the report with a result for each requirement added.
 
     The report's engine searches. What Spin cannot answer, the built-in search does, and a note says
-    so. If a person has interrupted a search, no other one begins.
+    so. If a person has interrupted a search, no other one begins. If the search of the properties
+    has ended after a violation, the search for each requirement ends after as large a share.
+    `decided` gets the result of each requirement when it is known.
 
     Raises:
         KeyError: the mission has no such process.
@@ -100,7 +121,8 @@ def with_requirements(
         return replace(
             report, results=(*report.results, *(_result(each, mission) for each in answers))
         )
-    queries = _Asking(mission, fleet, net, limits, progress)
+    watch = _Violated() if report.found.stopped is Stopped.VIOLATION else None
+    queries = _Asking(mission, fleet, net, limits, progress, watch)
     spins: SpinExploration | None = None
     results: list[Result] = []
     instead: list[str] = []
@@ -108,6 +130,8 @@ def with_requirements(
         each.covered.endswith(Stopped.INTERRUPTED) for each in report.results
     )
     for each in requirements:
+        if decided is not None and results:
+            decided(results[-1])
         if stopped or queries.interrupted:
             why = f"not begun, after {Stopped.INTERRUPTED}"
             results.append(_result(Answer(each, model_check.Result.UNDECIDED, why=why), mission))

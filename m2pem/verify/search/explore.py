@@ -7,6 +7,10 @@
 
 `Exploration` is what properties are read from. A place that gets more tokens than it has room for
 is noted (`overflows`), and the search starts again with more room for it, up to `Limits.tokens`.
+Until then, what follows such a step is not searched.
+
+A `Watch` sees what was found while the search goes on. When it has seen a violation, the search
+goes on for a share of what it has searched (`Limits.after_violation`), and ends.
 """
 
 import gc
@@ -15,16 +19,17 @@ from array import array
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import Protocol
 
 from m2pem.verify.net.encoding import Encoding, Marking
 from m2pem.verify.net.petri_net import Flag, Kind, PetriNet
 from m2pem.verify.search.read_write_sets import affected_transitions, as_sets, tests_of
 from m2pem.verify.search.stubborn_sets import Reduction, states_to_expand
 
-_LOOK_EVERY = 128
+LOOK_EVERY = 128
 """States between two readings of the clock; states that take longer count more."""
-_LOOK_EVERY_STEPS = 10_000
-_LOOK_EVERY_CHOICE = 4
+LOOK_EVERY_STEPS = 10_000
+LOOK_EVERY_CHOICE = 4
 """The same with a reduction, which takes longer for each state."""
 _BYTES_A_STATE = 250
 """Approximate memory of a state beside its own bits; a state that waits to be searched takes more.
@@ -33,16 +38,24 @@ _BYTES_A_WAITING_STATE = 56
 _BYTES_A_TRANSITION = 8
 """Of each transition that is enabled in a waiting state."""
 _BYTES_AN_EDGE = 16
+AFTER_VIOLATION_STATES = 50_000
+"""States that are searched after a violation in any case."""
 
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Limits of a check; beyond, it is undecided. `tokens`: on a place where one is meant."""
+    """Limits of a check; beyond, it is undecided. `tokens`: on a place where one is meant.
+
+    `after_violation`: when a `Watch` has seen a violation, the search ends after as many states
+    again as it took to find it, at least after this many; None: it goes on to its end. It is a
+    number of states, so that an answer does not depend on the speed of the machine.
+    """
 
     states: int = 2_000_000
     seconds: float = 600.0
     memory_mb: float = 2_000.0
     tokens: int = 7
+    after_violation: int | None = AFTER_VIOLATION_STATES
 
 
 class Stopped(StrEnum):
@@ -55,16 +68,18 @@ class Stopped(StrEnum):
     TRANSITIONS = "the limit of transitions"
     DEPTH = "the limit of depth"
     BITSTATE = "a table that may take a new state for a known one"
+    VIOLATION = "a violation that was found before"
     INTERRUPTED = "an interruption by hand"
 
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """The progress of a search."""
+    """The progress of a search. `memory_mb`: about what it needs, 0 if that is not known."""
 
     states: int
     waiting: int
     seconds: float
+    memory_mb: float = 0.0
 
 
 @dataclass(slots=True)
@@ -74,7 +89,8 @@ class Exploration:
     `fired`: by transition, the first state in which it fired. `flagged`: those of them that have a
     flag. `overflows`: by place, the first state and transition at which a token came to a place
     that had one, where one is meant. `beyond`: places that got more than `Limits.tokens`. `edges`:
-    successors of each state as (transition, state), if they were kept.
+    successors of each state as (transition, state), if they were kept. `expanded`: how many states
+    have all their successors, but for those of `cut`: there, a place has no room for a token.
     """
 
     net: PetriNet
@@ -94,6 +110,8 @@ class Exploration:
     edge_transition: "array[int] | None" = None
     edge_state: "array[int] | None" = None
     reduced: bool = False
+    expanded: int = 0
+    cut: set[int] = field(default_factory=set)
 
     @property
     def complete(self) -> bool:
@@ -130,6 +148,14 @@ class Exploration:
             yield self.edge_transition[at], self.edge_state[at]
 
 
+class Watch(Protocol):
+    """Looks at what a search has found while it goes on."""
+
+    def look(self, found: Exploration) -> bool:
+        """Whether there is a violation in what was found; called when there is more in it."""
+        ...
+
+
 def explore(
     net: PetriNet,
     limits: Limits | None = None,
@@ -137,6 +163,7 @@ def explore(
     reduction: Reduction | None = None,
     keep_edges: bool = True,
     progress: Callable[[Progress], None] | None = None,
+    watch: Watch | None = None,
 ) -> Exploration:
     """Explore the states of a net, nearest first.
 
@@ -148,51 +175,61 @@ def explore(
     wider: dict[int, int] = {}
     overflows: dict[int, tuple[int, int]] = {}
     runs: dict[int, tuple[int, ...]] = {}
+    observer = _Observer(limits, watch)
     began = time.monotonic()
     while True:
         edges = keep_edges or reduction is not None
-        search = _Search(net, Encoding(net, wider), limits, began, edges)
-        found = search.run(reduction, progress)
-        while found.stopped is None and search.puts_off_for_ever(found):
+        search = _Search(net, Encoding(net, wider), limits, began, edges, observer)
+        while True:
             found = search.run(reduction, progress)
-        again = False
-        for place, (state, transition) in found.overflows.items():
-            if not _exact(found, found.run_to(state), limits):
-                continue
+            full = [place for place in found.overflows if search.grows(place)]
+            if found.stopped is not None or full or not search.puts_off_for_ever(found):
+                break
+        for place, at in found.overflows.items():
             if place not in overflows and not net.places[place].several:
-                overflows[place] = (state, transition)
-                runs[place] = (*found.run_to(state), transition)
-            if net.places[place].once:
-                continue
-            bits = found.encoding.width[place] + 1
-            if found.stopped in (None, Stopped.TOKENS) and (1 << bits) - 1 <= limits.tokens:
-                wider[place] = bits
-                again = True
-        if not again:
-            found.beyond = frozenset(
-                place for place in found.overflows if not net.places[place].once
-            )
-            if found.beyond and found.stopped is None:
-                found.stopped = Stopped.TOKENS
-            found.overflows = overflows
-            found.overflow_runs = runs
-            return found
+                overflows[place] = at
+                runs[place] = found.overflow_runs[place]
+        if full and found.stopped is None:
+            for place in full:
+                wider[place] = found.encoding.width[place] + 1
+            continue
+        found.beyond = frozenset(
+            place
+            for place in found.overflows
+            if not (net.places[place].once or search.grows(place))
+        )
+        if found.beyond and found.stopped is None:
+            found.stopped = Stopped.TOKENS
+        found.overflows = overflows
+        found.overflow_runs = runs
+        return found
 
 
-def _exact(found: Exploration, run: Sequence[int], limits: Limits) -> bool:
-    """Whether no token on a run was lost for want of room that the next search will have.
+class _Observer:
+    """Asks a watch, and says when enough was searched after a violation."""
 
-    What comes after such a loss need not be a run: it may miss a step that had to come first.
-    """
-    encoding = found.encoding
-    state = encoding.initial
-    for transition in run:
-        state, full = encoding.fire(transition, state)
-        for place in encoding.places_in(full) if full else ():
-            widest = (1 << (encoding.width[place] + 1)) - 1 > limits.tokens
-            if not widest and not found.net.places[place].once:
-                return False
-    return True
+    def __init__(self, limits: Limits, watch: Watch | None) -> None:
+        self.watch = watch
+        self.least = limits.after_violation
+        self.before = 0
+        """States of the searches before this one, which had less room or deferred too much."""
+        self.most: int | None = None
+        self.seen = (0, 0, 0)
+
+    def enough(self, found: Exploration, states: int) -> bool:
+        """Whether to end a search that has found so many states."""
+        if self.watch is None:
+            return False
+        searched = self.before + states
+        now = (len(found.terminals), len(found.fired), len(found.overflows))
+        if self.most is None and now != self.seen:
+            self.seen = now
+            found.stopped = Stopped.VIOLATION  # not all was seen: nothing holds yet
+            violated = self.watch.look(found)
+            if violated and self.least is not None:
+                self.most = searched + max(searched, self.least)
+            found.stopped = None
+        return self.most is not None and searched > self.most
 
 
 def _complete_only(*columns: "list[int] | array[int]") -> None:
@@ -204,13 +241,21 @@ def _complete_only(*columns: "list[int] | array[int]") -> None:
 
 class _Search:
     def __init__(
-        self, net: PetriNet, encoding: Encoding, limits: Limits, began: float, keep_edges: bool
+        self,
+        net: PetriNet,
+        encoding: Encoding,
+        limits: Limits,
+        began: float,
+        keep_edges: bool,
+        observer: _Observer,
     ) -> None:
         self.net = net
         self.encoding = encoding
         self.limits = limits
         self.began = began
         self.keep_edges = keep_edges
+        self.observer = observer
+        self.growing = encoding.places_mask(p.index for p in net.places if self.grows(p.index))
         self.whole: set[int] = set()
         """States on a cycle, in which nothing may be deferred (the ignoring proviso)."""
         self.partly: set[int] = set()
@@ -224,6 +269,11 @@ class _Search:
             for transition in net.transitions
         ]
         self.masks = [(c.test, c.need, ~c.clear, c.put, c.plain) for c in transitions]
+
+    def grows(self, place: int) -> bool:
+        """Whether a place that is full gets more room in another search."""
+        bits = self.encoding.width[place] + 1
+        return not self.net.places[place].once and (1 << bits) - 1 <= self.limits.tokens
 
     def run(
         self, reduction: Reduction | None, progress: Callable[[Progress], None] | None
@@ -265,9 +315,13 @@ class _Search:
             if collecting:
                 gc.enable()
         if self.keep_edges:
+            found.expanded = len(edge_start)
+            if found.stopped is Stopped.INTERRUPTED:
+                found.expanded = max(0, found.expanded - 1)
             while len(edge_start) <= len(states):
                 edge_start.append(len(edge_transition))
         found.seconds = time.monotonic() - self.began
+        self.observer.before += len(states)
         return found
 
     def _loop(  # noqa: PLR0915 (one loop, kept flat for its speed)
@@ -296,14 +350,15 @@ class _Search:
         add_state, add_parent, add_via = states.append, parents.append, via.append
         wait, setdefault = waiting.append, index.setdefault
         outside = [each == 2 for each in rank]
+        overflow_runs, growing, cut = found.overflow_runs, self.growing, found.cut
         transitions = looked = overfull = 0
-        look_every = _LOOK_EVERY if choose is None else _LOOK_EVERY_CHOICE
+        look_every = LOOK_EVERY if choose is None else LOOK_EVERY_CHOICE
         self.partly, self.inner = partly, inner = set(), set()
         self.goes_back = False
         at = 0
         count = len(states)
         while at < count:
-            if at % look_every == 0 or transitions - looked > _LOOK_EVERY_STEPS:
+            if at % look_every == 0 or transitions - looked > LOOK_EVERY_STEPS:
                 found.transitions = looked = transitions
                 if self._stop(found, count, at, waiting, progress):
                     return
@@ -338,13 +393,18 @@ class _Search:
                     after |= put
                 else:
                     after, full = fire(number, state)
-                if full & ~overfull:
-                    for place in encoding.places_in(full & ~overfull):
-                        overflows[place] = (at, number)
-                        overfull |= encoding.mask[place]
                 if unfired[number]:
                     unfired[number] = False
                     fired[number] = at
+                if full:
+                    for place in encoding.places_in(full & ~overfull) if full & ~overfull else ():
+                        overflows[place] = (at, number)
+                        overflow_runs[place] = (*found.run_to(at), number)
+                        overfull |= encoding.mask[place]
+                    if full & growing:
+                        cut.add(at)
+                        transitions -= 1
+                        continue
                 known = setdefault(after, count)
                 if known == count:
                     count += 1
@@ -386,8 +446,6 @@ class _Search:
         progress: Callable[[Progress], None] | None,
     ) -> bool:
         seconds = time.monotonic() - self.began
-        if progress is not None:
-            progress(Progress(states, states - done, seconds))
         size = states * (_BYTES_A_STATE + self.encoding.bits // 7)
         if self.keep_edges:
             size += found.transitions * _BYTES_AN_EDGE
@@ -396,7 +454,11 @@ class _Search:
         size += (states - done) * (
             _BYTES_A_WAITING_STATE + _BYTES_A_TRANSITION * sum(ends) // len(ends)
         )
-        if states > self.limits.states:
+        if progress is not None:
+            progress(Progress(states, states - done, seconds, size / 1e6))
+        if self.observer.enough(found, states):
+            found.stopped = Stopped.VIOLATION
+        elif states > self.limits.states:
             found.stopped = Stopped.STATES
         elif seconds > self.limits.seconds:
             found.stopped = Stopped.TIME

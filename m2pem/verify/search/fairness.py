@@ -42,7 +42,10 @@ class FairCycles:
         self._outcomes = [
             frozenset(outcomes[transition.index]) for transition in found.net.transitions
         ]
-        self._open = _last_expanded(found) if found.stopped is Stopped.INTERRUPTED else -1
+        self._open = set(found.cut)
+        """States of which not all steps are known."""
+        if found.stopped is Stopped.INTERRUPTED:
+            self._open.add(_last_expanded(found))
 
     @property
     def any(self) -> bool:
@@ -68,7 +71,7 @@ class FairCycles:
         return len(self._found.states)
 
     def _steps(self, state: int) -> Iterator[_Step]:
-        if state != self._open:
+        if state not in self._open:
             for step in self._found.successors(state):
                 if not self._ignored[step[0]]:
                     yield step
