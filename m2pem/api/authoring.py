@@ -1,6 +1,7 @@
 """What MissionControl returns to editors of missions."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeAlias, Union
 
@@ -111,19 +112,29 @@ class Outline:
 
 @dataclass(frozen=True, slots=True)
 class SearchLimits:
-    """Limits at which a verification ends undecided."""
+    """Limits at which a verification ends undecided.
+
+    `exhaustive`: a large search goes on after a violation; otherwise it ends soon.
+    """
 
     states: int = 2_000_000
     seconds: float = 600.0
+    exhaustive: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class SearchProgress:
-    """Progress of a verification: `waiting` of the `states` found are still to be searched."""
+    """Progress of a verification: `waiting` of the `states` found are still to be searched.
+
+    `memory_mb`: about what the search needs. `decided`: by property or requirement whose verdict is
+    certain already, `holds`, `violated`, `warning` or `undecided`.
+    """
 
     seconds: float
     states: int = 0
     waiting: int = 0
+    memory_mb: float = 0.0
+    decided: Mapping[str, str] = field(default_factory=dict)
 
 
 DEFAULT_LIMITS = SearchLimits()

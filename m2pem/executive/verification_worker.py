@@ -84,18 +84,34 @@ def _work(content: bytes, send: SendProgress) -> bytes:
     # What searches is loaded here: the executive has no use for it.
     from m2pem.executive.verification import SearchEngine, search, search_request  # noqa: PLC0415
     from m2pem.plugins import PluginManager  # noqa: PLC0415
+    from m2pem.verify.properties.results import Result  # noqa: PLC0415
     from m2pem.verify.report.data import as_data  # noqa: PLC0415
-    from m2pem.verify.search.explore import Limits, Progress  # noqa: PLC0415
+    from m2pem.verify.report.text import word_of  # noqa: PLC0415
+    from m2pem.verify.search.explore import (  # noqa: PLC0415
+        AFTER_VIOLATION_STATES,
+        Limits,
+        Progress,
+    )
 
     order = msgspec.msgpack.decode(content, type=Order)
     shown_at = 0.0
+    verdicts: dict[str, str] = {}
+
+    def decided(result: Result) -> None:
+        verdicts[result.property] = word_of(result, strict=order.strict)
 
     def progress(searched: Progress) -> None:
         nonlocal shown_at
         now = time.monotonic()
         if now >= shown_at + _BETWEEN_S:
             shown_at = now
-            how_far = SearchProgress(searched.seconds, searched.states, searched.waiting)
+            how_far = SearchProgress(
+                searched.seconds,
+                searched.states,
+                searched.waiting,
+                searched.memory_mb,
+                verdicts,
+            )
             send(msgspec.msgpack.encode(how_far))
 
     path = [Path(each) for each in order.search_path]
@@ -110,9 +126,18 @@ def _work(content: bytes, send: SendProgress) -> bytes:
         order.spec,
         timers_in_order=order.timers_in_order,
     )
-    limits = Limits(states=order.limits.states, seconds=order.limits.seconds, tokens=TOKENS)
+    limits = Limits(
+        states=order.limits.states,
+        seconds=order.limits.seconds,
+        tokens=TOKENS,
+        after_violation=None if order.limits.exhaustive else AFTER_VIOLATION_STATES,
+    )
     found = search(
-        asked, SearchEngine("builtin", "exact", limits), strict=order.strict, progress=progress
+        asked,
+        SearchEngine("builtin", "exact", limits),
+        strict=order.strict,
+        progress=progress,
+        decided=decided,
     )
     return msgspec.json.encode(as_data(found))
 

@@ -201,18 +201,16 @@ def test_what_ends_m2pem_ends_spin_and_what_it_saw_is_told(
 
 
 def test_a_violation_is_printed_while_the_search_goes_on(
-    m2pem: CommandLine, tmp_path: Path
+    m2pem: CommandLine, unhandled: Path
 ) -> None:
-    mission = tmp_path / "unsafe.bpmn"
-    mission.write_bytes(unsafe(9).source)
-    program = m2pem.start("verify", mission, "--exhaustive")
-    program.until(lambda line: line.startswith("violated   one-token"))
+    program = m2pem.start("verify", unhandled, "--exhaustive")
+    program.until(lambda line: line.startswith("violated   decisions-handled"))
     program.send(signal.SIGINT)
     assert program.rest() == (1, "")
-    said = [line for line in program.lines if line.startswith("violated   one-token")]
+    said = [line for line in program.lines if line.startswith("violated   decisions-handled")]
     assert len(said) == 1
     text = "\n".join(program.lines)
-    assert "one-token: Again gets a second token" in text
+    assert "no flow of Way0 is true and it has no default" in text
     assert "then an interruption by hand ended the search" in text
 
 

@@ -25,6 +25,7 @@ from m2pem.journal import MemoryJournal
 from m2pem.plugins import PluginManager
 from m2pem.rehearsal.worker import rehearse_in_subprocess
 from m2pem.verify.requirements.requirement import RequirementsError
+from tests.cli.test_verify_terminal import tangled
 from tests.console import run_preloaded
 
 T = TypeVar("T")
@@ -94,6 +95,24 @@ def test_a_specification_timers_strictness_and_limits_are_handed_on() -> None:
     assert "never" in [each["property"] for each in violated["violations"]]
     assert any("in the order of their times" in note for note in violated["coverage"]["notes"])
     assert cut["verdict"] == "undecided"
+
+
+def test_progress_says_what_is_certain_already_and_what_the_search_needs() -> None:
+    told: list[SearchProgress] = []
+
+    async def story(control: Control) -> Any:
+        limits = SearchLimits(states=150_000, exhaustive=True)
+        mission = tangled(handled=False).encode()
+        return await control.verify(mission, limits=limits, on_progress=told.append)
+
+    found = with_control(story)
+    assert found["coverage"]["states"] > 150_000, "it has gone on after the violation"
+    last = told[-1]
+    assert last.decided["decisions-handled"] == "violated"
+    assert last.decided["can-be-triggered"] == "holds"
+    assert "no-livelock" not in last.decided
+    assert last.states > 0
+    assert last.memory_mb > 0
 
 
 def test_what_cannot_be_verified_is_refused_with_its_findings() -> None:

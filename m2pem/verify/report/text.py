@@ -18,11 +18,9 @@ _MEANING = {
 Paint = Callable[[str, str], str]
 """A text in a colour (`green`, `red`, `yellow`, `cyan`)."""
 
-_MARK = {
-    Verdict.HOLDS: ("holds", "green"),
-    Verdict.VIOLATED: ("violated", "red"),
-    Verdict.UNDECIDED: ("undecided", "yellow"),
-}
+WARNING = "warning"
+"""The word for a violation of what is only a warning."""
+_COLOUR = {"holds": "green", "violated": "red", WARNING: "yellow", "undecided": "yellow"}
 _MOST_STEPS = 40
 """Most steps of a run that are printed; the beginning of a longer one is left out."""
 
@@ -71,6 +69,13 @@ def _properties(findings: Findings, paint: Paint, printed: Collection[str]) -> I
             yield f"{answer.property}: {_shown(condition)}"
 
 
+def word_of(answer: Result, *, strict: bool) -> str:
+    """Return the verdict, or "warning". `strict`: warnings are violations."""
+    if answer.warning and not strict and answer.verdict is Verdict.VIOLATED:
+        return WARNING
+    return answer.verdict.value
+
+
 def result_lines(
     answer: Result, width: int, paint: Paint, *, strict: bool, note: str = ""
 ) -> Iterator[str]:
@@ -79,9 +84,8 @@ def result_lines(
     `width`: of the column of names. `strict`: warnings are violations. `note`: on what its verdict
     depends.
     """
-    word, colour = _MARK[answer.verdict]
-    if answer.warning and not strict and answer.verdict is Verdict.VIOLATED:
-        word, colour = "warning", "yellow"
+    word = word_of(answer, strict=strict)
+    colour = _COLOUR[word]
     extent = f" ({answer.covered})" if answer.covered else ""
     run_step = _shown(f"{answer.property:<{width}}  {answer.text}{extent}")
     yield f"{paint(f'{word:<9}', colour)}  {run_step}"

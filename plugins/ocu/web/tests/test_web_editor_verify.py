@@ -1,5 +1,6 @@
 """Verification from the editor, in a real browser: the report, a run step by step, requirements."""
 
+import re
 import shutil
 from xml.etree import ElementTree
 
@@ -7,6 +8,8 @@ import pytest
 from playwright.async_api import Locator, Page, expect
 from web_desk import IN_ONE_LOOP, MISSION, Desk
 from web_served import REPOSITORY
+
+from tests.cli.test_verify_terminal import tangled
 
 pytestmark = IN_ONE_LOOP
 
@@ -65,6 +68,31 @@ async def test_a_run_into_a_deadlock_is_stepped_through_on_the_diagram(desk: Des
     await expect(page.locator(".m2v-number")).to_have_count(0)
     await report.get_by_role("button", name="Clear the report").click()
     await expect(drawn(page, "Reverse")).not_to_contain_class("m2v-unreached")
+
+
+async def test_what_is_certain_is_shown_while_the_search_goes_on(desk: Desk) -> None:
+    mission = desk.executive.missions / "tangled.bpmn"
+    mission.write_text(tangled(handled=False), encoding="utf-8")
+    page = await desk.edit("tangled", tab="Verify")
+    await page.get_by_text("Options", exact=True).click()
+    await page.get_by_label("Search on after a violation").check()
+    await verify(page)
+    certain = page.get_by_role("list", name="Certain already")
+    await expect(certain.get_by_text("violated: decisions-handled")).to_be_visible()
+    await expect(certain.get_by_role("listitem").first).to_contain_text("violated")
+    await expect(certain.get_by_text("holds: can-be-triggered")).to_be_visible()
+    status = page.get_by_role("status").filter(has_text="states found")
+    rate = re.compile(r"still to search, [1-9][\d,]* a second, [1-9]")
+    await expect(status).to_contain_text(rate)
+    await page.get_by_role("button", name="Cancel", exact=True).click()
+    await expect(page.get_by_text("The verification was cancelled.")).to_be_visible()
+    await expect(certain).to_have_count(0)
+
+    await page.get_by_label("Search on after a violation").uncheck()
+    await verify(page)
+    report = page.get_by_role("region", name="Report")
+    await expect(report.get_by_role("heading", name="Violated")).to_be_visible()
+    await expect(report).to_contain_text("a violation that was found before")
 
 
 async def test_requirements_are_written_verified_undone_and_kept(desk: Desk) -> None:

@@ -23,13 +23,15 @@ Report = Mapping[str, Any]
 
 class VerifyModel(DraftModel):
     """What to prove. `spec`: the text of a file of requirements. `timers`: whether those that begin
-    together come in any order, or in that of their times."""
+    together come in any order, or in that of their times. `exhaustive`: a large search goes on
+    after a violation."""
 
     spec: Annotated[str, Field(max_length=LONGEST_SPEC)] | None = None
     strict: bool = False
     timers: Literal["any", "in-order"] = "any"
     seconds: Annotated[float, Field(gt=0, le=LONGEST_S, strict=False)] = 600.0
     states: Annotated[int, Field(ge=1, le=MOST_STATES)] = 2_000_000
+    exhaustive: bool = False
 
 
 class JobModel(BaseModel):
@@ -39,11 +41,14 @@ class JobModel(BaseModel):
 
 
 class ProgressModel(BaseModel):
-    """How far it is: `waiting` of the `states` found are still to be searched."""
+    """How far it is: `waiting` of the `states` found are still to be searched. `decided`: by
+    property or requirement, its verdict, if that is certain already."""
 
     seconds: float
     states: int
     waiting: int
+    memory_mb: float
+    decided: dict[str, str]
 
 
 class VerificationModel(BaseModel):
@@ -80,7 +85,7 @@ def router(control: MissionControl, folder: MissionFolder, jobs: Jobs[Report]) -
                     spec=wanted.spec,
                     strict=wanted.strict,
                     timers_in_order=wanted.timers == "in-order",
-                    limits=SearchLimits(wanted.states, wanted.seconds),
+                    limits=SearchLimits(wanted.states, wanted.seconds, wanted.exhaustive),
                     on_progress=progressed,
                 )
             finally:
@@ -102,7 +107,11 @@ def router(control: MissionControl, folder: MissionFolder, jobs: Jobs[Report]) -
             by=job.by,
             state=job.state,
             progress=ProgressModel(
-                seconds=found.seconds, states=found.states, waiting=found.waiting
+                seconds=found.seconds,
+                states=found.states,
+                waiting=found.waiting,
+                memory_mb=found.memory_mb,
+                decided=dict(found.decided),
             ),
             report=report,
             problem=job.problem or None,

@@ -13,12 +13,17 @@ export const verify: Translation<typeof english.verify> = {
   inOrderHint: "Timer, die gemeinsam zu laufen beginnen, feuern in der Reihenfolge ihrer Zeiten",
   strict: "Streng",
   strictHint: "Warnungen gelten als Verletzungen",
+  exhaustive: "Nach einer Verletzung weitersuchen",
+  exhaustiveHint:
+    "Bis zum Ende oder bis zu den Grenzen. Sonst endet eine große Suche bald danach.",
   spec: "Weitere Anforderungen (YAML)",
   specHint: "Wie für m2pem verify --spec. Sie werden nicht mit der Mission aufbewahrt.",
   specExample: "requirements:\n  - id: am-ende\n    ltl: <> ended",
   specLine: "Zeile",
   starting: "Beginnt…",
-  progress: "{states} Zustände gefunden, {waiting} noch zu untersuchen, {seconds} s",
+  progress:
+    "{states} Zustände gefunden, {waiting} noch zu untersuchen, {rate} je Sekunde, {memory} MB, {seconds} s",
+  decided: "Schon sicher",
   cancelled: "Die Verifikation wurde abgebrochen.",
   failed: "Die Mission konnte nicht verifiziert werden",
   report: "Bericht",

@@ -11,7 +11,7 @@ import { ProblemView } from "../ProblemView";
 import { Requirements } from "../requirements/Requirements";
 import { Answers } from "./Answers";
 import { followOnCanvas } from "./canvas";
-import { counted } from "./report";
+import { counted, type Outcome } from "./report";
 import { verificationOf, type Verification } from "./verification";
 import { ViolationView } from "./ViolationView";
 import "../begin/begin.css";
@@ -59,7 +59,7 @@ interface PartProps {
 }
 
 function Ask({ editor, verification }: PartProps) {
-  const { job, strict, inOrder, spec } = verification;
+  const { job, strict, inOrder, exhaustive, spec } = verification;
   const busy = job.isBusy.value;
   const allowed = may("operator");
   const ready = beginningOf(editor).isReadable();
@@ -105,6 +105,15 @@ function Ask({ editor, verification }: PartProps) {
             strict.value = value;
           }}
         />
+        <CheckField
+          id="m2v-exhaustive"
+          label={words.exhaustive}
+          hint={words.exhaustiveHint}
+          value={exhaustive.value}
+          write={(value) => {
+            exhaustive.value = value;
+          }}
+        />
         <TextField
           id="m2v-spec"
           label={words.spec}
@@ -122,6 +131,7 @@ function Ask({ editor, verification }: PartProps) {
   );
 }
 
+const ORDER: readonly Outcome[] = ["violated", "warning", "undecided", "holds"];
 const NUMBER = new Intl.NumberFormat(locale);
 
 /** How far the search is, or why there is no report. */
@@ -129,7 +139,7 @@ function Progress({ editor, verification }: PartProps) {
   const { job, spec } = verification;
   const told = job.told.value;
   const refusal = job.refusal.value;
-  const { states = 0, waiting = 0, seconds = 0 } = told?.progress ?? {};
+  const { states = 0, waiting = 0, seconds = 0, memory_mb = 0 } = told?.progress ?? {};
   return (
     <>
       <div role="status">
@@ -140,6 +150,8 @@ function Progress({ editor, verification }: PartProps) {
               ? fill(words.progress, {
                   states: NUMBER.format(states),
                   waiting: NUMBER.format(waiting),
+                  rate: NUMBER.format(Math.round(states / Math.max(seconds, 0.1))),
+                  memory: NUMBER.format(Math.round(memory_mb)),
                   seconds: NUMBER.format(Math.round(seconds)),
                 })
               : words.starting}
@@ -147,9 +159,25 @@ function Progress({ editor, verification }: PartProps) {
         )}
         {told?.state === "cancelled" && <p class="m2-note">{words.cancelled}</p>}
       </div>
+      {job.isBusy.value && <Decided decided={told?.progress.decided ?? {}} />}
       {refusal && (
         <ProblemView editor={editor} title={words.failed} refusal={refusal} spec={spec.value} />
       )}
     </>
+  );
+}
+
+/** What is certain while the search goes on, what is violated first. */
+function Decided({ decided }: { decided: Record<string, Outcome> }) {
+  const found = Object.entries(decided).sort(([, a], [, b]) => ORDER.indexOf(a) - ORDER.indexOf(b));
+  if (!found.length) return null;
+  return (
+    <ul class="m2v-decided" aria-label={words.decided}>
+      {found.map(([property, outcome]) => (
+        <li key={property} data-outcome={outcome}>
+          {words.outcomes[outcome]}: {property}
+        </li>
+      ))}
+    </ul>
   );
 }

@@ -5,11 +5,18 @@ import { beginningOf } from "../begin/beginning";
 import { Job, type JobTold } from "../job";
 import { keptOf } from "../kept";
 import type { EditorContext } from "../panel";
-import { meaningOf, type Report, type Violation } from "./report";
+import { meaningOf, type Outcome, type Report, type Violation } from "./report";
 import { walkOf } from "./walk";
 
 export interface VerificationTold extends JobTold {
-  progress: { seconds: number; states: number; waiting: number };
+  progress: {
+    seconds: number;
+    states: number;
+    waiting: number;
+    memory_mb: number;
+    /** By property or requirement, its verdict, if that is certain already. */
+    decided: Record<string, Outcome>;
+  };
   report: Report | null;
 }
 
@@ -22,6 +29,7 @@ export interface Made {
 export class Verification {
   readonly strict = signal(false);
   readonly inOrder = signal(false);
+  readonly exhaustive = signal(false);
   /** More requirements, as the text of a YAML file. */
   readonly spec = signal("");
   readonly job = new Job<VerificationTold>("/verifications");
@@ -44,6 +52,7 @@ export class Verification {
         ...beginningOf(editor).request(),
         ...(this.spec.value.trim() ? { spec: this.spec.value } : {}),
         strict: this.strict.value,
+        ...(this.exhaustive.value ? { exhaustive: true } : {}),
         ...(this.inOrder.value ? { timers: "in-order" } : {}),
       };
     });
