@@ -1,5 +1,8 @@
+from pathlib import Path
+
 import pytest
 
+from m2pem.bpmn import read_mission
 from m2pem.fleet.default_fleet import fleet_for
 from m2pem.mission.mission import Mission
 from m2pem.verify.assumptions import NO_FAILURES
@@ -64,6 +67,22 @@ def test_what_fails_breaks_what_must_come() -> None:
 )
 def test_formulas_are_about_what_the_mission_does(formula: str, result: Result) -> None:
     assert ltl(approval(), formula).result is result
+
+
+DATA = Path(__file__).parents[1] / "data"
+
+
+@pytest.mark.parametrize(
+    ("file", "formula"),
+    [
+        ("10.5-events/timer_duration.bpmn", "<> completed(wait)"),
+        ("10.3-activities/call_process.bpmn", "[](active(in) -> active(P))"),
+        ("10.6-gateways/exclusive_none_true.bpmn", "[](completed(which) -> !ended)"),
+    ],
+    ids=["a catch event completes", "a called process is active", "a gateway without a way fails"],
+)
+def test_what_completes_and_is_active_is_what_records_say(file: str, formula: str) -> None:
+    assert ltl(read_mission(DATA / file), formula).result is HOLDS
 
 
 def test_a_broken_requirement_comes_with_the_transitions_of_a_run() -> None:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from m2pem.errors import ExpressionError
 from m2pem.fleet.allocation import spelled_out
 from m2pem.fleet.fleet import Fleet
-from m2pem.mission.elements import Process, SequenceFlow
+from m2pem.mission.elements import IntermediateCatchEvent, Process, ReceiveTask, SequenceFlow
 from m2pem.mission.mission import Mission
 from m2pem.verify.ltl.formula import (
     Active,
@@ -19,7 +19,7 @@ from m2pem.verify.ltl.formula import (
     Proposition,
 )
 from m2pem.verify.net.encoding import Encoding
-from m2pem.verify.net.petri_net import Action, PetriNet, Place, Role, Transition, outcomes_of
+from m2pem.verify.net.petri_net import Action, PetriNet, Place, Role, Step, Transition, outcomes_of
 from m2pem.verify.search.explore import Exploration
 from m2pem.verify.translate.domains import tells_apart
 
@@ -136,16 +136,14 @@ class Labels:
             return False
         if place.role is Role.FLOW:
             flow = self._mission.elements.get(place.element)
-            return isinstance(flow, SequenceFlow) and flow.target.id == element
+            target = flow.target.id if isinstance(flow, SequenceFlow) else ""
+            return target == element or self._is_in_process(place, element)
         return place.element == element or self._is_in_process(place, element)
 
     def _is_in_process(self, place: Place, process: str) -> bool:
         if not isinstance(self._mission.elements.get(process), Process):
             return False
-        scope = self.net.scopes[place.scope]
-        while scope.element != process and scope.parent is not None:
-            scope = self.net.scopes[scope.parent]
-        return scope.element == process
+        return process in self.net.scopes[place.scope].path
 
     def _variables_of(self, each: Proposition) -> list[int]:
         if not isinstance(each, Data):
@@ -180,12 +178,33 @@ class Labels:
             return False
 
     def _of_transition(self, transition: Transition) -> int:
-        completed = {step.element for step in transition.steps if step.action is Action.COMPLETED}
+        completed = {step.element for step in transition.steps if self._completes(step, transition)}
         return sum(
             1 << bit
             for bit, each in enumerate(self.propositions)
             if isinstance(each, Completed) and each.element in completed
         )
+
+    def _completes(self, step: Step, transition: Transition) -> bool:
+        """Whether a token leaves the element of a step as completed.
+
+        One that waits at a catch event leaves it as soon as that is triggered; where no flow can be
+        taken, the activity or gateway fails.
+        """
+        if step.action is Action.TRIGGERED:
+            element = self._mission.elements.get(step.element)
+            flows = (
+                {flow.id for flow in element.outgoing}
+                if isinstance(element, IntermediateCatchEvent | ReceiveTask)
+                else ()
+            )
+            return any(
+                each.action is Action.TAKEN and each.element in flows for each in transition.steps
+            )
+        if step.action is not Action.COMPLETED:
+            return False
+        failed = Step(step.element, Action.THROWN, "NO_FLOW")
+        return failed not in transition.steps
 
 
 def _touched(transition: Transition) -> frozenset[int]:
