@@ -170,6 +170,16 @@ class Observer:
         """A mask of all promises that an accepted run must not postpone for ever."""
         return (1 << self.automaton.promises) - 1
 
+    @property
+    def has_memory(self) -> bool:
+        """Whether there are operators of the past, so that a state is more than the automaton's."""
+        return bool(self._past.initial)
+
+    def may_accept(self, state: int) -> bool:
+        """Whether the automaton accepts some continuation from a state on; with memory, it may be
+        one that cannot come."""
+        return bool(self.automaton.edges[self._states[state][0]])
+
     def accepts_all(self, state: int) -> bool:
         """Whether every continuation is accepted from a state on."""
         return self._states[state][0] == self.automaton.accepting_all
