@@ -43,6 +43,8 @@ NOT_READY = "NOT_READY"
 """The code of the alert of vehicles that say that they are not ready."""
 RUN_FAILED = "RUN_FAILED"
 """The code of the alert of a run that has failed."""
+REQUIREMENT_VIOLATED = "REQUIREMENT_VIOLATED"
+"""The code of the alert of a run that has violated a requirement."""
 SPACE_VIOLATED = "SPACE_VIOLATED"
 """The code of the alert of a shared space with more vehicles than it has places."""
 

@@ -115,6 +115,27 @@ def _unknown(view: RunView, record: Any) -> _Sentence:
     return f"{name}: {view.label(element)}" if element else name, Importance.DETAIL
 
 
+# --- requirements ---------------------------------------------------------------------------------
+
+
+def _requirement_monitored(_: RunView, record: r.RequirementMonitored) -> _Sentence:
+    text = f"requirement {record.requirement} is monitored: {record.english}"
+    return text, Importance.DETAIL
+
+
+def _requirement_decided(_: RunView, record: r.RequirementDecided) -> _Sentence:
+    violated = record.verdict is r.RequirementVerdict.VIOLATED
+    said = record.english.rstrip(".")
+    text = f"requirement {record.requirement} is {record.verdict}: {said}"
+    importance = Importance.ERROR if violated else Importance.NORMAL
+    return f"{text}{_in_brackets(record.because)}", importance
+
+
+def _condition_changed(_: RunView, record: r.TelemetryConditionChanged) -> _Sentence:
+    says = {True: "holds", False: "does not hold", None: "is not known"}[record.holds]
+    return f"{record.condition} {says}", Importance.DETAIL
+
+
 # --- the run --------------------------------------------------------------------------------------
 
 
@@ -536,6 +557,9 @@ _SENTENCES: dict[type, Callable[[RunView, Any], _Sentence]] = {
     r.CompensationTriggered: _compensation_triggered,
     r.CompensationBegan: _compensation_began,
     r.TransactionCancelled: _transaction_cancelled,
+    r.RequirementMonitored: _requirement_monitored,
+    r.RequirementDecided: _requirement_decided,
+    r.TelemetryConditionChanged: _condition_changed,
 }
 
 _KINDS: dict[type, Kind] = {
@@ -553,6 +577,8 @@ _KINDS: dict[type, Kind] = {
             r.InputIgnored,
             r.InputDeferred,
             r.InputSeen,
+            r.RequirementMonitored,
+            r.RequirementDecided,
         ),
         Kind.OPERATORS: (
             r.OperatorTookControl,
@@ -602,6 +628,7 @@ _KINDS: dict[type, Kind] = {
             r.CompensationBegan,
             r.CompensationEnded,
             r.TransactionCancelled,
+            r.TelemetryConditionChanged,
         ),
     }.items()
     for record in records

@@ -48,6 +48,19 @@ class ElementState(msgspec.Struct):
     stopped: bool = False
 
 
+class RequirementState(msgspec.Struct):
+    """A requirement that a run is monitored for. `verdict`: "open": it holds so far, or has not
+    come yet; "satisfied" or "violated": whatever follows, since mission time `since_s`. `because`:
+    what made it certain. `elements`: those that it is about."""
+
+    id: str
+    english: str
+    elements: tuple[str, ...] = ()
+    verdict: str = "open"
+    since_s: float | None = None
+    because: str = ""
+
+
 @dataclass(slots=True)
 class Behavior:
     """A behavior that has not ended. `since_s`: mission time of the request.
@@ -166,18 +179,21 @@ class ActiveElement:
 
 @dataclass(slots=True)
 class Changes:
-    """The elements, behaviors, prompts and resources that changed since the last `clear`."""
+    """The elements, behaviors, prompts, resources and requirements that changed since the last
+    `clear`."""
 
     elements: set[Place] = field(default_factory=set)
     behaviors: set[str] = field(default_factory=set)
     prompts: set[str] = field(default_factory=set)
     resources: set[str] = field(default_factory=set)
+    requirements: set[str] = field(default_factory=set)
 
     def clear(self) -> None:
         self.elements.clear()
         self.behaviors.clear()
         self.prompts.clear()
         self.resources.clear()
+        self.requirements.clear()
 
 
 class RunView:
@@ -223,6 +239,8 @@ class RunView:
         """What the run keeps between tasks, by the id of that."""
         self.holders: dict[str, str] = {}
         """Operators who have taken a resource, by resource, as far as the run's records say."""
+        self.requirements: dict[str, RequirementState] = {}
+        """The requirements that the run is monitored for, by id."""
         self.changes: Changes | None = None
         self._ended_behaviors: dict[str, Behavior] = {}
         self._ended_allocations: dict[str, Allocation] = {}
@@ -404,6 +422,24 @@ class RunView:
         self.holders.pop(record.resource, None)
         if self.changes is not None:
             self.changes.resources.add(record.resource)
+
+    # --- requirements ---------------------------------------------------------------------------
+
+    def _monitor(self, record: r.RequirementMonitored) -> None:
+        self.requirements[record.requirement] = RequirementState(
+            record.requirement, record.english, record.elements
+        )
+        if self.changes is not None:
+            self.changes.requirements.add(record.requirement)
+
+    def _decide(self, record: r.RequirementDecided) -> None:
+        state = self.requirements.get(record.requirement)
+        if state is not None:
+            state.verdict = record.verdict.value
+            state.since_s = record.decided_us / US_PER_S
+            state.because = record.because
+        if self.changes is not None:
+            self.changes.requirements.add(record.requirement)
 
     # --- tokens and scopes ----------------------------------------------------------------------
 
@@ -695,4 +731,6 @@ _FOLDS: dict[type, Callable[[RunView, Any], None]] = {
     r.KeepingEnded: RunView._end_keeping,
     r.EventAwaited: RunView._await_event,
     r.EventTriggered: RunView._trigger_event,
+    r.RequirementMonitored: RunView._monitor,
+    r.RequirementDecided: RunView._decide,
 }

@@ -16,6 +16,7 @@ from m2pem.api.run_view import (
     ElementState,
     FinishedToken,
     Place,
+    RequirementState,
     RunView,
     Scope,
     Service,
@@ -70,6 +71,7 @@ class _Snapshot(msgspec.Struct, array_like=True):
     ended_allocations: list[Allocation]
     closed_prompts: list[r.PromptOpened]
     past_waits: list[tuple[int, Wait]]
+    requirements: list[RequirementState]
 
 
 _encode = msgspec.msgpack.Encoder().encode
@@ -105,6 +107,7 @@ def snapshot_of(view: RunView) -> bytes:
             list(view._ended_allocations.values()),
             list(view._closed_prompts.values()),
             list(view._past_waits.items()),
+            list(view.requirements.values()),
         )
     )
 
@@ -140,6 +143,7 @@ def view_of(
     view._ended_allocations = {each.id: each for each in read.ended_allocations}
     view._closed_prompts = {each.prompt: each for each in read.closed_prompts}
     view._past_waits = dict(read.past_waits)
+    view.requirements = {each.id: each for each in read.requirements}
     work: dict[str, Behavior | Service | Allocation] = {
         **view.behaviors,
         **view.allocations,

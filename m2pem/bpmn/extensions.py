@@ -194,6 +194,8 @@ _TABLE = (
                 Type.TEXT,
                 "what is [assumed](requirements.md#assumptions), such as `no-failures`",
             ),
+            Attribute("monitor", Type.BOOLEAN, "`false`: runs are not monitored for it"),
+            Attribute("onViolation", Type.NAME, "what a violation in a run throws"),
         ),
         ("arg",),
         places=("process",),

@@ -49,6 +49,7 @@ SHOWN = frozenset(
         r.CompensationBegan,
         r.TransactionCancelled,
         r.GeometryReceived,
+        r.RequirementDecided,
     )
 )
 """Records that are printed; the others matter to programs only."""

@@ -36,11 +36,28 @@ class _Input(
     """Base of all inputs: immutable, and JSON with its name under "input"."""
 
 
+class RequirementVerdict(StrEnum):
+    """What is certain of a requirement."""
+
+    SATISFIED = "satisfied"
+    VIOLATED = "violated"
+
+
+class MonitoredRequirement(msgspec.Struct, frozen=True, omit_defaults=True):
+    """A requirement that a run is monitored for. Fields as in record `RequirementMonitored`."""
+
+    id: str
+    formula: str
+    english: str
+    elements: tuple[str, ...] = ()
+    on_violation: str = ""
+
+
 class StartRun(_Input, frozen=True):
     """Begin: one token for each start event of the process, and the data given at start.
 
     `taken`: resources that operators have at that moment, and who has each. `step`: the run is
-    paused before its first step.
+    paused before its first step. `requirements`: those that the run is monitored for.
     """
 
     process: str
@@ -48,6 +65,7 @@ class StartRun(_Input, frozen=True):
     by: str = ""
     taken: dict[str, str] = msgspec.field(default_factory=dict)
     step: bool = False
+    requirements: tuple[MonitoredRequirement, ...] = ()
 
 
 class ClaimRun(_Input, frozen=True):
@@ -322,6 +340,24 @@ class GeometrySet(_Input, frozen=True):
     by: str = ""
 
 
+class RequirementDecided(_Input, frozen=True):
+    """A monitor has found that a requirement is satisfied or violated, whatever follows. Fields as
+    in record `RequirementDecided`."""
+
+    requirement: str
+    verdict: RequirementVerdict
+    decided_us: int
+    because: str = ""
+
+
+class TelemetryConditionChanged(_Input, frozen=True):
+    """What telemetry says of a condition in requirements has changed. `holds` None: it says
+    nothing."""
+
+    condition: str
+    holds: bool | None
+
+
 Input: TypeAlias = Union[
     StartRun,
     ClaimRun,
@@ -353,4 +389,6 @@ Input: TypeAlias = Union[
     ControlRequestEnded,
     OperatorNoted,
     GeometrySet,
+    RequirementDecided,
+    TelemetryConditionChanged,
 ]

@@ -7,7 +7,8 @@
 * PAUSED takes ResumeRun, StepRun, StopRun, GiveUp, what is changed for debugging (breakpoints,
   data), and what changes nothing in the mission (a claim, a geometry, a note). It ignores ticks.
   Every other input is deferred: journaled now, decided at resume.
-* ENDED takes only claims, and what ends behaviors that are still being cancelled.
+* ENDED takes only claims, what ends behaviors that are still being cancelled, and verdicts on
+  requirements, which the end of the run decides.
 * An input that is not taken is ignored with a reason; it is never an error.
 
 `admission` reads it from two tables.
@@ -25,6 +26,7 @@ from m2pem.engine.inputs import (
     Input,
     OperatorNoted,
     PauseRun,
+    RequirementDecided,
     ResourceFault,
     ResumeRun,
     SetBreakpoints,
@@ -73,6 +75,7 @@ _EXCEPTIONS: dict[RunStatus, dict[type, Admission]] = {
         BehaviorMissing: Admission.DECIDE,
         ResourceFault: Admission.DECIDE,
         ClaimRun: Admission.DECIDE,
+        RequirementDecided: Admission.DECIDE,
     },
 }
 

@@ -10,7 +10,7 @@ from enum import StrEnum
 from typing import TypeAlias
 
 from m2pem.engine.inputs import IncidentChoice, Input
-from m2pem.engine.records import RunOutcome, Trigger
+from m2pem.engine.records import RequirementMonitored, RequirementVerdict, RunOutcome, Trigger
 from m2pem.mission.catalogue import BehaviorState
 from m2pem.mission.elements import (
     Activity,
@@ -431,6 +431,12 @@ class RunState:
     breakpoints: Breakpoints | None = None
     stepping: bool = False
     """It is paused before the next step."""
+    requirements: dict[str, RequirementMonitored] = field(default_factory=dict)
+    """The requirements that the run is monitored for, by id."""
+    verdicts: dict[str, RequirementVerdict] = field(default_factory=dict)
+    """Those that are decided."""
+    telemetry_conditions: dict[str, bool | None] = field(default_factory=dict)
+    """What telemetry says of conditions in requirements, as far as it has said anything."""
     geometries: dict[str, dict[str, Value]] = field(default_factory=dict)
     deferred: list[Input] = field(default_factory=list)
     yielded: tuple[int, ...] = ()

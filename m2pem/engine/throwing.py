@@ -92,6 +92,27 @@ def throw_expression_error(x: Execution, scope: Scope, reason: str) -> None:
     end_run(x, RunOutcome.FAILED, f"error {code} from {element}: {reason}", {scope})
 
 
+def throw_error_in_process(x: Execution, code: str, reason: str) -> None:
+    """Throw an error in the process that the run began with, from no element of it.
+
+    An event subprocess of it catches that; uncaught, the run fails.
+    """
+    scope = x.state.root
+    assert scope is not None, "a run that goes on has begun"
+    starts: list[StartEvent] = []
+    if scope.id in x.state.scopes and not (scope.interrupted or scope.completing):
+        starts = [start for each in scope.container.event_subprocesses for start in each.starts]
+    caught = _best_match(starts, code, error_code)
+    element = scope.container.id
+    caught_by = caught.id if caught is not None else ""
+    x.emit(r.ErrorThrown(0, element, element, scope.id, code, reason, caught_by))
+    if caught is None:
+        detail = f"error {code}, which no event catches: {reason}"
+        end_run(x, RunOutcome.FAILED, detail, {scope})
+    else:
+        start_event_subprocess(x, scope, caught, {scope})
+
+
 # --- escalations --------------------------------------------------------------------------------
 
 

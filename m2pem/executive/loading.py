@@ -13,12 +13,14 @@ from m2pem.bpmn.lint import by_file, lint
 from m2pem.bpmn.rules.files import TOO_LARGE, UNREADABLE_FILE
 from m2pem.bpmn.search_path import SearchPath
 from m2pem.bpmn.xml import max_bytes, too_large
+from m2pem.engine.inputs import MonitoredRequirement
 from m2pem.errors import MissionError
 from m2pem.executive.fleet_connections import FleetArbiters
 from m2pem.findings import Finding, Severity, has_errors, unreadable_remedy
 from m2pem.fleet.behaviors import SHARED
 from m2pem.fleet.check import check_mission, check_named
 from m2pem.fleet.default_fleet import fleet_for
+from m2pem.fleet.fleet import Fleet
 from m2pem.mission.elements import ServiceTask
 from m2pem.mission.library import KeptLibrary
 from m2pem.mission.mission import Mission
@@ -173,7 +175,8 @@ def known_data(data: Mapping[str, object] | None) -> tuple[str, ...]:
     return tuple(data or ())
 
 
-_WRITTEN = (b"requirement", b"assume")
+_ELEMENT = b"requirement"
+_WRITTEN = (_ELEMENT, b"assume")
 
 
 def requirement_findings(
@@ -195,10 +198,32 @@ def requirement_findings(
     for process in mission.processes:
         try:
             read_assumptions(names, process)
-        except RequirementsError as error:
-            found += error.findings
+        except RequirementsError as error:  # no run needs them
+            found += [replace(each, severity=Severity.WARNING) for each in error.findings]
     try:
         collect(names)
     except RequirementsError as error:
         found += error.findings
-    return [replace(each, severity=Severity.WARNING) for each in found]
+    return found
+
+
+def monitored_requirements(
+    mission: Mission,
+    fleet: Fleet,
+    plugins: "Plugins",
+    data: Iterable[str] = (),
+    spec: Path | bytes | None = None,
+) -> tuple[MonitoredRequirement, ...]:
+    """Return the requirements that a run of a mission is monitored for: those in its file, and
+    those of a spec file, or of its text.
+
+    Raises:
+        RequirementsError: with every finding.
+    """
+    if spec is None and _ELEMENT not in mission.source:
+        return ()
+    from m2pem.monitors.selection import monitored  # noqa: PLC0415
+    from m2pem.verify.requirements import Names, collect  # noqa: PLC0415
+
+    names = Names(mission, fleet, plugins.service_writes(), data)
+    return monitored(collect(names, spec))

@@ -36,6 +36,7 @@ from m2pem.fleet.parameters import ParameterError
 from m2pem.journal.base import Journal, Loss
 from m2pem.mission.behavior import BehaviorType
 from m2pem.mission.catalogue import BehaviorState, ResourceId, ResumePolicy
+from m2pem.monitors.run_monitors import RunMonitors
 
 log = logging.getLogger("m2pem.resume")
 
@@ -46,14 +47,18 @@ UNASKED = "its arbiter could not be asked after a restart"
 """Why a resource counts as lost after a restart."""
 
 
-async def replay(journal: Journal, run: MissionRun, on_records: OnRecords | None) -> int:
+async def replay(
+    journal: Journal, run: MissionRun, monitors: RunMonitors | None, on_records: OnRecords | None
+) -> int:
     """Fold all of a run's records; returns when the last was decided (us since the Unix epoch).
 
-    `on_records` is called with the records of each entry.
+    `monitors` read them, and `on_records` is called with the records of each entry.
     """
     last_us = 0
     async for entry in journal.read(run.state.run):
         run.replay(entry.records)
+        if monitors is not None:
+            monitors.observe(entry.t_us, entry.records)
         if on_records is not None:
             on_records(run.state.run, entry.records)
         last_us = max(last_us, entry.at_us)

@@ -19,6 +19,7 @@ from m2pem.executive.loading import (
     findings_for,
     known_data,
     load_source,
+    monitored_requirements,
     refuse_errors,
     requirement_findings,
 )
@@ -69,6 +70,9 @@ class RunStarter:
             known_data(data),
             process,
             handed_over=supervisor.drawings.handed_over,
+        )
+        findings += requirement_findings(
+            loaded, supervisor.arbiters, supervisor.plugins, known_data(data)
         )
         refuse_errors(f"{loaded.file} cannot run with fleet {supervisor.fleet.file}", findings)
         if loaded.chooses_resources or waits_for_space(supervisor.fleet):
@@ -253,6 +257,9 @@ class RunStarter:
         supervisor.refuse_unconnected()
         supervisor.interrupted.refuse_start()
         files = loaded.file, loaded.source, loaded.library
+        requirements = await asyncio.to_thread(
+            monitored_requirements, loaded, supervisor.fleet, supervisor.plugins, known_data(data)
+        )
         approved = "" if direct else await self.approvals.refuse_unapproved(*files)
         header = RunHeader(
             loaded.file,
@@ -282,7 +289,14 @@ class RunStarter:
         run = MissionRun(loaded, supervisor.fleet, number, supervisor.settings.steps_at_once)
         runner = supervisor.add(run, 1)
         begun = runner.submit(
-            StartRun(process_id, dict(data or {}), by, supervisor.handover.by_name(lent), step)
+            StartRun(
+                process_id,
+                dict(data or {}),
+                by,
+                supervisor.handover.by_name(lent),
+                step,
+                requirements,
+            )
         )
         for geometry in supervisor.geometries_given(loaded):
             runner.post(geometry)

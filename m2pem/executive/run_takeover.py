@@ -21,6 +21,7 @@ from m2pem.executive.supervisor import Supervisor
 from m2pem.findings import Severity
 from m2pem.fleet.space import waits_for_space
 from m2pem.journal.mission import mission_of
+from m2pem.monitors.run_monitors import RunMonitors
 from m2pem.units import US_PER_S
 
 log = logging.getLogger("m2pem.executive")
@@ -91,8 +92,9 @@ class RunTakeover:
         if mission.chooses_resources or waits_for_space(supervisor.fleet):
             await asyncio.to_thread(load_solver)
         run = MissionRun(mission, supervisor.fleet, number, supervisor.settings.steps_at_once)
-        last_us = await replay(supervisor.journal, run, supervisor.settings.on_records)
-        runner = supervisor.add(run, epoch)
+        monitors = RunMonitors(mission, supervisor.fleet)
+        last_us = await replay(supervisor.journal, run, monitors, supervisor.settings.on_records)
+        runner = supervisor.add(run, epoch, monitors)
         await supervisor.dispatcher.fence(number, epoch)
         taken_before, requests = control_of(run.state)
         supervisor.handover.take_up(taken_before)

@@ -38,6 +38,7 @@ from m2pem.executive.dispatcher import Dispatcher
 from m2pem.executive.outages import Outages, StallMonitor
 from m2pem.executive.services import Services
 from m2pem.journal.base import Entry, Journal
+from m2pem.monitors.run_monitors import RunMonitors
 
 log = logging.getLogger("m2pem.run")
 
@@ -120,8 +121,10 @@ class Runner:
         epoch: int,
         context: RunContext,
         steps_between_waits: int | None = None,
+        monitors: RunMonitors | None = None,
     ) -> None:
         self.run = run
+        self.monitors = monitors or RunMonitors(run.state.mission, None)
         self.id: RunId = run.state.run
         self.epoch = epoch
         self.failure: M2pemError | None = None
@@ -324,14 +327,14 @@ class Runner:
             due.cancel()
 
     async def _cycle(self, batch: Sequence[Input]) -> None:
-        steps = [self._decide(item) for item in batch]
+        steps = [step for item in batch for step in self._decide_with_verdicts(item)]
         # A mission that does not wait: what an operator wants is seen between any two steps.
         begun = self.run.steps_done
         while self.run.wants_continue and self.run.steps_done - begun < STEPS_A_COMMIT:
             await asyncio.sleep(0)
             if self._inbox or self._exceeds_limit() or self._never_waits():
                 break
-            steps.append(self._decide(Continue()))
+            steps += self._decide_with_verdicts(Continue())
         await self._commit(steps)
         seen, unsent = await self._look_after_outage()
         self._inbox[:0] = seen
@@ -362,8 +365,16 @@ class Runner:
         self._outages_seen = outages.number
         return await self._context.look_again(self, outages.length_s)
 
+    def _decide_with_verdicts(self, item: Input) -> list[Step]:
+        """Decide an input, and after it the verdicts on requirements that it makes certain."""
+        steps = [self._decide(item)]
+        for found in self.monitors.take():
+            steps += self._decide_with_verdicts(found)
+        return steps
+
     def _decide(self, item: Input) -> Step:
         step = self.run.receive(item, self._context.clock.now_us())
+        self.monitors.observe(step.t_us, step.records)
         if isinstance(item, _EARLY):
             self._dispatch_early(step)
         elif _opens_incident(step):

@@ -11,7 +11,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from m2pem.api.alerts import BATTERY_LOW, RUN_FAILED, AlertSeverity
+from m2pem.api.alerts import BATTERY_LOW, REQUIREMENT_VIOLATED, RUN_FAILED, AlertSeverity
 from m2pem.api.allocation import SharedSpaceState
 from m2pem.api.arbiter import BehaviorId, BehaviorReport
 from m2pem.api.clock import Clock
@@ -22,7 +22,14 @@ from m2pem.api.service import ServiceContext
 from m2pem.api.telemetry import TeamState, Telemetry
 from m2pem.bpmn.one_task import is_one_task
 from m2pem.engine.inputs import GeometrySet, Input, ResourceFault
-from m2pem.engine.records import Record, RunEnded, RunOutcome, WorkReassigned
+from m2pem.engine.records import (
+    Record,
+    RequirementDecided,
+    RequirementVerdict,
+    RunEnded,
+    RunOutcome,
+    WorkReassigned,
+)
 from m2pem.engine.run import STEPS_AT_ONCE, MissionRun
 from m2pem.engine.state import OutOfReach, RunStatus
 from m2pem.errors import (
@@ -79,6 +86,7 @@ from m2pem.mission.geometry import Area, Geometry, Point, Route
 from m2pem.mission.losses import LINK_LOST
 from m2pem.mission.mission import Mission
 from m2pem.mission.values import Value
+from m2pem.monitors.run_monitors import RunMonitors
 from m2pem.plugins import Plugins
 from m2pem.suggestions import suggest
 from m2pem.telemetry.bus import Bus
@@ -329,8 +337,9 @@ class Supervisor:
             if name not in mission.geometries
         ]
 
-    def add(self, run: MissionRun, epoch: int) -> Runner:
-        """Return the runner of a run that is to be driven. `epoch`: that of its claim."""
+    def add(self, run: MissionRun, epoch: int, monitors: RunMonitors | None = None) -> Runner:
+        """Return the runner of a run that is to be driven. `epoch`: that of its claim. `monitors`:
+        have read its records; None: it has none yet."""
         context = RunContext(
             self.journal,
             self.clock,
@@ -346,7 +355,8 @@ class Supervisor:
             self.counts,
             self.settings.limit,
         )
-        runner = Runner(run, epoch, context, self.fleet.steps_between_waits)
+        monitors = monitors or RunMonitors(run.state.mission, self.fleet)
+        runner = Runner(run, epoch, context, self.fleet.steps_between_waits, monitors)
         self.runners[runner.id] = runner
         return runner
 
@@ -418,6 +428,8 @@ class Supervisor:
         if (runner := self.runners.get(run)) is not None:
             self.emergency.on_records(runner, records)
         for record in records:
+            if type(record) is RequirementDecided:
+                self._alert_of_violation(run, record)
             if isinstance(record, WorkReassigned) and record.code == LINK_LOST:
                 for resource in map(ResourceId, record.excluded):
                     if not self.availability.reason(resource):
@@ -433,6 +445,13 @@ class Supervisor:
                     text = f"failed: {record.detail}" if record.detail else "failed"
                     self.on_alert(Alert(run, RUN_FAILED, text, AlertSeverity.ERROR))
                 self.marks.remove(run)
+
+    def _alert_of_violation(self, run: RunId, record: RequirementDecided) -> None:
+        if record.verdict is RequirementVerdict.VIOLATED:
+            text = f"requirement {record.requirement} is violated: {record.english.rstrip('.')}"
+            if record.because:
+                text = f"{text} ({record.because})"
+            self.events.publish(Alert(run, REQUIREMENT_VIOLATED, text, AlertSeverity.ERROR))
 
     # --- what happens outside of the runs -------------------------------------------------------
 

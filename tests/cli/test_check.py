@@ -141,7 +141,7 @@ def m2pem_check_mission(mission, fleet):
 
 
 @pytest.mark.parametrize("fleet", [(), ("--fleet", FLEET)], ids=["alone", "fleet"])
-def test_a_requirement_in_the_file_that_cannot_be_verified_is_a_warning(
+def test_a_requirement_in_the_file_that_cannot_be_read_is_an_error(
     invoke: Invoke, tmp_path: Path, fleet: tuple[object, ...]
 ) -> None:
     mission = tmp_path / "mission.bpmn"
@@ -153,12 +153,12 @@ def test_a_requirement_in_the_file_that_cannot_be_verified_is_a_warning(
         )
     )
     status, out, _ = invoke("check", mission, *fleet, "--data", "mission.speed=3")
-    assert status == 0
+    assert status == 1
     first, formula, caret, last = out.splitlines()
-    assert "ends: warning: " in first
+    assert "ends: error: " in first
     assert first.endswith("at column 4 [requirement]")
     assert (formula, caret) == ("    <> endd", "       ^")
-    assert last == f"{mission}: 1 warning"
+    assert last == f"{mission}: 1 error"
     assert invoke("check", mission, *fleet, "--data", "mission.speed=3", "--strict")[0] == 1
 
 

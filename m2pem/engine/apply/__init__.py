@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 from m2pem.engine import records as r
-from m2pem.engine.apply import compensation, events, incidents, run, tasks, tokens
+from m2pem.engine.apply import compensation, events, incidents, requirements, run, tasks, tokens
 from m2pem.engine.state import RunState
 
 
@@ -89,4 +89,7 @@ APPLIERS: dict[type, Callable[[RunState, Any], None]] = {
     r.CompensationEnded: compensation.compensation_ended,
     r.ScopeReopened: compensation.scope_reopened,
     r.TransactionCancelled: tokens.transaction_cancelled,
+    r.RequirementMonitored: requirements.requirement_monitored,
+    r.RequirementDecided: requirements.requirement_decided,
+    r.TelemetryConditionChanged: requirements.telemetry_condition_changed,
 }

@@ -10,7 +10,7 @@ that contains `element`.
 
 from typing import TypeAlias, Union
 
-from m2pem.engine.inputs import RequestOutcome
+from m2pem.engine.inputs import RequestOutcome, RequirementVerdict
 from m2pem.engine.records.base import RunOutcome, TokenOutcome, Trigger
 from m2pem.engine.records.compensation import (
     CompensationBegan,
@@ -35,6 +35,11 @@ from m2pem.engine.records.incidents import (
     IncidentOpened,
     IncidentResolved,
     IncidentUpdated,
+)
+from m2pem.engine.records.requirements import (
+    RequirementDecided,
+    RequirementMonitored,
+    TelemetryConditionChanged,
 )
 from m2pem.engine.records.run import (
     BreakpointReached,
@@ -143,6 +148,9 @@ __all__ = [
     "PromptOpened",
     "PromptWithdrawn",
     "Record",
+    "RequirementDecided",
+    "RequirementMonitored",
+    "RequirementVerdict",
     "ResourceKept",
     "ResourceReturned",
     "ResourcesAllocated",
@@ -164,6 +172,7 @@ __all__ = [
     "ServiceWithdrawn",
     "SignalThrown",
     "StopReason",
+    "TelemetryConditionChanged",
     "TokenEntered",
     "TokenLeft",
     "TokenOutcome",
@@ -243,4 +252,7 @@ Record: TypeAlias = Union[
     CompensationEnded,
     ScopeReopened,
     TransactionCancelled,
+    RequirementMonitored,
+    RequirementDecided,
+    TelemetryConditionChanged,
 ]

@@ -62,6 +62,9 @@ def read_mission_requirements(names: Names) -> list[Requirement]:
         if element.get("fair", "true") not in ("true", "false"):
             error(f"fair='{element.get('fair')}' is neither true nor false")
             continue
+        if element.get("monitor", "true") not in ("true", "false"):
+            error(f"monitor='{element.get('monitor')}' is neither true nor false")
+            continue
         try:
             found += requirements_of(_written(element, name, mission.file, document), names)
         except UnusableError as unusable:
@@ -108,6 +111,8 @@ def _written(
         file,
         document.line(element),
         element.get("assume", ()),
+        element.get("monitor") != "false",
+        element.get("onViolation", ""),
     )
 
 
@@ -134,7 +139,7 @@ def read_assumptions(names: Names, process: e.Process) -> Assumptions:
     return NOTHING
 
 
-_KEYS = ("id", "text", "ltl", "pattern", "args", "fair", "assume")
+_KEYS = ("id", "text", "ltl", "pattern", "args", "fair", "assume", "monitor", "on_violation")
 
 
 def read_spec(path: Path, names: Names) -> list[Requirement]:
@@ -247,7 +252,7 @@ def _item(source: YamlSource, path: KeyPath, entry: Any) -> WrittenRequirement |
                 f"a requirement has no '{key}'",
                 suggest(key, _KEYS, "keys"),
             )
-    for key in ("id", "text", "ltl", "pattern"):
+    for key in ("id", "text", "ltl", "pattern", "on_violation"):
         if key in entry and not isinstance(entry[key], str):
             wrong = True
             source.error((*path, key), "requirement", f"'{key}' is no text", "quote it")
@@ -263,6 +268,9 @@ def _item(source: YamlSource, path: KeyPath, entry: Any) -> WrittenRequirement |
     if not _is_assumption(entry.get("assume", ())):
         wrong = True
         source.error((*path, "assume"), "requirement", "'assume' is no text and no list of texts")
+    if not isinstance(entry.get("monitor", True), bool):
+        wrong = True
+        source.error((*path, "monitor"), "requirement", "'monitor' is true or false")
     if wrong:
         return None
     return WrittenRequirement(
@@ -275,6 +283,8 @@ def _item(source: YamlSource, path: KeyPath, entry: Any) -> WrittenRequirement |
         source.file,
         source.line(path),
         entry.get("assume", ()),
+        entry.get("monitor", True),
+        entry.get("on_violation", ""),
     )
 
 

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from m2pem.errors import ExpressionSyntaxError, M2pemError
@@ -60,6 +60,8 @@ class WrittenRequirement:
     file: str = ""
     line: int = 0
     assume: str | Sequence[str] = ()
+    monitor: bool = True
+    on_violation: str = ""
 
 
 def requirements_of(written: WrittenRequirement, names: Names) -> Iterator[Requirement]:
@@ -68,6 +70,32 @@ def requirements_of(written: WrittenRequirement, names: Names) -> Iterator[Requi
     Raises:
         UnusableError: it cannot be read, or names what the mission or fleet lacks.
     """
+    on_violation = _on_violation(written.on_violation, names)
+    for each in _read(written, names):
+        yield replace(each, monitor=written.monitor, on_violation=on_violation)
+
+
+def _on_violation(text: str, names: Names) -> str:
+    """What a violation throws, with the id of a signal for its name."""
+    kind, _, name = text.partition(":")
+    if not text or (kind == "error" and name):
+        return text
+    if kind != "signal":
+        raise UnusableError(
+            "on_violation",
+            f"{text!r} is neither an error nor a signal",
+            "write error:CODE or signal:ID",
+        )
+    signals = names.mission.signals
+    found = [each.id for each in signals.values() if name in (each.id, each.name)]
+    if len(found) != 1:
+        known = [each.name or each.id for each in signals.values()]
+        hint = suggest(name, known, "signals") if known else "the mission has none"
+        raise UnusableError("on_violation", f"the mission has no signal {name!r}", hint)
+    return f"signal:{found[0]}"
+
+
+def _read(written: WrittenRequirement, names: Names) -> Iterator[Requirement]:
     if (written.ltl is None) == (written.pattern is None):
         raise UnusableError(
             "", "a requirement has either 'ltl' or 'pattern'", "write one of the two"

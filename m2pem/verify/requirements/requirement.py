@@ -63,6 +63,8 @@ class Requirement:
     `pattern`: the name of its pattern, "" for a formula as written. `resource`: the vehicle it was
     made for, if it was made for each. `fair`: only fair runs count. `line` counts from 1.
     `assumed`: only runs count in which that is so.
+    `monitor`: runs are monitored for it. `on_violation`: what a violation in a run throws,
+    "error:CODE" or "signal:ID"; "": nothing.
     """
 
     id: str
@@ -75,3 +77,5 @@ class Requirement:
     file: str = ""
     line: int = 0
     assumed: Assumptions = NOTHING
+    monitor: bool = True
+    on_violation: str = ""

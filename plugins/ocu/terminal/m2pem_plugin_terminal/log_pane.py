@@ -46,6 +46,7 @@ LOGGED = frozenset(
         r.IncidentUpdated,
         r.IncidentResolved,
         r.IncidentClosed,
+        r.RequirementDecided,
     )
 )
 """Records that the log shows; the mission pane shows tokens."""

@@ -1,0 +1,16 @@
+"""What records about requirements do to the state."""
+
+from m2pem.engine import records as r
+from m2pem.engine.state import RunState
+
+
+def requirement_monitored(state: RunState, record: r.RequirementMonitored) -> None:
+    state.requirements[record.requirement] = record
+
+
+def requirement_decided(state: RunState, record: r.RequirementDecided) -> None:
+    state.verdicts[record.requirement] = record.verdict
+
+
+def telemetry_condition_changed(state: RunState, record: r.TelemetryConditionChanged) -> None:
+    state.telemetry_conditions[record.condition] = record.holds

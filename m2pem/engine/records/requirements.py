@@ -1,0 +1,39 @@
+"""Records about the requirements that a run is monitored for."""
+
+from m2pem.engine.inputs import RequirementVerdict
+from m2pem.engine.records.base import BaseRecord
+
+
+class RequirementMonitored(BaseRecord, frozen=True):
+    """A requirement is evaluated over the records of the run from here on.
+
+    `formula`: the requirement (docs/requirements.md), with ids for names. `english`: the same in
+    words. `elements`: those that it is about. `on_violation`: what a violation does to the mission,
+    "error:CODE" or "signal:ID"; "": nothing.
+    """
+
+    requirement: str
+    formula: str
+    english: str
+    elements: tuple[str, ...] = ()
+    on_violation: str = ""
+
+
+class RequirementDecided(BaseRecord, frozen=True):
+    """It is certain that the run satisfies or violates a requirement, whatever follows.
+
+    `decided_us`: since when, in microseconds of mission time. `because`: what made it certain.
+    """
+
+    requirement: str
+    verdict: RequirementVerdict
+    english: str
+    decided_us: int
+    because: str = ""
+
+
+class TelemetryConditionChanged(BaseRecord, frozen=True):
+    """What telemetry says of a condition in requirements; `holds` None: it says nothing."""
+
+    condition: str
+    holds: bool | None

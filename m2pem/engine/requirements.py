@@ -1,0 +1,58 @@
+"""What the engine does of monitored requirements: it records verdicts, and acts on violations.
+
+The verdicts themselves are inputs, which `m2pem.monitors` finds from the records.
+"""
+
+from m2pem.engine import inputs as i
+from m2pem.engine import records as r
+from m2pem.engine.execution import Execution
+from m2pem.engine.state import RunStatus
+from m2pem.engine.throwing import throw_error_in_process
+from m2pem.engine.triggering import throw_signal
+
+
+def monitor(x: Execution, requirements: tuple[i.MonitoredRequirement, ...]) -> None:
+    """Record which requirements the run is monitored for, as it begins."""
+    for each in requirements:
+        x.emit(
+            r.RequirementMonitored(
+                each.id, each.formula, each.english, each.elements, each.on_violation
+            )
+        )
+
+
+def requirement_decided(x: Execution, item: i.RequirementDecided) -> None:
+    """Record a verdict; a violation throws the error or signal that the requirement names."""
+    monitored = x.state.requirements.get(item.requirement)
+    if monitored is None:
+        x.ignore(f"the run is not monitored for requirement {item.requirement}")
+        return
+    if monitored.requirement in x.state.verdicts:
+        x.ignore(f"requirement {item.requirement} was decided before")
+        return
+    x.emit(
+        r.RequirementDecided(
+            item.requirement, item.verdict, monitored.english, item.decided_us, item.because
+        )
+    )
+    if item.verdict is i.RequirementVerdict.VIOLATED and x.state.status is RunStatus.RUNNING:
+        _act(x, monitored)
+
+
+def _act(x: Execution, monitored: r.RequirementMonitored) -> None:
+    kind, _, name = monitored.on_violation.partition(":")
+    if kind == "error":
+        reason = f"requirement {monitored.requirement} is violated: {monitored.english}"
+        throw_error_in_process(x, name, reason)
+    elif kind == "signal":
+        x.emit(r.SignalThrown(name, by=f"requirement {monitored.requirement}"))
+        throw_signal(x, name, {})
+
+
+def condition_changed(x: Execution, item: i.TelemetryConditionChanged) -> None:
+    """Record what telemetry says of a condition now."""
+    known = x.state.telemetry_conditions.get(item.condition)
+    if known is item.holds:
+        x.ignore(f"telemetry said the same of {item.condition} before")
+        return
+    x.emit(r.TelemetryConditionChanged(item.condition, item.holds))
