@@ -239,6 +239,15 @@ def _geometry_received(_: RunView, record: r.GeometryReceived) -> _Sentence:
     return f"{record.name} received{_by(record)}", Importance.NORMAL
 
 
+def _mission_revised(view: RunView, record: r.MissionRevised) -> _Sentence:
+    moved = "".join(
+        f"; {view.label(element)}: its token {f'goes to {view.label(to)}' if to else 'ends'}"
+        for element, to in record.moves.items()
+    )
+    text = f"goes on with version {record.version[:12]} of its mission{_by(record)}{moved}"
+    return text, Importance.WARNING
+
+
 # --- tokens and scopes ----------------------------------------------------------------------------
 
 
@@ -517,6 +526,7 @@ _SENTENCES: dict[type, Callable[[RunView, Any], _Sentence]] = {
     r.ControlRequestEnded: _control_request_ended,
     r.OperatorNote: _operator_note,
     r.GeometryReceived: _geometry_received,
+    r.MissionRevised: _mission_revised,
     r.TokenEntered: _token_entered,
     r.TokenLeft: _token_left,
     r.FlowTaken: _flow_taken,
@@ -579,6 +589,7 @@ _KINDS: dict[type, Kind] = {
             r.InputSeen,
             r.RequirementMonitored,
             r.RequirementDecided,
+            r.MissionRevised,
         ),
         Kind.OPERATORS: (
             r.OperatorTookControl,

@@ -44,7 +44,7 @@ PAGE = 1000
 
 _STATUS_RECORDS = (r.RunStarted, r.RunClaimed, r.RunPaused, r.RunResumed, r.RunEnded)
 _CLOSING_RECORDS = (r.PromptAnswered, r.PromptWithdrawn, r.RunEnded)
-_SLOW_RECORDS = frozenset((*_STATUS_RECORDS, *_CLOSING_RECORDS))
+_SLOW_RECORDS = frozenset((*_STATUS_RECORDS, *_CLOSING_RECORDS, r.MissionRevised))
 
 log = logging.getLogger("m2pem.ocu")
 
@@ -183,17 +183,23 @@ class Follower:
         ):
             for stamped in page:
                 if stamped.seq > view.seq:
+                    if is_new and isinstance(stamped.record, r.MissionRevised):
+                        await self._read_mission(view)
                     self._apply(view, stamped, is_new=is_new)
             self._read_up_to[view.run] = page[-1].seq
             await asyncio.sleep(0)
 
     async def _view(self, summary: RunSummary) -> RunView:
+        view = RunView(summary)
+        await self._read_mission(view)
+        return view
+
+    async def _read_mission(self, view: RunView) -> None:
+        """Give a view the version of the mission that its run has now, for the names."""
         try:
-            mission = await self._control.mission(summary.run)
+            view.mission = await self._control.mission(view.run)
         except M2pemError as error:
-            log.warning("%s: its diagram cannot be read: %s", summary.run, error)
-            mission = None
-        return RunView(summary, mission)
+            log.warning("%s: its diagram cannot be read: %s", view.run, error)
 
     def _add(self, view: RunView) -> None:
         self.views[view.run] = view
@@ -243,6 +249,8 @@ class Follower:
             )
             self._add(view)
         if stamped.seq == view.seq + 1:
+            if isinstance(stamped.record, r.MissionRevised):
+                await self._read_mission(view)
             self._apply(view, stamped, is_new=True)
         elif stamped.seq > view.seq:
             await self._read_on(view, is_new=True)

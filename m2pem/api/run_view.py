@@ -241,6 +241,8 @@ class RunView:
         """Operators who have taken a resource, by resource, as far as the run's records say."""
         self.requirements: dict[str, RequirementState] = {}
         """The requirements that the run is monitored for, by id."""
+        self.version = ""
+        """The version of the mission that the last revision has brought; "": there was none."""
         self.changes: Changes | None = None
         self._ended_behaviors: dict[str, Behavior] = {}
         self._ended_allocations: dict[str, Allocation] = {}
@@ -665,6 +667,13 @@ class RunView:
         if token := self.tokens.get(record.token):
             token.waits[record.wait] = wait
 
+    def _revise(self, record: r.MissionRevised) -> None:
+        self.version = record.version
+        for number in record.disarmed:
+            wait = self.waits.pop(number, None)
+            if wait is not None and (token := self.tokens.get(wait.token)):
+                token.waits.pop(number, None)
+
     def _trigger_event(self, record: r.EventTriggered) -> None:
         wait = self.waits.pop(record.wait, None)
         if wait is not None:
@@ -733,4 +742,5 @@ _FOLDS: dict[type, Callable[[RunView, Any], None]] = {
     r.EventTriggered: RunView._trigger_event,
     r.RequirementMonitored: RunView._monitor,
     r.RequirementDecided: RunView._decide,
+    r.MissionRevised: RunView._revise,
 }

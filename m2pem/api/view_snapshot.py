@@ -72,6 +72,7 @@ class _Snapshot(msgspec.Struct, array_like=True):
     closed_prompts: list[r.PromptOpened]
     past_waits: list[tuple[int, Wait]]
     requirements: list[RequirementState]
+    version: str
 
 
 _encode = msgspec.msgpack.Encoder().encode
@@ -108,6 +109,7 @@ def snapshot_of(view: RunView) -> bytes:
             list(view._closed_prompts.values()),
             list(view._past_waits.items()),
             list(view.requirements.values()),
+            view.version,
         )
     )
 
@@ -144,6 +146,7 @@ def view_of(
     view._closed_prompts = {each.prompt: each for each in read.closed_prompts}
     view._past_waits = dict(read.past_waits)
     view.requirements = {each.id: each for each in read.requirements}
+    view.version = read.version
     work: dict[str, Behavior | Service | Allocation] = {
         **view.behaviors,
         **view.allocations,

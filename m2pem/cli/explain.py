@@ -41,11 +41,11 @@ async def _explain(run_id: str, name: str, url: str | None, output: str) -> None
     from m2pem.api.runs import StampedRecord
     from m2pem.cli.journals import find_run, journal_to_read
     from m2pem.executive.run_summary import summary
-    from m2pem.journal.mission import mission_of
+    from m2pem.journal.mission import present_mission_of
 
     async with journal_to_read(url) as journal:
         line = await find_run(journal, run_id)
-        mission = mission_of(line.header)
+        mission = await present_mission_of(journal, line)
         element = _element(mission, name)
         task = _roles_of(element)
         if task is None or not task.roles:

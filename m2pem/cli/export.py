@@ -162,7 +162,7 @@ async def _add(journal: "Journal", line: "RunInfo", exporter: "Exporter") -> Non
     from m2pem.api.exporter import ExportedRecord, ExportedRun
     from m2pem.errors import M2pemError
     from m2pem.executive.run_summary import summary
-    from m2pem.journal.mission import fleet_of, mission_of
+    from m2pem.journal.mission import fleet_of, present_mission_of
 
     records = []
     async for entry in journal.read(line.run):
@@ -170,7 +170,7 @@ async def _add(journal: "Journal", line: "RunInfo", exporter: "Exporter") -> Non
             records.append(ExportedRecord(seq, entry.at_us, entry.t_us / US_PER_S, record))
     mission, fleet = None, None
     with suppress(M2pemError):
-        mission = mission_of(line.header)
+        mission = await present_mission_of(journal, line)
     with suppress(M2pemError):
         fleet = fleet_of(line.header) if line.header.fleet else None
     exporter.add(ExportedRun(summary(line), records, mission, fleet, journal.file))

@@ -201,5 +201,5 @@ async def interruption(journal: Journal, line: RunInfo) -> Interrupted:
     standing = RunStatusView(line)
     async for entry in journal.read(line.run):
         for record in entry.records:
-            standing.take(record)
+            standing.take(record, entry.input)
     return Interrupted(line.run, line.header.mission_name, standing.commanded())

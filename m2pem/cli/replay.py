@@ -120,7 +120,7 @@ async def _print(
     lines = LineFormatter(lambda _: standing.mission, colour=wants_colour(sys.stdout))
     async for entry in journal.read(line.run):
         for seq, record in enumerate(entry.records, entry.seq):
-            standing.take(record)
+            standing.take(record, entry.input)
             if state_only:
                 continue
             if output == "json":

@@ -6,11 +6,13 @@ import msgspec
 
 from m2pem.api.description import waiting
 from m2pem.cli.table import table
+from m2pem.engine.inputs import Input
 from m2pem.engine.records import DataWritten, Record
 from m2pem.engine.run import MissionRun
 from m2pem.executive.run_summary import summary
 from m2pem.journal.base import RunInfo
 from m2pem.journal.mission import fleet_of, mission_of
+from m2pem.mission.mission import Mission
 from m2pem.mission.values import Value
 
 
@@ -27,12 +29,16 @@ class RunStatusView:
         self._summary = summary(line)
         self._run = run_of(line)
         self._data: dict[str, Value] = {}
-        self.mission = self._run.state.mission
 
-    def take(self, record: Record) -> None:
-        """Apply the next record."""
+    @property
+    def mission(self) -> Mission:
+        """The version of the mission that holds after the last record."""
+        return self._run.state.mission
+
+    def take(self, record: Record, item: Input) -> None:
+        """Apply the next record, and the input that it was decided from."""
         state = self._run.state
-        self._run.replay([record])
+        self._run.replay([record], item)
         # Kept here, as the state forgets the root's data when it ends.
         if isinstance(record, DataWritten) and state.root and record.store == state.root.id:
             self._data[record.key] = record.value

@@ -50,12 +50,14 @@ def arm(
     definition: EventDefinition,
     *,
     spent: bool = False,
+    since_us: int | None = None,
 ) -> bool:
     """Make a token or scope wait for a trigger at `node`. False: a timer was wrong, and its error
     was thrown.
 
     Errors, escalations and compensation are not armed: they look for their catcher when thrown.
-    A condition is evaluated after the step; `spent`: it has fired before.
+    A condition is evaluated after the step; `spent`: it has fired before. `since_us`: the mission
+    time from which a duration counts; None: from now.
     """
     match definition:
         case SignalEventDefinition():
@@ -68,7 +70,7 @@ def arm(
             x.data_changed = True
         case TimerEventDefinition():
             try:
-                _arm_timer(x, holder, node, definition)
+                _arm_timer(x, holder, node, definition, since_us)
             except (ExpressionError, ExpressionSyntaxError, _NotATimeError) as error:
                 reason = f"timer of {node.id}: {error}"
                 if isinstance(holder, Token):
@@ -90,6 +92,7 @@ def await_event(
     left: int = 0,
     period: str = "",
     spent: bool = False,
+    armed_us: int | None = None,
 ) -> None:
     """Record that a token or scope waits for a trigger at `node`."""
     scope = holder if isinstance(holder, Scope) else holder.scope
@@ -107,12 +110,16 @@ def await_event(
             left,
             period,
             spent,
+            armed_us,
         )
     )
 
 
-def due_after(x: Execution, holder: TokenOrScope, expression: Expression) -> int:
-    """Return the mission time, in microseconds, at which a duration from now ends.
+def due_after(
+    x: Execution, holder: TokenOrScope, expression: Expression, since_us: int | None = None
+) -> int:
+    """Return the mission time, in microseconds, at which a duration ends that counts from now, or
+    from the mission time `since_us`.
 
     Raises:
         ExpressionError, ExpressionSyntaxError: the value is no duration.
@@ -122,15 +129,23 @@ def due_after(x: Execution, holder: TokenOrScope, expression: Expression) -> int
         raise ExpressionError(
             f"{expression.text!r} gives {describe(text)}, not an ISO 8601 duration"
         )
-    return x.state.mission_time_us(x.now_us) + duration_us(text, x.now_us)
+    now_us = x.state.mission_time_us(x.now_us)
+    begun_us = now_us if since_us is None else since_us
+    return begun_us + duration_us(text, x.now_us - (now_us - begun_us))
 
 
 def _arm_timer(
-    x: Execution, holder: TokenOrScope, node: FlowNode, definition: TimerEventDefinition
+    x: Execution,
+    holder: TokenOrScope,
+    node: FlowNode,
+    definition: TimerEventDefinition,
+    since_us: int | None,
 ) -> None:
     if definition.kind is TimerKind.DURATION:
-        due_us = due_after(x, holder, definition.expression)
-        await_event(x, holder, node, Trigger.TIMER, due_us=due_us)
+        if since_us is None:
+            since_us = x.state.mission_time_us(x.now_us)
+        due_us = due_after(x, holder, definition.expression, since_us)
+        await_event(x, holder, node, Trigger.TIMER, due_us=due_us, armed_us=since_us)
         return
     text = definition.expression.evaluate(reader(holder))
     if not isinstance(text, str):

@@ -32,6 +32,7 @@ from m2pem.engine.lifecycle import Admission, admission
 from m2pem.engine.records import RunOutcome
 from m2pem.engine.requirements import condition_changed, monitor, requirement_decided
 from m2pem.engine.resolving import resolve_incident, why_refused
+from m2pem.engine.revision import revise
 from m2pem.engine.scopes import end_run
 from m2pem.engine.state import BehaviorPhase, RunStatus
 from m2pem.engine.steps import Steps
@@ -53,6 +54,7 @@ _THROW_NOTHING = (
     i.ClaimRun,
     i.GeometrySet,
     i.OperatorNoted,
+    i.Revise,
 )
 
 
@@ -333,4 +335,5 @@ _DECIDERS: dict[type, Callable[[Steps, Any], None]] = {
     i.GeometrySet: _geometry,
     i.RequirementDecided: requirement_decided,
     i.TelemetryConditionChanged: condition_changed,
+    i.Revise: revise,
 }

@@ -28,6 +28,7 @@ from m2pem.mission.elements import (
     FlowNode,
     IntermediateCatchEvent,
     IntermediateThrowEvent,
+    Process,
     ReceiveTask,
     SequenceFlow,
     StartEvent,
@@ -116,7 +117,6 @@ class Execution:
 
     def __init__(self, state: RunState, fleet: Fleet | None) -> None:
         self.state = state
-        self.mission: Mission = state.mission
         self.fleet = fleet if fleet is not None else NO_FLEET
         self.now_us = 0
         self.records: list[Record] = []
@@ -128,6 +128,11 @@ class Execution:
         self.at_breakpoints: list[Token] = []  # they have entered elements with breakpoints
         self.steps_left = 0  # steps that the batch still allows
         self.data_changed = False  # whether conditions must be evaluated before the next step
+        self.read_mission()
+
+    def read_mission(self) -> None:
+        """Make the tables of the mission, for the version that the run has now."""
+        self.mission: Mission = self.state.mission
         self.process_ids = [node.container.process.id for node in self.mission.nodes]
         self.waits = {
             node: waits
@@ -168,24 +173,11 @@ class Execution:
 
     @property
     def triggered_starts(self) -> tuple[FlowNode, ...]:
-        """Elements that begin the processes that neither the run began with nor a call activity
-        calls.
-
-        These are typed start events, instantiating receive tasks, and the events after
-        instantiating event-based gateways. Each trigger makes an instance (docs/missions.md).
-        """
+        """Elements that begin other processes: `triggered_starts` of the run's mission."""
         if self._triggered_starts is None:
             assert self.state.root is not None
-            elsewhere = {
-                node.called for node in self.mission.nodes if isinstance(node, CallActivity)
-            }
-            elsewhere.add(self.state.root.container.process)
-            self._triggered_starts = tuple(
-                start
-                for process in self.mission.processes
-                if process not in elsewhere
-                for entry in process.entries
-                for start in _triggered(entry)
+            self._triggered_starts = triggered_starts(
+                self.mission, self.state.root.container.process
             )
         return self._triggered_starts
 
@@ -374,19 +366,19 @@ def waits_when_entered(node: FlowNode, *, instance: bool = False) -> Waits:
         else:
             waits = isinstance(node, EventBasedGateway)
         return Waits.AT_ITSELF if waits else Waits.NOTHING
-    at_boundary = not instance and any(map(_is_awaited, node.boundary))
+    at_boundary = not instance and any(map(is_awaited, node.boundary))
     if instance or node.loop is None:
         if isinstance(node, ReceiveTask) and node.message is not None:
             return Waits.AT_ITSELF
         if isinstance(node, CallActivity | SubProcess):
             container = node.called if isinstance(node, CallActivity) else node
             starts = [start for inner in container.event_subprocesses for start in inner.starts]
-            at_boundary = at_boundary or any(map(_is_awaited, starts))
+            at_boundary = at_boundary or any(map(is_awaited, starts))
             return Waits.AT_ITSELF if at_boundary else Waits.NOTHING
     return Waits.AT_ITS_BOUNDARY if at_boundary else Waits.NOTHING
 
 
-def _is_awaited(event: Event) -> bool:
+def is_awaited(event: Event) -> bool:
     """Whether an event is armed; the triggers of others look for their catcher when thrown."""
     return any(isinstance(definition, _AWAITED) for definition in event.definitions)
 
@@ -404,6 +396,24 @@ def definitions_of(node: FlowNode) -> Sequence[EventDefinition]:
     if isinstance(node, ReceiveTask):
         return (MessageEventDefinition(node.line, node.message),) if node.message else ()
     return node.definitions if isinstance(node, Event) else ()
+
+
+def triggered_starts(mission: Mission, root: Process) -> tuple[FlowNode, ...]:
+    """Return the elements that begin the processes that neither a run begins with, which is `root`,
+    nor a call activity calls.
+
+    These are typed start events, instantiating receive tasks, and the events after instantiating
+    event-based gateways. Each trigger makes an instance (docs/missions.md).
+    """
+    elsewhere = {node.called for node in mission.nodes if isinstance(node, CallActivity)}
+    elsewhere.add(root)
+    return tuple(
+        start
+        for process in mission.processes
+        if process not in elsewhere
+        for entry in process.entries
+        for start in _triggered(entry)
+    )
 
 
 def _triggered(entry: FlowNode) -> Sequence[FlowNode]:

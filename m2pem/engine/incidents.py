@@ -20,6 +20,7 @@ from m2pem.mission.elements import (
     AdHocSubProcess,
     BoundaryEvent,
     ComplexGateway,
+    Container,
     EndEvent,
     ErrorPolicy,
     EventBasedGateway,
@@ -189,19 +190,26 @@ def move_targets(token: Token) -> list[FlowNode | SequenceFlow]:
 
 
 def targets_from(node: FlowNode) -> list[FlowNode | SequenceFlow]:
-    """Return the other elements of a node's scope; none from an ad-hoc or an event subprocess.
+    """Return the other elements of a node's scope; none from an ad-hoc or an event subprocess."""
+    if is_outside_the_flow(node):
+        return []
+    return [each for each in targets_in(node.container) if each is not node]
+
+
+def targets_in(container: Container) -> list[FlowNode | SequenceFlow]:
+    """Return the elements of a container to which a token can be moved; none of an ad-hoc one.
 
     A join must know by which of its flows the token comes, so these stand for it.
     """
-    if isinstance(node.container, AdHocSubProcess) or _is_outside_the_flow(node):
+    if isinstance(container, AdHocSubProcess):
         return []
     found: list[FlowNode | SequenceFlow] = []
-    for each in node.container.nodes:
-        if isinstance(each, StartEvent | BoundaryEvent) or _is_outside_the_flow(each):
+    for each in container.nodes:
+        if isinstance(each, StartEvent | BoundaryEvent) or is_outside_the_flow(each):
             continue
         if _joins(each):
             found += each.incoming
-        elif each is not node:
+        else:
             found.append(each)
     return found
 
@@ -212,7 +220,8 @@ def _joins(node: FlowNode) -> bool:
     return isinstance(node, ComplexGateway)
 
 
-def _is_outside_the_flow(node: FlowNode) -> bool:
+def is_outside_the_flow(node: FlowNode) -> bool:
+    """Whether no sequence flow leads to an element: an event subprocess, or what undoes."""
     if isinstance(node, SubProcess) and node.triggered_by_event:
         return True
     return isinstance(node, Activity) and node.for_compensation

@@ -10,6 +10,7 @@ from typing import TypeAlias, Union
 import msgspec
 
 from m2pem.mission.catalogue import BehaviorState, ResumePolicy
+from m2pem.mission.library import Source
 from m2pem.mission.values import Value
 
 
@@ -325,6 +326,24 @@ class ControlRequestEnded(_Input, frozen=True):
     by: str = ""
 
 
+class Revise(_Input, frozen=True):
+    """Replace the mission of the run by a new version of its files, which the input carries.
+
+    `version`: of the files (`m2pem.mission.version`). `mission_name`, `mission`, `library`: as in
+    the header of a run. `moves`: where a token on an element goes first, by the ids of elements or,
+    at a join, of sequence flows; "": it ends there. `plan`: the digest of the plan that was shown;
+    the run is only revised if that is what the revision does now.
+    """
+
+    version: str
+    mission_name: str
+    mission: bytes
+    plan: str
+    library: tuple[Source, ...] = ()
+    moves: dict[str, str] = msgspec.field(default_factory=dict)
+    by: str = ""
+
+
 class OperatorNoted(_Input, frozen=True):
     """An operator writes a note into the run's log."""
 
@@ -391,4 +410,5 @@ Input: TypeAlias = Union[
     GeometrySet,
     RequirementDecided,
     TelemetryConditionChanged,
+    Revise,
 ]

@@ -107,5 +107,5 @@ def kept_for_others(state: RunState, token: Token, resource: str) -> str:
     keeping = state.kept.get(resource)
     if keeping is None or may_use(keeping, token):
         return ""
-    label = state.mission.elements[keeping.element].label
+    label = state.label_of(keeping.element)
     return f"{resource} is kept for {label} until {keeping.until.container.label} ends"

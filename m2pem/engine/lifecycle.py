@@ -4,8 +4,8 @@
     RUNNING, PAUSED --StopRun, or what the mission does--> ENDED
 
 * NEW takes only StartRun.
-* PAUSED takes ResumeRun, StepRun, StopRun, GiveUp, what is changed for debugging (breakpoints,
-  data), and what changes nothing in the mission (a claim, a geometry, a note). It ignores ticks.
+* PAUSED takes ResumeRun, StepRun, StopRun, GiveUp, Revise, what is changed for debugging
+  (breakpoints, data), and what moves no token (a claim, a geometry, a note). It ignores ticks.
   Every other input is deferred: journaled now, decided at resume.
 * ENDED takes only claims, what ends behaviors that are still being cancelled, and verdicts on
   requirements, which the end of the run decides.
@@ -29,6 +29,7 @@ from m2pem.engine.inputs import (
     RequirementDecided,
     ResourceFault,
     ResumeRun,
+    Revise,
     SetBreakpoints,
     SetData,
     StartRun,
@@ -69,6 +70,7 @@ _EXCEPTIONS: dict[RunStatus, dict[type, Admission]] = {
         ClaimRun: Admission.DECIDE,
         GeometrySet: Admission.DECIDE,
         OperatorNoted: Admission.DECIDE,
+        Revise: Admission.DECIDE,
     },
     RunStatus.ENDED: {
         BehaviorReported: Admission.DECIDE,

@@ -8,19 +8,33 @@ Pure: no clock, no random, no I/O. The same inputs at the same times give the sa
 """
 
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 from m2pem.engine.apply import apply
 from m2pem.engine.arming import next_timer
 from m2pem.engine.commands import Command
 from m2pem.engine.decide import decide
-from m2pem.engine.inputs import Input
+from m2pem.engine.inputs import Input, Revise
 from m2pem.engine.outbox import commands_of, outstanding
-from m2pem.engine.records import Record
+from m2pem.engine.records import MissionRevised, Record
 from m2pem.engine.state import RunState, RunStatus
 from m2pem.engine.steps import Steps
+from m2pem.errors import MissionError
 from m2pem.fleet.fleet import Fleet
+from m2pem.mission.library import KeptLibrary
 from m2pem.mission.mission import Mission
+
+
+def mission_of_revision(item: Revise) -> Mission:
+    """Read the mission of a revision, as that of a run is read again (`m2pem.journal.mission`).
+
+    Raises:
+        MissionError: no executable mission can be read any more.
+    """
+    from m2pem.bpmn import parse_mission  # noqa: PLC0415  # slow to load, and few runs are revised
+
+    return parse_mission(item.mission, item.mission_name, KeptLibrary(item.library), accepted=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,17 +71,34 @@ class MissionRun:
         m2pem; the state is not usable after it.
         """
         x = self._x
+        self._read_version(item)
         seq = self.state.seq + 1
         t_us = 0 if self.state.status is RunStatus.NEW else self.state.mission_time_us(now_us)
         x.begin(now_us)
         decide(x, item)
+        self.state.new_mission = None
         records = x.finish()
         return Step(item, now_us, t_us, seq, records, commands_of(self.state, records))
 
-    def replay(self, records: Iterable[Record]) -> None:
-        """Rebuild the state from journaled records, by applying them alone."""
+    def replay(self, records: Iterable[Record], item: Input | None = None) -> None:
+        """Rebuild the state from journaled records, by applying them alone.
+
+        `item`: the input that they were decided from, which has the files of a revision.
+
+        Raises:
+            MissionError: this release cannot read a version of the mission.
+        """
         for record in records:
+            if type(record) is MissionRevised:
+                assert isinstance(item, Revise), "a revision is replayed with its input"
+                self.state.new_mission = mission_of_revision(item)
             apply(self.state, record)
+
+    def _read_version(self, item: Input) -> None:
+        """Read the mission of a revision; one that cannot be read is refused when it is decided."""
+        if isinstance(item, Revise):
+            with suppress(MissionError):
+                self.state.new_mission = mission_of_revision(item)
 
     def outstanding(self) -> Sequence[Command]:
         """Return the commands of all that should be active, for an executive that claims the

@@ -204,7 +204,7 @@ class Token:
         return self.inner is not None and self.inner.reopened
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(slots=True, eq=False)
 class Wait:
     """An armed catch event.
 
@@ -224,6 +224,7 @@ class Wait:
     calendar: bool
     left: int
     cycle: str
+    armed_us: int | None = None
 
 
 TokenOrScope: TypeAlias = Token | Scope
@@ -370,6 +371,9 @@ class RunState:
 
     run: str
     mission: Mission
+    """The version that holds now."""
+    new_mission: Mission | None = None
+    """The version that the revision brings which is being decided or replayed; None: none is."""
     status: RunStatus = RunStatus.NEW
     by: str = ""
     """Who has started it."""
@@ -445,6 +449,11 @@ class RunState:
 
     def __post_init__(self) -> None:
         self.shared = DataStores(self.mission.data_stores)
+
+    def label_of(self, element: str) -> str:
+        """Return what to call an element that a revision may have removed since."""
+        found = self.mission.elements.get(element)
+        return found.label if found is not None else element
 
     def mission_time_us(self, now_us: int) -> int:
         """Microseconds from the start of the run, not counting pauses."""

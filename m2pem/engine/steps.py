@@ -38,6 +38,8 @@ class Steps(Execution):
     def begin(self, now_us: int) -> None:
         """Prepare for an input that came at `now_us`; steps left over come first."""
         self.now_us = now_us
+        if self.mission is not self.state.mission:  # a replay has revised it
+            self.read_mission()
         self.steps_left = self.batch
         self.look_for_breakpoints()
         if self.state.yielded and self.state.status is RunStatus.RUNNING:

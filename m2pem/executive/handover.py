@@ -69,7 +69,7 @@ class Handover:
                 runner.id,
                 behavior.id,
                 behavior.element,
-                state.mission.elements[behavior.element].label,
+                state.label_of(behavior.element),
                 catcher.label if catcher is not None else "",
                 on_loss is OnLoss.REASSIGN,
                 on_loss is OnLoss.ASK

@@ -69,7 +69,8 @@ def _work(content: bytes, _: SendProgress) -> bytes:
     mission = parse_mission(order.source, order.file, library, accepted=True)
     run = MissionRun(mission, restore(order.fleet), order.run)
     for body in order.bodies:
-        run.replay(decode_body(body)[1])
+        item, records = decode_body(body)
+        run.replay(records, item)
     choice = msgspec.json.decode(order.choice, type=Input)
     assert isinstance(choice, ResolveIncident)
     found = outlook(run, order.now_us, choice, writers=frozenset(order.writers))

@@ -43,7 +43,7 @@ class Holder:
     @property
     def task(self) -> str:
         """The label of its task."""
-        return self.runner.run.state.mission.elements[self.element].label
+        return self.runner.run.state.label_of(self.element)
 
     @property
     def label(self) -> str:
@@ -89,7 +89,7 @@ def preemptible(runners: Iterable[Runner], latest: LatestState) -> list[Holder]:
 
 
 def _roles(state: RunState, behavior: Behavior) -> Iterator[Role]:
-    node = state.mission.elements[behavior.element]
+    node = state.mission.elements.get(behavior.element)
     if isinstance(node, ScriptTask | ServiceTask | SendTask) and node.behavior is not None:
         yield from node.behavior.roles
 

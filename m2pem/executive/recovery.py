@@ -56,7 +56,7 @@ async def replay(
     """
     last_us = 0
     async for entry in journal.read(run.state.run):
-        run.replay(entry.records)
+        run.replay(entry.records, entry.input)
         if monitors is not None:
             monitors.observe(entry.t_us, entry.records)
         if on_records is not None:

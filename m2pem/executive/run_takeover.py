@@ -89,11 +89,12 @@ class RunTakeover:
                 log.warning(
                     "%s goes on as it was begun, but would not begin now: %s", number, finding
                 )
-        if mission.chooses_resources or waits_for_space(supervisor.fleet):
-            await asyncio.to_thread(load_solver)
         run = MissionRun(mission, supervisor.fleet, number, supervisor.settings.steps_at_once)
         monitors = RunMonitors(mission, supervisor.fleet)
         last_us = await replay(supervisor.journal, run, monitors, supervisor.settings.on_records)
+        mission = run.state.mission  # the version that holds now
+        if mission.chooses_resources or waits_for_space(supervisor.fleet):
+            await asyncio.to_thread(load_solver)
         runner = supervisor.add(run, epoch, monitors)
         await supervisor.dispatcher.fence(number, epoch)
         taken_before, requests = control_of(run.state)

@@ -36,14 +36,14 @@ def holder_label(runners: Mapping[RunId, Runner], holder: str, *, mission: bool 
     state = runner.run.state
     run = f"{state.run} ({PurePath(state.mission.file).stem})" if mission else state.run
     if (behavior := state.behaviors.get(holder)) is not None:
-        return f"{state.mission.elements[behavior.element].label} of {run}"
+        return f"{state.label_of(behavior.element)} of {run}"
     if (request := state.allocations.get(holder)) is not None:
         return f"{request.token.node.label} of {run}"
     if (incident := state.incidents.get(holder)) is not None:
         return f"the incident of {incident.token.node.label} of {run}"
     for keeping in state.kept.values():
         if keeping.id == holder:
-            label = state.mission.elements[keeping.element].label
+            label = state.label_of(keeping.element)
             return f"{label} of {run}, which keeps it until {keeping.until.container.label} ends"
     return ""
 

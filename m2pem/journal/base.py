@@ -280,6 +280,15 @@ class Journal(Protocol):
         """
         ...
 
+    async def revisions(self, run: str) -> Sequence[Entry]:
+        """Return the entries of a run whose input is a revision of its mission, also one that was
+        refused, in order. They are found without reading the others.
+
+        Raises:
+            JournalError: no such run, or one of them is damaged.
+        """
+        ...
+
     async def runs(self, *, files: bool = True) -> Sequence[RunInfo]:
         """Return every run, in order of its number.
 

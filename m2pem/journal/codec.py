@@ -49,6 +49,10 @@ def encode_body(entry: Entry) -> bytes:
     return body
 
 
+BEGIN_OF_REVISION = b'[{"input":"Revise",'
+"""With what the encoded body of an entry begins whose input is a revision."""
+
+
 def decode_body(body: bytes | str) -> Body:
     """The input and records that `encode_body` wrote.
 

@@ -16,6 +16,7 @@ from m2pem.errors import JournalError
 from m2pem.fleet.approval import Approval, Edit
 from m2pem.journal.base import Deletion, Entry, Loss, RunHeader, RunInfo
 from m2pem.journal.codec import (
+    BEGIN_OF_REVISION,
     decode_body,
     decode_library,
     decode_part,
@@ -276,6 +277,30 @@ class DatabaseJournal(ABC):
                 if size > _BATCH_BYTES:
                     break
         return entries, before
+
+    async def revisions(self, run: str) -> Sequence[Entry]:
+        """See `Journal.revisions`."""
+        return await self._read(partial(self._revisions_of, run_number(run)))
+
+    def _revisions_of(self, number: int) -> list[Entry]:
+        query = (
+            f"SELECT seq, epoch, at_us, t_us, {self.body_column} FROM entries"
+            f" WHERE run = ? AND substr({self.body_column}, 1, ?) = ? ORDER BY seq"
+        )
+        begin = BEGIN_OF_REVISION
+        with self._snapshot():
+            run = self._reading.execute("SELECT 1 FROM runs WHERE run = ?", (number,)).fetchone()
+            if run is None:
+                raise no_run(self._reading, number)
+            rows = self._reading.execute(query, (number, len(begin), begin)).fetchall()
+        entries: list[Entry] = []
+        for seq, epoch, at_us, t_us, body in rows:
+            try:
+                content = decode_body(body)
+            except JournalError as error:
+                raise self._damaged(number, seq, str(error)) from error
+            entries.append(Entry(run_id(number), epoch, seq, at_us, t_us, *content))
+        return entries
 
     def _hash_up_to(self, number: int, seq: int) -> bytes | None:
         row = self._reading.execute(

@@ -10,6 +10,7 @@ from operator import attrgetter
 from pathlib import Path
 from uuid import UUID, uuid4
 
+from m2pem.engine.inputs import Revise
 from m2pem.errors import InternalError, JournalError, StaleEntryError
 from m2pem.fleet.approval import Approval, Edit
 from m2pem.journal.base import Deletion, Entry, RunHeader, RunInfo
@@ -184,6 +185,10 @@ class MemoryJournal:
             for entry in batch:
                 yield entry
             after_seq = batch[-1].seq
+
+    async def revisions(self, run: str) -> Sequence[Entry]:
+        """See `Journal.revisions`; those that `keep` has dropped are not among them."""
+        return [each for each in self._find(run).entries if isinstance(each.input, Revise)]
 
     def _batch(self, found: _Run, run: str, after_seq: int) -> Sequence[Entry]:
         if after_seq < found.dropped_seq:

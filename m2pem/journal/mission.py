@@ -1,4 +1,5 @@
-"""The mission and the fleet of a run, as they were when the run began, read from the journal alone.
+"""The mission and the fleet of a run, as they were when the run began, read from the journal alone;
+and the version of the mission that holds now.
 
 It is apart from the rest of the journal, which needs no parser of BPMN.
 """
@@ -6,9 +7,12 @@ It is apart from the rest of the journal, which needs no parser of BPMN.
 from dataclasses import replace
 
 from m2pem.bpmn import parse_mission
+from m2pem.engine.inputs import Revise
+from m2pem.engine.records import MissionRevised
+from m2pem.engine.run import mission_of_revision
 from m2pem.errors import JournalError
 from m2pem.fleet.fleet import Fleet, restore, simulated_fleet
-from m2pem.journal.base import RunHeader
+from m2pem.journal.base import Entry, Journal, RunHeader, RunInfo
 from m2pem.mission.library import KeptLibrary
 from m2pem.mission.mission import Mission
 
@@ -24,6 +28,26 @@ def mission_of(header: RunHeader) -> Mission:
     """
     library = KeptLibrary(header.library)
     return parse_mission(header.mission, header.mission_name, library, accepted=True)
+
+
+async def present_mission_of(journal: Journal, line: RunInfo) -> Mission:
+    """Read the version of a run's mission that the last revision has brought, if there was any.
+
+    Raises:
+        MissionError: no executable mission can be read any more.
+        JournalError: the run is not in the journal, or a revision of it is damaged.
+    """
+    revised = [entry for entry in await journal.revisions(line.run) if is_revision(entry)]
+    if not revised:
+        return mission_of(line.header)
+    item = revised[-1].input
+    assert isinstance(item, Revise)
+    return mission_of_revision(item)
+
+
+def is_revision(entry: Entry) -> bool:
+    """Whether the mission of a run was revised by the input of an entry, which else was refused."""
+    return any(isinstance(record, MissionRevised) for record in entry.records)
 
 
 def fleet_of(header: RunHeader) -> Fleet:

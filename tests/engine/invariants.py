@@ -1,7 +1,11 @@
 """What is always true of a run's state between two inputs."""
 
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+
 from m2pem.engine.state import BehaviorPhase, RunState, RunStatus, Scope
-from m2pem.mission.elements import Activity, BoundaryEvent
+from m2pem.mission.elements import Activity, BoundaryEvent, Element
+from m2pem.mission.mission import Mission
 
 
 def check_state(state: RunState) -> None:
@@ -25,6 +29,26 @@ def check_state(state: RunState) -> None:
         assert not state.deferred
         assert not state.timers
         assert not state.dates
+
+
+def check_bound(state: RunState) -> None:
+    """Assert that every element which the state refers to is one of its mission."""
+    seen: set[int] = set()
+    waiting: list[object] = [getattr(state, each.name) for each in fields(state)]
+    elements = {id(each) for each in state.mission.elements.values()}
+    while waiting:
+        each = waiting.pop()
+        if id(each) in seen or isinstance(each, Mission):
+            continue
+        seen.add(id(each))
+        if isinstance(each, Element):
+            assert id(each) in elements, f"{each.id} is not in the mission of the run"
+        elif isinstance(each, Mapping):
+            waiting += [*each.keys(), *each.values()]
+        elif isinstance(each, (list, tuple)):
+            waiting += each
+        elif is_dataclass(each) and not isinstance(each, type):
+            waiting += [getattr(each, part.name) for part in fields(each)]
 
 
 def _check_tokens(state: RunState) -> None:

@@ -6,6 +6,7 @@ from typing import Any, ClassVar, Self
 from m2pem.engine import inputs as i
 from m2pem.engine import records as r
 from m2pem.engine.commands import Command
+from m2pem.engine.revision import RevisionPlan, plan_revision
 from m2pem.engine.run import MissionRun, Step
 from m2pem.engine.state import Behavior, BehaviorPhase, RunStatus
 from m2pem.fleet.default_fleet import fleet_for
@@ -110,6 +111,18 @@ class Play:
     def stop(self) -> Self:
         return self.give(i.StopRun("ops"))
 
+    def plan(self, text: str, **moves: str) -> RevisionPlan:
+        """The plan of a revision to the mission that `text` says."""
+        return plan_revision(self.run.state, mission(text), moves, self.now_us)
+
+    def revise(self, text: str, **moves: str) -> Self:
+        """Revise the run to the mission that `text` says, by the plan of this moment."""
+        new = mission(text)
+        plan = plan_revision(self.run.state, new, moves, self.now_us)
+        assert not plan.refusals, plan.refusals
+        item = i.Revise(plan.version, "new.bpmn", new.source, plan.digest, moves=moves, by="ops")
+        return self.give(item)
+
     def advance(self, seconds: float) -> Self:
         """Let time pass; every timer fires when it is due."""
         until_us = self.now_us + round(seconds * SECOND_US)
@@ -203,7 +216,7 @@ class Play:
         for step in self.steps:
             entry = Entry("r1", 1, step.seq, step.at_us, step.t_us, step.input, tuple(step.records))
             item, records = decode_body(encode_body(entry))
-            replayed.replay(records)
+            replayed.replay(records, item)
             again = decided.receive(item, step.at_us)
             assert list(again.records) == list(step.records)
             assert list(again.commands) == list(step.commands)

@@ -107,6 +107,10 @@ class RandomPlay:
     def go(self, choices: Sequence[int]) -> None:
         """Start, and let the chosen things happen."""
         self.give(i.StartRun(self.play.mission.process().id, {"a": 1, "b": 1}))
+        self.go_on(choices)
+
+    def go_on(self, choices: Sequence[int]) -> None:
+        """Let the chosen things happen."""
         for choice in choices:
             things = self._things()
             things[choice % len(things)]()
@@ -168,10 +172,11 @@ class RandomPlay:
         for service in state.services:
             add(i.ServiceCompleted(service, {"a": 2}))
             add(i.ServiceFailed(service, "E1"))
-        for signal in self.play.mission.signals:
+        mission = state.mission
+        for signal in mission.signals:
             add(i.SignalReceived(signal, {"b": 2}))
             add(i.SignalReceived(signal, id="once"))
-        for message in self.play.mission.messages:
+        for message in mission.messages:
             add(i.MessageReceived(message, {"a": 0}))
         for incident in state.incidents.values():
             for choice in self._choices_about(incident):
@@ -203,7 +208,7 @@ class RandomPlay:
         for choice in i.IncidentChoice:
             yield i.ResolveIncident(incident.id, choice, "ann")
         yield i.ResolveIncident(incident.id, i.IncidentChoice.SET_DATA, data={"a": 3, "b": 0})
-        for target in self.play.mission.elements:
+        for target in self.play.run.state.mission.elements:
             yield i.ResolveIncident(incident.id, i.IncidentChoice.MOVE, to=target)
         for role in incident.roles:
             for resource in self.play.fleet.vehicles:

@@ -38,6 +38,7 @@ _LINES: dict[type, Callable[[Any], Iterable[object]]] = {
     r.InputDeferred: lambda x: ("defer", type(x.input).__name__),
     r.InputSeen: lambda x: ("seen", x.id),
     r.GeometryReceived: lambda x: ("geometry", x.name),
+    r.MissionRevised: lambda x: ("revise", *(f"{a}={b}" for a, b in x.moves.items())),
     r.ScopeOpened: lambda x: ("open", x.element),
     r.ScopeClosed: lambda x: ("close", x.element, _outcome(x), "kept" if x.kept else ""),
     r.TokenEntered: lambda x: ("enter", x.element),

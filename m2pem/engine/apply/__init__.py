@@ -9,7 +9,16 @@ from collections.abc import Callable
 from typing import Any
 
 from m2pem.engine import records as r
-from m2pem.engine.apply import compensation, events, incidents, requirements, run, tasks, tokens
+from m2pem.engine.apply import (
+    compensation,
+    events,
+    incidents,
+    requirements,
+    revision,
+    run,
+    tasks,
+    tokens,
+)
 from m2pem.engine.state import RunState
 
 
@@ -38,6 +47,7 @@ APPLIERS: dict[type, Callable[[RunState, Any], None]] = {
     r.ControlRequestEnded: run.control_request_ended,
     r.OperatorNote: run.nothing,
     r.GeometryReceived: run.geometry_received,
+    r.MissionRevised: revision.mission_revised,
     r.ScopeOpened: tokens.scope_opened,
     r.ScopeClosed: tokens.scope_closed,
     r.ScopeInterrupted: tokens.scope_interrupted,

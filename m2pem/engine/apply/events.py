@@ -55,6 +55,7 @@ def event_awaited(state: RunState, record: r.EventAwaited) -> None:
         record.calendar,
         record.left,
         record.cycle,
+        record.armed_us,
     )
     state.last_wait = record.wait
     state.waits[wait.id] = wait

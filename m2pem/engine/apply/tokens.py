@@ -25,7 +25,8 @@ from m2pem.mission.elements import (
 )
 
 
-def _is_join(node: FlowNode) -> bool:
+def is_join(node: FlowNode) -> bool:
+    """Whether tokens wait at a gateway for those of its other flows."""
     kind = type(node)
     if kind is ParallelGateway or kind is InclusiveGateway:
         return len(node.incoming) > 1
@@ -52,7 +53,7 @@ def token_entered(state: RunState, record: r.TokenEntered) -> None:
     state.last_token = max(state.last_token, record.token)
     if scope.compensations and compensation.enter_compensation(scope, token):
         return
-    if flow is not None and _is_join(node):
+    if flow is not None and is_join(node):
         join = scope.joins.get(node)
         if join is None:
             join = scope.joins[node] = Join()
@@ -102,7 +103,7 @@ def token_left(state: RunState, record: r.TokenLeft) -> None:
         for wait in list(token.waits.values()):
             end_wait(state, wait)
     compensation.leave_compensation(token)
-    if token.flow is not None and _is_join(token.node):
+    if token.flow is not None and is_join(token.node):
         join = scope.joins[token.node]
         arrived = join.by_flow[token.flow]
         arrived.remove(token)

@@ -32,7 +32,8 @@ class EventAwaited(BaseRecord, frozen=True):
 
     A duration or cycle is due at a mission time (microseconds from the start, which stops during
     a pause); a date (`calendar`) at a time since the Unix epoch. `left`: how often a cycle still
-    fires after this one (-1: for ever); `cycle`: its period or cron text.
+    fires after this one (-1: for ever); `cycle`: its period or cron text. `armed_us`: the mission
+    time from which a duration counts.
     """
 
     token: int
@@ -47,6 +48,7 @@ class EventAwaited(BaseRecord, frozen=True):
     left: int = 0
     cycle: str = ""
     spent: bool = False
+    armed_us: int | None = None
 
 
 class EventTriggered(BaseRecord, frozen=True):

@@ -2,6 +2,8 @@
 
 from enum import StrEnum
 
+import msgspec
+
 from m2pem.engine.inputs import Input, RequestOutcome
 from m2pem.engine.records.base import BaseRecord, RunOutcome
 from m2pem.mission.values import Value
@@ -145,6 +147,22 @@ class ControlRequestEnded(BaseRecord, frozen=True):
     requested_by: str
     outcome: RequestOutcome
     by: str = ""
+
+
+class MissionRevised(BaseRecord, frozen=True):
+    """The run goes on with a new version of its mission; the files are in the input `Revise`.
+
+    `version`, `previous`: hashes of the files. `moves`: where tokens went, by the element that they
+    were on; "": they ended. `disarmed`: waits that are over. `restarted`: tokens whose task begins
+    again.
+    """
+
+    version: str
+    previous: str
+    by: str = ""
+    moves: dict[str, str] = msgspec.field(default_factory=dict)
+    disarmed: tuple[int, ...] = ()
+    restarted: tuple[int, ...] = ()
 
 
 class OperatorNote(BaseRecord, frozen=True):

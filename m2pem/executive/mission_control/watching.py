@@ -10,7 +10,7 @@ from m2pem.engine.state import RunStatus as EngineStatus
 from m2pem.errors import OperatorError
 from m2pem.executive.mission_control.parts import ControlParts
 from m2pem.executive.run_summary import summary
-from m2pem.journal.mission import mission_of
+from m2pem.journal.mission import present_mission_of
 from m2pem.mission.mission import Mission
 
 MANY_RUNS = 500
@@ -62,7 +62,7 @@ class WatchOperations(ControlParts):
         ]
 
     async def mission(self, run: RunId) -> Mission:
-        """The mission of a run, of an older one from the journal."""
+        """The mission of a run as it is now, of an older one from the journal."""
         runner = self._supervisor.runners.get(run)
         if runner is not None:
             return runner.run.state.mission
@@ -70,7 +70,7 @@ class WatchOperations(ControlParts):
             if line.run == run:
                 if line.gone:
                     raise OperatorError(f"{run}: {line.loss}")
-                return await asyncio.to_thread(mission_of, line.header)
+                return await present_mission_of(self._supervisor.journal, line)
         raise OperatorError(f"the journal has no run {run}")
 
     async def mission_time_s(self, run: RunId) -> float:

@@ -14,11 +14,12 @@ import os
 import pytest
 
 from m2pem.boot_time import boot_time_s
-from m2pem.engine.inputs import BehaviorReported, Continue, PauseRun, StartRun
+from m2pem.engine.inputs import BehaviorReported, Continue, PauseRun, Revise, StartRun
 from m2pem.engine.records import (
     BehaviorProgressed,
     DataWritten,
     InputIgnored,
+    MissionRevised,
     RunClaimed,
     RunEnded,
     RunOutcome,
@@ -29,6 +30,7 @@ from m2pem.engine.records import (
 from m2pem.errors import FleetServedError, InternalError, JournalError, StaleEpochError
 from m2pem.journal.base import Entry, RunInfo
 from m2pem.mission.catalogue import BehaviorState
+from m2pem.mission.library import Source
 from m2pem.mission.values import Value
 from m2pem.testing.contracts.contract import needs
 from m2pem.testing.contracts.journal_approvals import JournalApprovals
@@ -186,6 +188,21 @@ class JournalContract(JournalSchedule, JournalApprovals):
             await journal.append([entry(run, 3), entry(run, 4)])
             for after_seq, expected in {0: [1, 3, 4], 1: [3, 4], 2: [3, 4], 3: [4], 9: []}.items():
                 assert [e.seq for e in await written(journal, run, after_seq)] == expected
+
+    async def test_revisions_of_a_mission_are_found(self, open_journal: OpenJournal) -> None:
+        """With their files, among many other entries; those of other runs are not."""
+        revision = Revise("9f8e", "b.bpmn", b"<b/>\xff", "c0ffee", (Source("c.bpmn", b"<c/>"),))
+        async with opened(open_journal) as journal:
+            run, other = await journal.create(HEADER), await journal.create(HEADER)
+            some = [entry(run, seq) for seq in range(1, 11)]
+            revised = MissionRevised("9f8e", "0", "anna", {"A": ""}, (1,), (2,))
+            some[4] = entry(run, 5, revised, given=revision)
+            some[8] = entry(run, 9, given=revision)
+            await journal.append(some)
+            await journal.append([entry(other, 1, given=revision)])
+            assert list(await journal.revisions(run)) == [some[4], some[8]]
+            with pytest.raises(JournalError, match="no run 'r9'"):
+                await journal.revisions("r9")
 
     async def test_a_long_run_is_read_in_order(self, open_journal: OpenJournal) -> None:
         """Beyond any batch that a journal may read in."""

@@ -1,0 +1,117 @@
+"""Carrying a revision out: the records of an input `Revise`.
+
+First the work ends that the new version does not have, and the tokens leave that are to be moved;
+then `MissionRevised` binds the state to the new version; then tokens enter elements of it, events
+are armed and tasks begin again.
+"""
+
+from m2pem.engine import records as r
+from m2pem.engine.apply.tokens import is_join
+from m2pem.engine.arming import arm
+from m2pem.engine.elements.activities import activate_later
+from m2pem.engine.execution import Execution, definitions_of
+from m2pem.engine.inputs import Revise
+from m2pem.engine.records import TokenOutcome
+from m2pem.engine.revision.plan import Arming, Move, RevisionPlan
+from m2pem.engine.revision.planning import plan_revision
+from m2pem.engine.scopes import stop_activity
+from m2pem.engine.state import Scope
+from m2pem.engine.steps import Steps
+from m2pem.engine.triggering import take_kept_messages
+from m2pem.mission.elements import (
+    ComplexGateway,
+    FlowNode,
+    InclusiveGateway,
+    ParallelGateway,
+    SequenceFlow,
+)
+
+
+def revise(x: Steps, item: Revise) -> None:
+    """Revise the run if the plan that was shown is what the revision does now."""
+    new = x.state.new_mission
+    if new is None:
+        x.ignore("the new version of the mission cannot be read")
+        return
+    plan = plan_revision(x.state, new, item.moves, x.now_us)
+    if plan.version != item.version:
+        x.ignore(f"the files are not those of version {item.version}")
+    elif plan.refusals:
+        x.ignore(f"the revision is refused: {'; '.join(each.text for each in plan.refusals)}")
+    elif plan.digest != item.plan:
+        x.ignore("the run has gone on since the plan was made: look at the new plan")
+    else:
+        _carry_out(x, plan, item)
+
+
+def _carry_out(x: Steps, plan: RevisionPlan, item: Revise) -> None:
+    state = x.state
+    x.reload_queue()  # what was left over before a pause goes on after it, as the rest
+    for move in plan.moves:
+        token = state.tokens[move.token]
+        stop_activity(x, token, TokenOutcome.TERMINATED)
+        x.leave(token, TokenOutcome.TERMINATED)
+    for number in plan.restarted:
+        stop_activity(x, state.tokens[number], TokenOutcome.TERMINATED)
+    x.emit(
+        r.MissionRevised(
+            plan.version, plan.previous, item.by, plan.requested, plan.disarmed, plan.restarted
+        )
+    )
+    x.read_mission()
+    for move in plan.moves:
+        _enter(x, move)
+    for arming in plan.armings:
+        _arm(x, arming)
+    for number in plan.restarted:
+        stays = state.tokens.get(number)
+        if stays is not None and x.is_active(stays):
+            activate_later(x, stays)
+    for number in plan.rechecked:
+        x.queue.append(state.scopes[number])
+    for scope in state.scopes.values():
+        _look_at_joins(x, scope)
+    x.joins_to_check.update(state.scopes)
+    x.data_changed = True
+
+
+def _enter(x: Execution, move: Move) -> None:
+    """Put a token that has left its element where it is to go."""
+    scope = x.state.scopes[move.scope]
+    if not move.target:
+        x.queue.append(scope)
+        return
+    element = x.mission.elements[move.target]
+    if isinstance(element, SequenceFlow):
+        process = x.process_of(element.source)
+        x.emit(r.FlowTaken(move.token, process, element.source.id, scope.id, element.id))
+        x.enter(move.token, element.target, scope, element)
+    else:
+        assert isinstance(element, FlowNode)
+        x.enter(move.token, element, scope)
+
+
+def _arm(x: Execution, arming: Arming) -> None:
+    """Arm the events of an element, unless an error in one of them has moved the token on."""
+    node = x.mission.elements[arming.element]
+    assert isinstance(node, FlowNode)
+    holder = x.state.tokens.get(arming.token) if arming.token else x.state.scopes.get(arming.scope)
+    if holder is None:
+        return
+    for definition in definitions_of(node):
+        if not arm(x, holder, node, definition, since_us=arming.since_us):
+            return
+    take_kept_messages(x, holder)
+
+
+def _look_at_joins(x: Execution, scope: Scope) -> None:
+    """Let tokens at joins go on that need to wait for fewer now, and those where nothing joins."""
+    for node, join in scope.joins.items():
+        if isinstance(node, ParallelGateway | ComplexGateway):
+            x.queue.extend(next(reversed(join.by_flow.values()))[:1])
+    for token in scope.tokens.values():
+        if isinstance(token.node, _GATEWAYS) and not is_join(token.node):
+            x.queue.append(token)
+
+
+_GATEWAYS = (ComplexGateway, InclusiveGateway, ParallelGateway)

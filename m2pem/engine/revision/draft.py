@@ -1,0 +1,77 @@
+"""A plan of a revision in the making."""
+
+from collections.abc import Mapping, Sequence
+
+from m2pem.engine.revision.plan import (
+    Arming,
+    Effect,
+    EffectKind,
+    Move,
+    Refusal,
+    RevisionPlan,
+)
+from m2pem.engine.state import RunState, Scope, Token, Wait
+from m2pem.mission.difference import Difference, difference
+from m2pem.mission.mission import Mission
+from m2pem.mission.version import version_of
+
+
+class PlanDraft:
+    """What was found so far."""
+
+    def __init__(self, state: RunState, new: Mission, moves: Mapping[str, str]) -> None:
+        self.difference: Difference = difference(state.mission, new)
+        self._versions = version_of(new), version_of(state.mission)
+        self._requested = dict(moves)
+        self._effects: list[Effect] = []
+        self._refusals: list[Refusal] = []
+        self._moves: list[Move] = []
+        self._restarted: list[int] = []
+        self._disarmed: list[int] = []
+        self._armings: list[Arming] = []
+        self._rechecked: list[int] = []
+
+    def add(self, kind: EffectKind, element: str, token: int, text: str) -> None:
+        """Add what the revision does."""
+        self._effects.append(Effect(kind, element, token, text))
+
+    def refuse(self, element: str, token: int, text: str, candidates: Sequence[str] = ()) -> None:
+        """Add why the revision cannot be."""
+        self._refusals.append(Refusal(element, token, text, tuple(candidates)))
+
+    def move(self, move: Move) -> None:
+        """Have a token leave its element."""
+        self._moves.append(move)
+
+    def restart(self, token: Token) -> None:
+        """Have the task of a token begin again."""
+        self._restarted.append(token.id)
+
+    def disarm(self, wait: Wait) -> None:
+        """Have an event awaited no longer."""
+        self._disarmed.append(wait.id)
+
+    def arm(self, arming: Arming) -> None:
+        """Have an event awaited."""
+        self._armings.append(arming)
+
+    def recheck(self, scope: Scope) -> None:
+        """Have an ad-hoc subprocess choose, or ask, again."""
+        self._rechecked.append(scope.id)
+
+    def finish(self) -> RevisionPlan:
+        """Return the plan."""
+        version, previous = self._versions
+        return RevisionPlan(
+            version,
+            previous,
+            self._requested,
+            self.difference,
+            tuple(self._effects),
+            tuple(self._refusals),
+            tuple(self._moves),
+            tuple(self._restarted),
+            tuple(self._disarmed),
+            tuple(self._armings),
+            tuple(self._rechecked),
+        )
