@@ -108,6 +108,7 @@ if TYPE_CHECKING:
         raw_parameters,
         restored_work,
     )
+    from m2pem.api.revision import RevisionEffect, RevisionPreview, RevisionRefusal
     from m2pem.api.run_view import RunView
     from m2pem.api.runs import (
         CONTROL_REQUEST,
@@ -263,6 +264,7 @@ _MODULES = {
     "m2pem.api.remaining": (
         "RemainingRoute RemainingSurvey RemainingWork raw_parameters restored_work"
     ),
+    "m2pem.api.revision": "RevisionEffect RevisionPreview RevisionRefusal",
     "m2pem.api.run_view": "RunView",
     "m2pem.api.runs": (
         "CONTROL_REQUEST NEWS SCHEDULE Alert GeometryVersion HandedOver IncidentPreview"
@@ -473,6 +475,9 @@ __all__ = [
     "ResolvedValue",
     "ResourceId",
     "ResumePolicy",
+    "RevisionEffect",
+    "RevisionPreview",
+    "RevisionRefusal",
     "Route",
     "RunId",
     "RunStatus",

@@ -9,6 +9,7 @@ from m2pem.api.mission_control.executive import ExecutiveControl
 from m2pem.api.mission_control.geometries import GeometryControl
 from m2pem.api.mission_control.operators import OperatorControl
 from m2pem.api.mission_control.resources import ResourceControl
+from m2pem.api.mission_control.revisions import RevisionControl
 from m2pem.api.mission_control.runs import RunControl
 from m2pem.api.mission_control.schedule import ScheduleControl
 from m2pem.api.mission_control.watching import WatchControl
@@ -17,6 +18,7 @@ from m2pem.api.mission_control.watching import WatchControl
 class MissionControl(
     RunControl,
     DebugControl,
+    RevisionControl,
     ScheduleControl,
     ResourceControl,
     OperatorControl,

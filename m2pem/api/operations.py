@@ -28,6 +28,7 @@ from m2pem.api.authoring import MissionFiles
 from m2pem.api.control import MissionControl
 from m2pem.api.health import ExecutiveAddress, HealthCheck
 from m2pem.api.people import OpenControlRequest, OperatorPresence, OperatorsChanged
+from m2pem.api.revision import RevisionPreview
 from m2pem.api.runs import (
     Alert,
     GeometryVersion,
@@ -112,6 +113,22 @@ class Choice(Params, frozen=True):
 class Resolve(Choice, frozen=True):
     """As `MissionControl.resolve_incident`."""
 
+    by: str = ""
+    even_if_stuck: bool = False
+
+
+class PlanRevision(Params, frozen=True):
+    """As `MissionControl.plan_revision`; the caller has read the mission's files."""
+
+    run: str
+    mission: MissionFiles
+    moves: dict[str, str] = msgspec.field(default_factory=dict)
+
+
+class Revision(PlanRevision, frozen=True, kw_only=True):
+    """As `MissionControl.revise`; the caller has read the mission's files."""
+
+    plan: str
     by: str = ""
     even_if_stuck: bool = False
 
@@ -413,6 +430,8 @@ OPERATIONS: dict[str, Operation] = {
         Operation("incidents", Nothing, list[OpenIncident]),
         Operation("preview_incident", Choice, IncidentPreview, alone=True),
         Operation("resolve_incident", Resolve, alone=True),
+        Operation("plan_revision", PlanRevision, RevisionPreview, alone=True),
+        Operation("revise", Revision, alone=True),
         Operation("alerts", Alerts, list[OperatorAlert]),
         Operation("acknowledge_alert", OfAlert),
         Operation("own_alert", OwnAlert),

@@ -47,6 +47,7 @@ COMMANDS = {
     "answer": "Answer a prompt of a run that is running on this host.",
     "incidents": "List the errors about which operators must decide.",
     "resolve": "Decide about an incident of a run that is running on this host.",
+    "revise": "Go on with a new version of a mission that is running on this host.",
     "take": "Take a vehicle or payload from the missions, to steer it by hand.",
     "give-back": "Give a vehicle or payload that an operator has taken back to the missions.",
     "alerts": "List what operators must know now.",

@@ -2,7 +2,7 @@
 
 import asyncio
 import itertools
-from collections.abc import AsyncIterator, Callable, Iterable, Sequence
+from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
 from inspect import iscoroutinefunction, signature
 from pathlib import Path
 from typing import Any, cast
@@ -14,12 +14,14 @@ from m2pem.api.approval import MissionApproval
 from m2pem.api.authoring import MissionFiles, MissionSource, file_of
 from m2pem.api.control import MissionControl
 from m2pem.api.operations import OPERATIONS, STREAMED, Operation, mission_files
-from m2pem.api.runs import OpenPrompt, PromptClosed, RunId
+from m2pem.api.revision import RevisionPreview
+from m2pem.api.runs import OpenPrompt, PromptClosed, RunId, StampedRecord
 from m2pem.api.schedule import EntryId
 from m2pem.bpmn import parse_mission
 from m2pem.control_socket.client import LONG_TIMEOUT_S, ask
 from m2pem.control_socket.paths import ControlSocketError, address
 from m2pem.control_socket.protocol import LONGEST_LINE_BYTES, Request, line, result_of
+from m2pem.engine.records import MissionRevised
 from m2pem.errors import MissionError, OperatorError
 from m2pem.findings import Finding
 from m2pem.mission.library import KeptLibrary
@@ -77,7 +79,7 @@ class RemoteControl:
         return list(self._prompts.values())
 
     async def mission(self, run: RunId) -> Mission:
-        """The mission of a run, read once."""
+        """The mission of a run, read once for each version of it."""
         if run not in self._missions:
             sent: MissionFiles = await self._call(OPERATIONS["mission"], run=run)
             library = KeptLibrary(sent.library)
@@ -110,6 +112,21 @@ class RemoteControl:
         operation = OPERATIONS["withdraw_approval"]
         state: MissionApproval = await self._call(operation, mission=files, by=by)
         return state
+
+    async def plan_revision(
+        self, run: RunId, mission: MissionSource, *, moves: Mapping[str, str] | None = None
+    ) -> RevisionPreview:
+        """Send the files of a new version to the executive, which says what it would do."""
+        files = await asyncio.to_thread(self._files, mission)
+        operation = OPERATIONS["plan_revision"]
+        preview: RevisionPreview = await self._call(operation, run=run, mission=files, moves=moves)
+        return preview
+
+    async def revise(self, run: RunId, mission: MissionSource, plan: str, **options: Any) -> None:
+        """Send the files of a new version to the executive, with which the run goes on."""
+        files = await asyncio.to_thread(self._files, mission)
+        operation = OPERATIONS["revise"]
+        await self._call(operation, run=run, mission=files, plan=plan, **options)
 
     async def schedule(self, mission: MissionSource, **options: Any) -> EntryId:
         """Send a mission's files to the executive, which starts it later."""
@@ -204,8 +221,12 @@ class RemoteControl:
             result_of(await reader.readline())
             while message := await reader.readline():
                 sent = msgspec.json.decode(message, type=Request).params
-                if sent["kind"] in STREAMED:  # an executive of a later release may send more
-                    yield msgspec.convert(sent["value"], STREAMED[sent["kind"]])
+                if sent["kind"] not in STREAMED:  # an executive of a later release may send more
+                    continue
+                value: Any = msgspec.convert(sent["value"], STREAMED[sent["kind"]])
+                if isinstance(value, StampedRecord) and isinstance(value.record, MissionRevised):
+                    self._missions.pop(value.run, None)
+                yield value
         finally:
             writer.close()
 

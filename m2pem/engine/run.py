@@ -60,7 +60,9 @@ class MissionRun:
     def __init__(
         self, mission: Mission, fleet: Fleet | None, run: str, batch: int = STEPS_AT_ONCE
     ) -> None:
-        """`batch`: steps that one input may cause before the run yields (`Continue`)."""
+        """`mission`: the version with which the run begins, or has begun. `batch`: steps that one
+        input may cause before the run yields (`Continue`)."""
+        self.begun_with = mission
         self.state = RunState(run, mission)
         self._x = Steps(self.state, fleet, batch)
 

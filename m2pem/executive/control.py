@@ -7,6 +7,7 @@ from m2pem.executive.mission_control.executive import ExecutiveOperations
 from m2pem.executive.mission_control.geometries import GeometryOperations
 from m2pem.executive.mission_control.operators import OperatorOperations
 from m2pem.executive.mission_control.resources import ResourceOperations
+from m2pem.executive.mission_control.revisions import RevisionOperations
 from m2pem.executive.mission_control.runs import RunOperations
 from m2pem.executive.mission_control.schedule import ScheduleOperations
 from m2pem.executive.mission_control.watching import WatchOperations
@@ -15,6 +16,7 @@ from m2pem.executive.mission_control.watching import WatchOperations
 class Control(
     RunOperations,
     DebugOperations,
+    RevisionOperations,
     ScheduleOperations,
     ResourceOperations,
     OperatorOperations,

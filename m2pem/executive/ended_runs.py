@@ -24,6 +24,8 @@ NOTHING_TO_DO = {
     "answer": "no question of it is open",
     "resolve_incident": "no incident of it is open",
     "preview_incident": "no incident of it is open",
+    "plan_revision": "only a run that is under way is revised",
+    "revise": "only a run that is under way is revised",
     "signal": "it takes no signals any more",
     "message": "it takes no messages any more",
     "set_geometry": "it takes no geometries any more",

@@ -6,7 +6,7 @@ from typing import Protocol
 
 from m2pem.api.runs import IncidentPreview, IncidentVerdict, OpenIncident, RunId
 from m2pem.engine.incidents import behavior_at, move_targets
-from m2pem.engine.inputs import IncidentChoice, ResolveIncident
+from m2pem.engine.inputs import IncidentChoice, ResolveIncident, Revise
 from m2pem.engine.resolving import replaced_roles, why_refused
 from m2pem.engine.state import Behavior, BehaviorPhase, Incident, RunState
 from m2pem.errors import OperatorError
@@ -54,7 +54,7 @@ def _described(state: RunState, incident: Incident, fleet: Fleet) -> OpenInciden
 
 
 class Foresee(Protocol):
-    """Explores what follows a choice about an incident: `outlook_in_subprocess`."""
+    """Explores what follows a choice about an incident or a revision: `outlook_in_subprocess`."""
 
     async def __call__(
         self,
@@ -62,7 +62,7 @@ class Foresee(Protocol):
         mission: Mission,
         fleet: Fleet,
         entries: Sequence[Entry],
-        choice: ResolveIncident,
+        choice: ResolveIncident | Revise,
         now_us: int,
         writers: Sequence[str],
     ) -> IncidentPreview:
@@ -111,12 +111,13 @@ class IncidentChoices:
             raise OperatorError(f"{run}: {refusal}")
         return item
 
-    async def outlook(self, run: RunId, item: ResolveIncident) -> IncidentPreview:
-        """Explore whether a run completes after a choice, if this executive can."""
+    async def outlook(self, run: RunId, item: ResolveIncident | Revise) -> IncidentPreview:
+        """Explore whether a run completes after a choice or a revision, if this executive can."""
         if self._foresee is None:
             return IncidentPreview(IncidentVerdict.UNKNOWN, "it is not explored here")
         supervisor = self._supervisor
-        state = supervisor.runner(run).run.state
+        mission_run = supervisor.runner(run).run
+        state = mission_run.state
         entries = [entry async for entry in supervisor.journal.read(run)]
         if sum(len(entry.records) for entry in entries) < state.seq:
             return IncidentPreview(IncidentVerdict.UNKNOWN, "the journal does not have all of it")
@@ -128,7 +129,7 @@ class IncidentChoices:
         }
         return await self._foresee(
             run,
-            state.mission,
+            mission_run.begun_with,
             supervisor.fleet,
             entries,
             item,

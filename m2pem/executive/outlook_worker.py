@@ -1,11 +1,11 @@
-"""The subprocess that explores what follows a choice about an incident, for an executive."""
+"""The subprocess that explores what follows a choice about an incident, or a revision."""
 
 from collections.abc import Sequence
 
 import msgspec
 
 from m2pem.api.runs import IncidentPreview, IncidentVerdict
-from m2pem.engine.inputs import Input, ResolveIncident
+from m2pem.engine.inputs import Input, ResolveIncident, Revise
 from m2pem.engine.run import MissionRun
 from m2pem.executive.subprocess_worker import SendProgress, run_in_subprocess, serve
 from m2pem.fleet.fleet import Fleet, dump, restore
@@ -35,13 +35,15 @@ async def outlook_in_subprocess(
     mission: Mission,
     fleet: Fleet,
     entries: Sequence[Entry],
-    choice: ResolveIncident,
+    choice: ResolveIncident | Revise,
     now_us: int,
     writers: Sequence[str],
 ) -> IncidentPreview:
-    """Return what follows a choice about an incident of a run, explored in a subprocess.
+    """Return what follows a choice about an incident of a run, or a revision of its mission,
+    explored in a subprocess.
 
-    `entries`: all of the run's, from its journal. Other arguments as in `Order`.
+    `mission`: with which the run began. `entries`: all of the run's, from its journal. Other
+    arguments as in `Order`.
     """
     order = Order(
         run,
@@ -72,7 +74,7 @@ def _work(content: bytes, _: SendProgress) -> bytes:
         item, records = decode_body(body)
         run.replay(records, item)
     choice = msgspec.json.decode(order.choice, type=Input)
-    assert isinstance(choice, ResolveIncident)
+    assert isinstance(choice, ResolveIncident | Revise)
     found = outlook(run, order.now_us, choice, writers=frozenset(order.writers))
     return msgspec.msgpack.encode((found.verdict.value, found.reason))
 

@@ -64,11 +64,11 @@ class _NotKnownError(Exception):
 def outlook(
     run: MissionRun,
     now_us: int,
-    choice: i.ResolveIncident,
+    choice: i.ResolveIncident | i.Revise,
     limits: OutlookLimits | None = None,
     writers: frozenset[str] = frozenset(),
 ) -> Outlook:
-    """Return whether a run completes after a choice about an incident.
+    """Return whether a run completes after a choice about an incident, or a revision.
 
     `run` is changed. `now_us`: microseconds since the Unix epoch. `writers`: names of behaviors
     that write data when they end.
@@ -86,17 +86,20 @@ class _Explorer:
         self._limits = limits
         self._writers = writers
         self._open_before = frozenset(run.state.incidents)
+
+    def explore(self, now_us: int, choice: i.ResolveIncident | i.Revise) -> Outlook:
+        """Explore all states, breadth first, and judge them."""
+        run = self._first
+        if isinstance(choice, i.Revise):  # its plan is that of the run as it is
+            _receive(run, choice, now_us)
+        if run.state.status is RunStatus.PAUSED:
+            _receive(run, i.ResumeRun(), now_us)
+        if isinstance(choice, i.ResolveIncident):
+            _receive(run, choice, now_us)
         mission = run.state.mission
         shared = [mission, *mission.elements.values()]
         self._shared = {id(each): each for each in shared}
         self._codes = list(dict.fromkeys(["FAILED", *(e.code for e in mission.errors.values())]))
-
-    def explore(self, now_us: int, choice: i.ResolveIncident) -> Outlook:
-        """Explore all states, breadth first, and judge them."""
-        run = self._first
-        if run.state.status is RunStatus.PAUSED:
-            _receive(run, i.ResumeRun(), now_us)
-        _receive(run, choice, now_us)
         until = time.monotonic() + self._limits.seconds
         numbers: dict[Key, int] = {_key(run.state, now_us): 0}
         before: list[list[int]] = [[]]

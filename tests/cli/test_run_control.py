@@ -71,6 +71,8 @@ OTHERWISE = {
     "incidents": "m2pem incidents, which tests/cli/test_incidents.py tries",
     "preview_incident": "m2pem resolve asks it first",
     "resolve_incident": "m2pem resolve",
+    "plan_revision": "m2pem revise asks it first",
+    "revise": "m2pem revise, which tests/cli/test_revise.py tries",
     "runs": "m2pem runs, and runs in m2pem attach",
     "prompts": "m2pem attach shows them",
     "subscribe": "m2pem attach shows what comes",

@@ -16,6 +16,7 @@ from m2pem.executive.direct_behaviors import DirectBehaviors
 from m2pem.executive.ended_runs import explain_end, in_words
 from m2pem.executive.health import ExecutiveHealth
 from m2pem.executive.incidents import Foresee, IncidentChoices
+from m2pem.executive.revisions import RunRevisions
 from m2pem.executive.run_starter import RunStarter
 from m2pem.executive.schedule_entries import ScheduleEntries
 from m2pem.executive.scheduler import Scheduler
@@ -73,6 +74,7 @@ class ControlParts:
         self._rehearse = rehearse
         self._estimate = estimate
         self._choices = IncidentChoices(supervisor, foresee)
+        self._revisions = RunRevisions(supervisor, starter, self._choices)
         self._direct = DirectBehaviors(supervisor, starter)
 
     def _refuse_others(self, what: str, role: str, by: str) -> None:

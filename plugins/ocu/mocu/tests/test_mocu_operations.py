@@ -74,6 +74,8 @@ SERVED_OTHERWISE = {
     "fleet": "/diagnostics names its vehicles and payloads",
 }
 NOT_SERVED = {
+    "plan_revision": "m2pem revise shows the plan: an operator must read it before",
+    "revise": "m2pem revise: an operator must read the plan before",
     "request_control": "operators over ROS take what is free; take_vehicle names the holder",
     "answer_control": "operators over ROS give back what they have",
     "control_requests": "topic events says who asks whom",

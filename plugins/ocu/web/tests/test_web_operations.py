@@ -125,6 +125,8 @@ NOT_SERVED = {
     "approve": "POST /api/missions/{name}/approval",
     "withdraw_approval": "POST /api/missions/{name}/approval/withdraw",
     "note_edit": "PUT /api/missions/{name} notes who saves",
+    "plan_revision": "m2pem revise shows the plan; a page does not revise runs",
+    "revise": "m2pem revise; a page does not revise runs",
     "execute_behavior": "programs command vehicles through faces; the page starts missions",
     "switch_over": "m2pem switchover asks for it on the executive's machine",
     "preview_incident": "POST .../incidents/{incident}/preview",

@@ -1,0 +1,157 @@
+"""Revisions of running missions: the new version is read and checked, and its plan is made."""
+
+import asyncio
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from m2pem.allocation.assignment import load_solver
+from m2pem.api.authoring import MissionSource
+from m2pem.api.revision import RevisionEffect, RevisionPreview, RevisionRefusal
+from m2pem.api.runs import IncidentPreview, RunId
+from m2pem.bpmn.one_task import is_one_task
+from m2pem.engine.inputs import Revise
+from m2pem.engine.revision import RevisionPlan, plan_revision
+from m2pem.errors import MissionError, OperatorError
+from m2pem.executive.incidents import IncidentChoices
+from m2pem.executive.run_starter import RunStarter
+from m2pem.executive.runner import Runner
+from m2pem.executive.supervisor import Supervisor
+from m2pem.findings import Finding, has_errors
+from m2pem.fleet.space import waits_for_space
+from m2pem.mission.difference import Difference
+from m2pem.mission.mission import Mission
+
+
+@dataclass(frozen=True, slots=True)
+class Prepared:
+    """A new version that was read and checked, and its plan."""
+
+    mission: Mission
+    plan: RevisionPlan
+    findings: tuple[Finding, ...]
+    item: Revise
+
+
+class RunRevisions:
+    """Prepares revisions of the runs of an executive."""
+
+    def __init__(
+        self, supervisor: Supervisor, starter: RunStarter, outlooks: IncidentChoices
+    ) -> None:
+        self._supervisor = supervisor
+        self._starter = starter
+        self._outlooks = outlooks
+
+    async def prepare(
+        self, run: RunId, mission: MissionSource, moves: Mapping[str, str], by: str
+    ) -> Prepared:
+        """Read and check a new version, and make the plan of the revision to it.
+
+        Raises:
+            MissionError: it cannot be read.
+            OperatorError: the run is not one that can be revised.
+        """
+        runner = self._runner(run)
+        loaded = await self._starter.read(mission)
+        state = runner.run.state
+        root = state.root
+        process = root.container.process.id if root is not None else None
+        if process not in {each.id for each in loaded.processes}:
+            process = None  # which the plan refuses
+        names = tuple(root.data) if root is not None else ()
+        found = await asyncio.to_thread(self._starter.findings, loaded, process, names)
+        if loaded.chooses_resources or waits_for_space(self._supervisor.fleet):
+            await asyncio.to_thread(load_solver)
+        # From here nothing is awaited: the plan is of this moment.
+        plan = plan_revision(state, loaded, moves, self._supervisor.clock.now_us())
+        files = (loaded.file, loaded.source, plan.digest, loaded.library)
+        return Prepared(
+            loaded, plan, tuple(found), Revise(plan.version, *files, moves=dict(moves), by=by)
+        )
+
+    def _runner(self, run: RunId) -> Runner:
+        runner = self._supervisor.runner(run)
+        if is_one_task(runner.run.state.mission):
+            raise OperatorError(f"{run} is one behavior that was commanded: command another one")
+        return runner
+
+    async def preview(self, run: RunId, prepared: Prepared) -> RevisionPreview:
+        """Return what a revision does, and what follows."""
+        plan, loaded = prepared.plan, prepared.mission
+        approval = await self._starter.approvals.state(loaded.file, loaded.source, loaded.library)
+        possible = not (plan.refusals or has_errors(prepared.findings))
+        return RevisionPreview(
+            run,
+            loaded.file,
+            plan.digest,
+            plan.version,
+            plan.previous,
+            tuple(described(plan.difference)),
+            tuple(
+                RevisionEffect(each.kind.value, each.element, each.token, each.text)
+                for each in plan.effects
+            ),
+            tuple(
+                RevisionRefusal(each.element, each.token, each.text, each.candidates)
+                for each in plan.refusals
+            ),
+            prepared.findings,
+            await self._outlooks.outlook(run, prepared.item) if possible else None,
+            "" if approval.may_start else str(approval),
+        )
+
+    async def refuse(self, run: RunId, prepared: Prepared, plan: str) -> None:
+        """Check that a revision may be carried out.
+
+        Raises:
+            MissionError: the new version is not well, or does not fit the fleet.
+            NotApprovedError: persons must approve it before.
+            OperatorError: it is refused, or its plan is another one than that which was seen.
+        """
+        loaded = prepared.mission
+        if has_errors(prepared.findings):
+            fleet = self._supervisor.fleet.file
+            raise MissionError(f"{loaded.file} cannot run with fleet {fleet}", prepared.findings)
+        await self._starter.approvals.refuse_unapproved(loaded.file, loaded.source, loaded.library)
+        if prepared.plan.refusals:
+            why = "; ".join(each.text for each in prepared.plan.refusals)
+            raise OperatorError(f"{run} is not revised: {why}")
+        if prepared.plan.digest != plan:
+            raise OperatorError(
+                f"{run} is not revised: the run or the file is another one since the plan was "
+                "made: look at the new plan"
+            )
+
+    async def outlook(self, run: RunId, prepared: Prepared) -> IncidentPreview:
+        """Explore whether the mission completes after a revision."""
+        return await self._outlooks.outlook(run, prepared.item)
+
+    def hand_over(self, run: RunId, prepared: Prepared) -> None:
+        """Give a revised run the routes, areas and points of operators that it has not."""
+        runner = self._supervisor.runner(run)
+        for geometry in self._supervisor.geometries_given(prepared.mission):
+            if geometry.name not in runner.run.state.geometries:
+                runner.post(geometry)
+
+
+def described(difference: Difference) -> Sequence[str]:
+    """Return what differs between two versions, as sentences for people."""
+    lines = [f"new: {each.kind} {_name(each)}" for each in difference.added]
+    lines += [f"removed: {each.kind} {_name(each)}" for each in difference.removed]
+    lines += [
+        f"changed: {each.element.kind} {_name(each.element)} ({', '.join(map(_words, each.what))})"
+        for each in difference.changed
+    ]
+    lines += [
+        f"changed: {name!r}, a route, area or point of the file" for name in difference.geometries
+    ]
+    return lines
+
+
+def _name(element: object) -> str:
+    label, id_ = getattr(element, "label", ""), getattr(element, "id", "")
+    return f"{label!r} ({id_})" if label != id_ else str(id_)
+
+
+def _words(field: str) -> str:
+    return field.replace("_", " ")
