@@ -25,6 +25,7 @@ from m2pem.engine.run import MissionRun
 from m2pem.engine.state import BehaviorPhase, RunState, RunStatus, Scope, Token, Wait
 from m2pem.engine.throwing import catcher_of_error
 from m2pem.mission.catalogue import BehaviorState
+from m2pem.mission.version import version_of
 
 Key: TypeAlias = tuple[Any, ...]
 
@@ -92,6 +93,8 @@ class _Explorer:
         run = self._first
         if isinstance(choice, i.Revise):  # its plan is that of the run as it is
             _receive(run, choice, now_us)
+            if version_of(run.state.mission) != choice.version:
+                raise _NotKnownError("the run has gone on since the plan of the revision was made")
         if run.state.status is RunStatus.PAUSED:
             _receive(run, i.ResumeRun(), now_us)
         if isinstance(choice, i.ResolveIncident):
