@@ -2,7 +2,7 @@
 
 import asyncio
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 @click.argument("run_ids", metavar="[RUN]...", nargs=-1, shell_complete=runs_of_journal(ended=True))
 @journal_option
 @click.option("--export", is_flag=True, help="Print these runs as JSON Lines, to keep them apart.")
+@click.option("--versions", is_flag=True, help="List the versions of missions that runs have had.")
 @click.option("--delete", is_flag=True, help="Delete these runs, with their tracks and recordings.")
 @click.option("--force", is_flag=True, help="Delete runs that were interrupted, too.")
 @click.option(
@@ -31,6 +32,7 @@ def runs(
     run_ids: tuple[str, ...],
     journal: str | None,
     export: bool,
+    versions: bool,
     delete: bool,
     force: bool,
     accept_loss: str | None,
@@ -41,8 +43,8 @@ def runs(
     Lists all, or those that are named. A run that an executive drives is never deleted; one that
     was interrupted only with --force: no executive knows then what its vehicles do.
     """
-    if export and delete:
-        raise click.UsageError("--export and --delete do not go together")
+    if export + delete + versions > 1:
+        raise click.UsageError("--export, --versions and --delete do not go together")
     if (export or delete) and not run_ids:
         raise click.UsageError(f"name the runs to {'export' if export else 'delete'}")
     if force and not delete:
@@ -55,6 +57,9 @@ def runs(
         click.echo(
             as_json({"deleted": run_ids}) if output == "json" else f"deleted: {', '.join(run_ids)}"
         )
+        return
+    if versions:
+        _print_versions(asyncio.run(_versions(journal, run_ids)), output)
         return
     found = asyncio.run(_runs(journal, run_ids, accept_loss))
     if output == "json":
@@ -96,6 +101,66 @@ async def _runs(
         if run_ids:
             return [summary(await find_run(journal, run)) for run in run_ids]
         return [summary(line) for line in await journal.runs()]
+
+
+async def _versions(url: str | None, run_ids: tuple[str, ...]) -> "list[dict[str, Any]]":
+    """Return each version of a mission that a run has had, in the order of the runs."""
+    from m2pem.cli.journals import find_run, journal_to_read
+    from m2pem.executive.run_summary import summary
+    from m2pem.mission.version import version_of_files
+
+    found: list[dict[str, Any]] = []
+    async with journal_to_read(url) as journal:
+        lines = [await find_run(journal, run) for run in run_ids] or await journal.runs()
+        for line in lines:
+            if line.gone:
+                continue
+            header = line.header
+            first = version_of_files(header.mission, header.library)
+            had = [(first, header.mission_name, 1, "")]
+            for entry in await journal.revisions(line.run):
+                item = entry.revision
+                if item is not None:
+                    had.append((item.version, item.mission_name, entry.seq, item.by))
+            for number, (version, mission, seq, by) in enumerate(had, 1):
+                found.append(
+                    {
+                        "run": line.run,
+                        "status": summary(line).status.value,
+                        "version": version,
+                        "mission": mission,
+                        "seq": seq,
+                        "by": by,
+                        "is_last": number == len(had),
+                    }
+                )
+    return found
+
+
+def _print_versions(found: "list[dict[str, Any]]", output: str) -> None:
+    if output == "json":
+        click.echo(as_json(found))
+        return
+    from m2pem.cli.table import table
+    from m2pem.mission.version import SHORT
+
+    if not found:
+        click.echo("no runs yet")
+        return
+    header = ("RUN", "STATUS", "VERSION", "", "FROM RECORD", "BY", "MISSION")
+    rows = [
+        (
+            each["run"],
+            each["status"],
+            each["version"][:SHORT],
+            "last" if each["is_last"] else "",
+            str(each["seq"]),
+            each["by"],
+            each["mission"],
+        )
+        for each in found
+    ]
+    click.echo(table(header, rows))
 
 
 async def _export(url: str | None, run_ids: tuple[str, ...]) -> None:

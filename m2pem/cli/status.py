@@ -14,6 +14,7 @@ from m2pem.journal.base import RunInfo
 from m2pem.journal.mission import fleet_of, mission_of
 from m2pem.mission.mission import Mission
 from m2pem.mission.values import Value
+from m2pem.mission.version import SHORT, version_of
 
 
 def run_of(line: RunInfo) -> MissionRun:
@@ -59,6 +60,7 @@ class RunStatusView:
             "run": state.run,
             "status": self._summary.status.value,
             "detail": state.detail,
+            "version": version_of(state.mission),
             "tokens": [
                 {
                     "token": token.id,
@@ -110,6 +112,9 @@ class RunStatusView:
         state = self._run.state
         detail = f": {state.detail}" if state.detail else ""
         parts = [f"\n{state.run} is {self._summary.status.value}{detail}"]
+        if state.mission is not self._run.begun_with:
+            version = version_of(state.mission)[:SHORT]
+            parts.append(f"its mission is version {version} of {state.mission.file}, by a revision")
         if state.tokens:
             rows = [
                 (str(token.id), token.scope.container.process.id, token.node.label)

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Protocol
 from uuid import UUID
 
-from m2pem.engine.inputs import Input
-from m2pem.engine.records import Record, RunOutcome
+from m2pem.engine.inputs import Input, Revise
+from m2pem.engine.records import MissionRevised, Record, RunOutcome
 from m2pem.fleet.approval import Approval, Edit
 from m2pem.journal.fleet_server import FleetServer
 from m2pem.mission.library import Source
@@ -60,6 +60,14 @@ class Entry:
     t_us: int
     input: Input
     records: tuple[Record, ...]
+
+    @property
+    def revision(self) -> Revise | None:
+        """The revision of the mission that its input is; None: it is none, or was refused."""
+        if not isinstance(self.input, Revise):
+            return None
+        done = any(isinstance(record, MissionRevised) for record in self.records)
+        return self.input if done else None
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from typing import Any
 
 import msgspec
 
-from m2pem.journal.base import Journal, RunInfo
+from m2pem.journal.base import Entry, Journal, RunInfo
 from m2pem.journal.codec import record_line
 
 VERSION = 1
@@ -21,7 +21,8 @@ async def exported_lines(journal: Journal, line: RunInfo) -> AsyncIterator[bytes
     Raises:
         JournalError: an entry is damaged or missing.
     """
-    yield msgspec.json.encode(_head(journal, line))
+    revisions = [_revision(entry) for entry in await journal.revisions(line.run) if entry.revision]
+    yield msgspec.json.encode({**_head(journal, line), "revisions": revisions})
     async for entry in journal.read(line.run):
         for seq, record in enumerate(entry.records, entry.seq):
             yield record_line(line.run, seq, entry.t_us, record)
@@ -46,6 +47,18 @@ def _head(journal: Journal, line: RunInfo) -> dict[str, Any]:
         "mission": _file(header.mission_name, header.mission),
         "files": [_file(source.name, source.data) for source in header.library],
         "fleet": _fleet(header.fleet),
+    }
+
+
+def _revision(entry: Entry) -> dict[str, Any]:
+    item = entry.revision
+    assert item is not None
+    return {
+        "seq": entry.seq,
+        "version": item.version,
+        "by": item.by,
+        "mission": _file(item.mission_name, item.mission),
+        "files": [_file(source.name, source.data) for source in item.library],
     }
 
 

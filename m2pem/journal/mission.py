@@ -7,12 +7,10 @@ It is apart from the rest of the journal, which needs no parser of BPMN.
 from dataclasses import replace
 
 from m2pem.bpmn import parse_mission
-from m2pem.engine.inputs import Revise
-from m2pem.engine.records import MissionRevised
 from m2pem.engine.run import mission_of_revision
 from m2pem.errors import JournalError
 from m2pem.fleet.fleet import Fleet, restore, simulated_fleet
-from m2pem.journal.base import Entry, Journal, RunHeader, RunInfo
+from m2pem.journal.base import Journal, RunHeader, RunInfo
 from m2pem.mission.library import KeptLibrary
 from m2pem.mission.mission import Mission
 
@@ -37,17 +35,9 @@ async def present_mission_of(journal: Journal, line: RunInfo) -> Mission:
         MissionError: no executable mission can be read any more.
         JournalError: the run is not in the journal, or a revision of it is damaged.
     """
-    revised = [entry for entry in await journal.revisions(line.run) if is_revision(entry)]
-    if not revised:
-        return mission_of(line.header)
-    item = revised[-1].input
-    assert isinstance(item, Revise)
-    return mission_of_revision(item)
-
-
-def is_revision(entry: Entry) -> bool:
-    """Whether the mission of a run was revised by the input of an entry, which else was refused."""
-    return any(isinstance(record, MissionRevised) for record in entry.records)
+    revisions = [entry.revision for entry in await journal.revisions(line.run)]
+    last = next(filter(None, reversed(revisions)), None)
+    return mission_of(line.header) if last is None else mission_of_revision(last)
 
 
 def fleet_of(header: RunHeader) -> Fleet:

@@ -20,7 +20,8 @@ def complete(m2pem: CommandLine, words: str) -> str:
 
 
 def test_commands_and_options_are_completed(m2pem: CommandLine) -> None:
-    assert complete(m2pem, "m2pem re").split() == ["plain,replay", "plain,resume", "plain,resolve"]
+    found = complete(m2pem, "m2pem re").split()
+    assert found == ["plain,replay", "plain,resume", "plain,resolve", "plain,revise"]
     assert "plain,--answers" in complete(m2pem, "m2pem run --a")
 
 

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from m2pem import load_mission
+from m2pem.mission.version import version_of_files
 from tests.cli.conftest import Invoke
 from tests.command_line import ANSWERS, MISSION, CommandLine
 from tests.executive.conftest import flow, mission
@@ -49,6 +51,7 @@ def test_the_state_alone(invoke: Invoke, journal: Path, printed: str) -> None:
         "run": "r1",
         "status": "terminated",
         "detail": "terminated by mission ended",
+        "version": version_of_files(MISSION.read_bytes(), load_mission(MISSION).library),
         "tokens": [],
         "behaviors": [],
         "waiting": [],

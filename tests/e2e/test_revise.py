@@ -4,6 +4,7 @@ import itertools
 import json
 from pathlib import Path
 
+from m2pem.mission.version import version_of_files
 from tests.command_line import CommandLine
 
 _FLEET = """
@@ -73,10 +74,19 @@ def test_a_route_that_is_driven_is_changed_and_a_task_is_added(
     status, _, errors = m2pem.run("revise", "r1", short, "--yes", "--by", "anna@here")
     assert (status, errors.startswith("r1 goes on with version ")) == (0, True)
     program.until_record("MissionRevised", by="anna@here")
+    first, last = json.loads(m2pem.run("runs", "r1", "--versions", "--format", "json")[1])
+    assert (first["seq"], first["mission"], first["is_last"]) == (1, str(long), False)
+    assert (last["by"], last["mission"], last["is_last"]) == ("anna@here", str(short), True)
+    assert last["version"] == version_of_files(short.read_bytes(), ())
+    assert last["version"][:12] in m2pem.run("runs", "--versions")[1]
     program.until_record("TokenEntered", element="Stop")
     program.until_record("RunEnded", outcome="completed")
     status, replayed, _ = m2pem.run("replay", "r1", "--verify")
     assert status == 0, replayed
+    assert f"version {last['version'][:12]} of {short}" in m2pem.run("replay", "r1")[1]
+    exported = json.loads(m2pem.run("runs", "--export", "r1")[1].splitlines()[0])
+    (revision,) = exported["revisions"]
+    assert revision["mission"]["text"] == short.read_text("utf-8")
 
 
 def test_a_branch_with_a_token_is_refused_and_the_token_is_named(
