@@ -2,7 +2,7 @@
 
 import logging
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +43,8 @@ class Order(msgspec.Struct):
     strict: bool
     timers_in_order: bool
     limits: SearchLimits
+    assume: list[str]
+    all_pools: bool
 
 
 async def verify_in_subprocess(
@@ -55,6 +57,8 @@ async def verify_in_subprocess(
     spec: str | None,
     strict: bool,
     timers_in_order: bool,
+    assume: Sequence[str],
+    all_pools: bool,
     limits: SearchLimits,
     on_progress: Callable[[SearchProgress], None] | None,
 ) -> dict[str, Any]:
@@ -69,6 +73,8 @@ async def verify_in_subprocess(
         strict,
         timers_in_order,
         limits,
+        list(assume),
+        all_pools,
     )
 
     def report_progress(content: bytes) -> None:
@@ -125,6 +131,8 @@ def _work(content: bytes, send: SendProgress) -> bytes:
         order.data,
         order.spec,
         timers_in_order=order.timers_in_order,
+        assume=order.assume,
+        all_pools=order.all_pools,
     )
     limits = Limits(
         states=order.limits.states,

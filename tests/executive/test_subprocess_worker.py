@@ -88,9 +88,12 @@ def test_a_specification_timers_strictness_and_limits_are_handed_on() -> None:
     async def story(control: Control) -> Any:
         violated = await control.verify(VIGNETTE, spec=spec, strict=True, timers_in_order=True)
         cut = await control.verify(VIGNETTE, limits=SearchLimits(seconds=1e-9))
-        return violated, cut
+        sure = await control.verify(VIGNETTE, assume=["no-failures"], all_pools=True)
+        return violated, cut, sure
 
-    violated, cut = with_control(story)
+    violated, cut, sure = with_control(story)
+    jsonschema.validate(sure, SCHEMA)
+    assert (sure["assumed"], sure["verdict"]) == ("no-failures", "holds")
     assert violated["verdict"] == "violated" and violated["strict"]
     assert "never" in [each["property"] for each in violated["violations"]]
     assert any("in the order of their times" in note for note in violated["coverage"]["notes"])

@@ -65,14 +65,17 @@ class AuthoringControl(Protocol):
         spec: str | None = None,
         strict: bool = False,
         timers_in_order: bool = False,
+        assume: Sequence[str] = (),
+        all_pools: bool = False,
         limits: SearchLimits = DEFAULT_LIMITS,
         on_progress: Callable[[SearchProgress], None] | None = None,
     ) -> Mapping[str, Any]:
         """Verify a mission with this fleet, as `m2pem verify --format json` does.
 
-        `spec`: the text of a file of requirements. `timers_in_order`: `--timers in-order`. It takes
-        a processor for up to `limits.seconds`, and is done in a process of its own; cancelling ends
-        that. The answer has the shape of docs/verification.schema.json.
+        `spec`: the text of a file of requirements. `timers_in_order`: `--timers in-order`.
+        `assume`: each as one `--assume`; `all_pools`: `--all-pools`. It takes a processor for up to
+        `limits.seconds`, and is done in a process of its own; cancelling ends that. The answer has
+        the shape of docs/verification.schema.json.
 
         Raises:
             FindingsError: the mission or the requirements cannot be used.

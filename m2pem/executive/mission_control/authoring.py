@@ -63,6 +63,8 @@ class AuthoringOperations(ControlParts):
         spec: str | None = None,
         strict: bool = False,
         timers_in_order: bool = False,
+        assume: Sequence[str] = (),
+        all_pools: bool = False,
         limits: SearchLimits = DEFAULT_LIMITS,
         on_progress: Callable[[SearchProgress], None] | None = None,
     ) -> Mapping[str, Any]:
@@ -77,6 +79,8 @@ class AuthoringOperations(ControlParts):
             spec=spec,
             strict=strict,
             timers_in_order=timers_in_order,
+            assume=assume,
+            all_pools=all_pools,
             limits=limits,
             on_progress=on_progress,
         )

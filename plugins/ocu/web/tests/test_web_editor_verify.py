@@ -144,6 +144,46 @@ async def test_requirements_are_written_verified_undone_and_kept(desk: Desk) -> 
     ]
 
 
+async def test_what_is_assumed_is_said_with_the_answers_and_kept(desk: Desk) -> None:
+    page = await desk.edit(tab="Verify")
+    await page.get_by_text("Options", exact=True).click()
+    of_all = page.get_by_role("group").get_by_role("textbox", name="Assumed")
+    await of_all.fill("no-failure")
+    await of_all.blur()
+    await verify(page)
+    said = "'no-failure' is no assumption; did you mean 'no-failures'?"
+    await expect(page.locator("#m2v-assume-error")).to_have_text(said)
+    await of_all.fill("no-failures")
+    await of_all.blur()
+    await verify(page)
+    report = page.get_by_role("region", name="Report")
+    await report.get_by_text("What this assumes").click()
+    await expect(report).to_contain_text("As you say: no-failures.")
+    await report.locator("summary", has_text="hold").last.click()
+    await expect(report).to_contain_text("if no behavior fails; without that: warning, by a run")
+    await of_all.fill("")
+    await of_all.blur()
+
+    parts = page.get_by_role("region", name="Requirements of this mission")
+    await parts.get_by_label("Pattern").select_option("")
+    await parts.get_by_role("button", name="Add", exact=True).click()
+    await parts.get_by_role("textbox", name="Formula", exact=True).fill("[] !ended(failed)")
+    await parts.get_by_role("textbox", name="Assumed").fill("no-failures")
+    await parts.get_by_role("textbox", name="Assumed").blur()
+    await verify(page)
+    condition = "if no behavior fails; without that: violated, by a run in which"
+    await expect(parts.locator(".m2v-condition")).to_contain_text(condition)
+    await report.get_by_role("button", name="Show the run without the assumption").first.click()
+    walk = page.get_by_role("region", name="A run that breaks it")
+    await expect(walk.locator('[aria-current="step"]')).to_contain_text("fails with FAILED")
+    await expect(walk).to_contain_text("one of those without the assumption (no-failures)")
+
+    await page.get_by_role("button", name="Save").click()
+    await expect(page.get_by_role("toolbar", name="Editor")).to_contain_text("Saved")
+    kept = ElementTree.parse(desk.executive.missions / f"{MISSION}.bpmn")
+    assert [each.get("assume") for each in kept.iter(REQUIREMENT)] == ["no-failures"]
+
+
 @pytest.mark.long
 async def test_a_pattern_gets_its_arguments_from_pickers(desk: Desk) -> None:
     page = await desk.edit(tab="Verify")

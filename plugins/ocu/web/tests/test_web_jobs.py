@@ -46,6 +46,18 @@ async def test_a_verification_gives_the_report_of_the_command_line(tmp_path: Pat
         assert (await rest.until_over(place))["report"]["verdict"] == "violated"
 
 
+async def test_a_verification_assumes_what_it_is_asked_to(tmp_path: Path) -> None:
+    async with rest_world(tmp_path) as rest:
+        asked = {"xml": VIGNETTE, "assume": ["no-failures"], "all_pools": True}
+        job = await rest.until_over(await ordered(rest, "/verifications", asked))
+        jsonschema.validate(job["report"], SCHEMA)
+        assert job["report"]["assumed"] == "no-failures"
+        wrong = {"xml": VIGNETTE, "assume": ["reliable(nothing)"]}
+        job = await rest.until_over(await ordered(rest, "/verifications", wrong))
+        assert job["state"] == "failed"
+        assert "no vehicle, payload or team 'nothing'" in job["findings"][0]["message"]
+
+
 async def test_a_verification_that_cannot_be_made_says_why(tmp_path: Path) -> None:
     async with rest_world(tmp_path) as rest:
         place = await ordered(rest, "/verifications", {"xml": VIGNETTE, "spec": "zzz: 1"})

@@ -17,18 +17,23 @@ from m2pem_plugin_web.rest.models import FindingModel, finding_models
 LONGEST_S = 3600.0
 MOST_STATES = 10_000_000
 LONGEST_SPEC = 1_000_000
+MOST_ASSUMPTIONS = 20
+Assumption = Annotated[str, Field(max_length=1_000)]
 
 Report = Mapping[str, Any]
 
 
 class VerifyModel(DraftModel):
     """What to prove. `spec`: the text of a file of requirements. `timers`: whether those that begin
-    together come in any order, or in that of their times. `exhaustive`: a large search goes on
-    after a violation."""
+    together come in any order, or in that of their times. `assume`: what all runs are taken to do,
+    such as `no-failures`. `all_pools`: whether all pools of a collaboration begin together.
+    `exhaustive`: a large search goes on after a violation."""
 
     spec: Annotated[str, Field(max_length=LONGEST_SPEC)] | None = None
     strict: bool = False
     timers: Literal["any", "in-order"] = "any"
+    assume: Annotated[list[Assumption], Field(max_length=MOST_ASSUMPTIONS, default_factory=list)]
+    all_pools: bool = False
     seconds: Annotated[float, Field(gt=0, le=LONGEST_S, strict=False)] = 600.0
     states: Annotated[int, Field(ge=1, le=MOST_STATES)] = 2_000_000
     exhaustive: bool = False
@@ -85,6 +90,8 @@ def router(control: MissionControl, folder: MissionFolder, jobs: Jobs[Report]) -
                     spec=wanted.spec,
                     strict=wanted.strict,
                     timers_in_order=wanted.timers == "in-order",
+                    assume=wanted.assume,
+                    all_pools=wanted.all_pools,
                     limits=SearchLimits(wanted.states, wanted.seconds, wanted.exhaustive),
                     on_progress=progressed,
                 )

@@ -7,6 +7,12 @@ export const verify = {
   cancel: "Cancel",
   notAllowed: "Viewers cannot verify.",
   options: "Options",
+  assume: "Assumed",
+  assumeHint:
+    "What all runs are taken to do, with commas between: no-failures; failures <= 2; reliable(uav1); operators-answer; messages-within 30 s. Each answer is also given without that.",
+  assumeExample: "no-failures, operators-answer",
+  allPools: "All pools",
+  allPoolsHint: "All pools of a collaboration begin together, not only one process",
   inOrder: "Timers in order",
   inOrderHint: "Timers that begin to run together come in the order of their times",
   strict: "Strict",
@@ -28,6 +34,7 @@ export const verify = {
   assumed: {
     title: "What this assumes",
     but: "But there are warnings ({properties}): a run in which that happens may fail, and so may its rehearsal.",
+    given: "As you say: {assumed}. Beside each answer is what it is without that, where it is another one.",
     behaviors: "Each behavior, detector and service that begins succeeds or fails some time, also one that goes on until it is interrupted.",
     failures: "A failure that nothing catches ends the run. That is a warning here (failures-handled); with Strict it is a violation.",
     answers: "Operators give any of the answers, at any time.",
@@ -51,6 +58,7 @@ export const verify = {
   moment: "a moment",
   stopped: "The search ended early: {reason}",
   showRun: "Show the run: {count} steps",
+  showRunWithout: "Show the run without the assumption: {count} steps",
   showPlace: "Show where",
   unreached: "Never reached",
   unreachedHint: "No run gets there. Hatched on the diagram.",
@@ -64,6 +72,7 @@ export const verify = {
   walk: {
     label: "A run that breaks it",
     back: "All answers",
+    without: "This run is one of those without the assumption ({assumed}).",
     stepper: "Steps of the run",
     steps: "The run",
     loop: "Then this, again and again",
@@ -118,4 +127,5 @@ export const requirements = {
   fairHint: "In a fair run, what is possible again and again happens again and again.",
   fairUsual: "As usual: {fair}",
   fairs: { true: "fair runs only", false: "all runs" },
+  assumeHint: "Only runs count in which that is so. The answer is also given without it.",
 } as const;

@@ -32,7 +32,8 @@ async function put(process: ModdleElement, requirements: Requirement[]) {
 }
 
 const BOTH = `<m2pem:requirement id="asked" ltl="[] !active(Drive)" fair="true"/>
-  <m2pem:requirement id="both" pattern="visit" text="both fields" tool:note="n">
+  <m2pem:requirement id="both" pattern="visit" text="both fields" tool:note="n"
+    assume="no-failures, operators-answer">
     <m2pem:arg name="locations" value="North"/><m2pem:arg name="locations" value="South"/>
   </m2pem:requirement>`;
 
@@ -40,7 +41,15 @@ describe("requirements", () => {
   it("are formulas, or patterns with arguments", async () => {
     const { process } = await read(BOTH);
     expect(requirementsOf(process)).toEqual([
-      { id: "asked", text: "", ltl: "[] !active(Drive)", pattern: "", args: {}, fair: "true" },
+      {
+        id: "asked",
+        text: "",
+        ltl: "[] !active(Drive)",
+        pattern: "",
+        args: {},
+        fair: "true",
+        assume: "",
+      },
       {
         id: "both",
         text: "both fields",
@@ -48,6 +57,7 @@ describe("requirements", () => {
         pattern: "visit",
         args: { locations: ["North", "South"] },
         fair: "",
+        assume: "no-failures, operators-answer",
       },
     ]);
   });
@@ -60,6 +70,8 @@ describe("requirements", () => {
     expect(xml).toContain('text="each field"');
     expect(xml).toContain('tool:note="n"');
     expect(xml).toContain('fair="true"');
+    expect(xml).toContain('assume="no-failures, operators-answer"');
+    expect(xml).not.toContain('assume=""');
     expect(xml).not.toContain('ltl=""');
     expect(requirementsOf(process).map(({ id }) => id)).toEqual(["both", "asked"]);
   });

@@ -14,6 +14,8 @@ export interface Requirement {
   pattern: string;
   args: Readonly<Record<string, readonly string[]>>;
   fair: "" | "true" | "false";
+  /** What is assumed, such as "no-failures"; "": nothing. */
+  assume: string;
 }
 
 export function requirementsOf(process: ModdleElement): Requirement[] {
@@ -67,6 +69,7 @@ function read(element: ModdleElement): Requirement {
     pattern: text(element, "pattern"),
     args,
     fair: fair === "true" || fair === "false" ? fair : "",
+    assume: text(element, "assume"),
   };
 }
 
@@ -83,6 +86,7 @@ function write(factory: Factory, requirement: Requirement, before?: ModdleElemen
       ltl: requirement.ltl ?? undefined,
       pattern: requirement.ltl === null ? requirement.pattern : undefined,
       fair: requirement.fair || undefined,
+      assume: requirement.assume || undefined,
       args: args.length ? args : undefined,
     },
     before,

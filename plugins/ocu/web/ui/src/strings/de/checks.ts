@@ -9,6 +9,12 @@ export const verify: Translation<typeof english.verify> = {
   cancel: "Abbrechen",
   notAllowed: "Beobachter können nicht verifizieren.",
   options: "Optionen",
+  assume: "Angenommen",
+  assumeHint:
+    "Was in allen Läufen so sein soll, mit Kommas dazwischen: no-failures; failures <= 2; reliable(uav1); operators-answer; messages-within 30 s. Jede Antwort wird auch ohne das gegeben.",
+  assumeExample: "no-failures, operators-answer",
+  allPools: "Alle Pools",
+  allPoolsHint: "Alle Pools einer Kollaboration beginnen gemeinsam, nicht nur ein Prozess",
   inOrder: "Timer der Reihe nach",
   inOrderHint: "Timer, die gemeinsam zu laufen beginnen, feuern in der Reihenfolge ihrer Zeiten",
   strict: "Streng",
@@ -32,6 +38,8 @@ export const verify: Translation<typeof english.verify> = {
   assumed: {
     title: "Was dabei angenommen wird",
     but: "Es gibt aber Warnungen ({properties}): Ein Lauf, in dem das geschieht, kann fehlschlagen, und sein Probelauf auch.",
+    given:
+      "Wie Sie sagen: {assumed}. Bei jeder Antwort steht, wie sie ohne das lautet, wo sie anders ist.",
     behaviors:
       "Jedes Verhalten, jeder Detektor und jeder Dienst, der beginnt, gelingt oder scheitert irgendwann, auch eines, das bis zur Unterbrechung weitergeht.",
     failures:
@@ -64,6 +72,7 @@ export const verify: Translation<typeof english.verify> = {
   moment: "einem Augenblick",
   stopped: "Die Suche endete vorzeitig: {reason}",
   showRun: "Den Lauf zeigen: {count} Schritte",
+  showRunWithout: "Den Lauf ohne die Annahme zeigen: {count} Schritte",
   showPlace: "Stelle zeigen",
   unreached: "Nie erreicht",
   unreachedHint: "Kein Lauf kommt dorthin. Im Diagramm schraffiert.",
@@ -77,6 +86,7 @@ export const verify: Translation<typeof english.verify> = {
   walk: {
     label: "Ein Lauf, der sie verletzt",
     back: "Alle Ergebnisse",
+    without: "Diesen Lauf gibt es ohne die Annahme ({assumed}).",
     stepper: "Schritte des Laufs",
     steps: "Der Lauf",
     loop: "Danach dies, immer wieder",
@@ -133,4 +143,5 @@ export const requirements: Translation<typeof english.requirements> = {
   fairHint: "In einem fairen Lauf geschieht immer wieder, was immer wieder möglich ist.",
   fairUsual: "Wie üblich: {fair}",
   fairs: { true: "nur faire Läufe", false: "alle Läufe" },
+  assumeHint: "Es zählen nur Läufe, in denen das so ist. Die Antwort wird auch ohne das gegeben.",
 };

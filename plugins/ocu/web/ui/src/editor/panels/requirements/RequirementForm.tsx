@@ -91,6 +91,15 @@ export function RequirementForm(props: RequirementFormProps) {
         ]}
         write={(fair) => write({ ...requirement, fair: fair as Requirement["fair"] })}
       />
+      <TextField
+        id={`${prefix}-assume`}
+        label={strings.verify.assume}
+        hint={words.assumeHint}
+        mono
+        placeholder={strings.verify.assumeExample}
+        value={requirement.assume}
+        write={(assume) => write({ ...requirement, assume: assume.trim() })}
+      />
     </div>
   );
 }

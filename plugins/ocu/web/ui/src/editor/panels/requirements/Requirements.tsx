@@ -126,9 +126,10 @@ function Line({ one, isOpen, isWrong, answers, strict, toggle, remove }: LinePro
             </span>
           )}
           <span class="m2v-said">{text || (ltl ?? spaced(pattern)) || words.empty}</span>
-          {answers.map(({ property, says }) => (
+          {answers.map(({ property, says, condition }) => (
             <span key={property} class="m2v-english">
               {says}
+              {condition && <span class="m2v-condition">{condition}</span>}
             </span>
           ))}
         </span>

@@ -41,7 +41,8 @@ export function add(editor: EditorContext, pattern: string): string | undefined 
   if (!process) return undefined;
   const taken = placed(editor).map(({ requirement }) => requirement.id);
   const id = freeId((pattern || "formula").replaceAll("_", "-"), taken);
-  const made = ofPattern({ id, text: "", ltl: pattern ? null : "", pattern, args: {}, fair: "" });
+  const ltl = pattern ? null : "";
+  const made = ofPattern({ id, text: "", ltl, pattern, args: {}, fair: "", assume: "" });
   write(editor, process, [...requirementsOf(process), made]);
   return id;
 }

@@ -110,6 +110,8 @@ function AnswerList({ title, told, verification }: AnswerListProps) {
 
 function AnswerLine({ told, verification }: { told: Told; verification: Verification }) {
   const { answer, outcome, violations } = told;
+  // Where it is violated in either case, one run is enough.
+  const without = outcome === "holds" ? answer.without?.violation : undefined;
   const line = useRef<HTMLLIElement>(null);
   const isPointed = verification.pointed.value === answer.property;
   useEffect(() => {
@@ -125,7 +127,16 @@ function AnswerLine({ told, verification }: { told: Told; verification: Verifica
         </p>
         {answer.author && <p class="m2v-author">“{answer.author}”</p>}
         <p>{answer.says}</p>
+        {answer.condition && <p class="m2v-condition">{answer.condition}</p>}
         {answer.note && <p class="m2v-faint">{answer.note}</p>}
+        {without && (
+          <button type="button" class="m2v-violation" onClick={() => verification.open(without)}>
+            <span>{without.text}</span>
+            <span class="m2v-show">
+              {fill(words.showRunWithout, { count: without.steps.length + without.loop.length })}
+            </span>
+          </button>
+        )}
         {violations.map((violation, index) => (
           <button
             key={index}

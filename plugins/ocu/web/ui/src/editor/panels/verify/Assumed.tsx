@@ -20,6 +20,7 @@ export function Assumed({ report, inOrder }: { report: Report; inOrder: boolean 
       <details class="m2v-assumed-part">
         <summary>{words.title}</summary>
         <ul class="m2v-assumed">
+          {report.assumed && <li>{fill(words.given, { assumed: report.assumed })}</li>}
           <li>{words.behaviors}</li>
           <li>{words.failures}</li>
           <li>{words.answers}</li>

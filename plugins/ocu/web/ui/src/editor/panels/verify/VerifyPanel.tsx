@@ -59,7 +59,7 @@ interface PartProps {
 }
 
 function Ask({ editor, verification }: PartProps) {
-  const { job, strict, inOrder, exhaustive, spec } = verification;
+  const { job, strict, inOrder, exhaustive, spec, assume, allPools } = verification;
   const busy = job.isBusy.value;
   const allowed = may("operator");
   const ready = beginningOf(editor).isReadable();
@@ -87,6 +87,27 @@ function Ask({ editor, verification }: PartProps) {
       <details class="m2v-options">
         <summary>{words.options}</summary>
         <BeginForm editor={editor} prefix="m2v" />
+        <TextField
+          id="m2v-assume"
+          label={words.assume}
+          hint={words.assumeHint}
+          mono
+          placeholder={words.assumeExample}
+          value={assume.value}
+          error={wrongAssumption(verification)}
+          write={(value) => {
+            assume.value = value;
+          }}
+        />
+        <CheckField
+          id="m2v-all-pools"
+          label={words.allPools}
+          hint={words.allPoolsHint}
+          value={allPools.value}
+          write={(value) => {
+            allPools.value = value;
+          }}
+        />
         <CheckField
           id="m2v-in-order"
           label={words.inOrder}
@@ -132,6 +153,13 @@ function Ask({ editor, verification }: PartProps) {
 }
 
 const ORDER: readonly Outcome[] = ["violated", "warning", "undecided", "holds"];
+/** What is wrong with the assumption of the whole check, as it was sent. */
+function wrongAssumption({ job }: Verification): string | undefined {
+  const findings = job.refusal.value?.findings ?? [];
+  const wrong = findings.filter(({ rule, element }) => rule === "assumption" && element === "");
+  return wrong.map(({ message, remedy }) => `${message}; ${remedy}`).join("\n") || undefined;
+}
+
 const NUMBER = new Intl.NumberFormat(locale);
 
 /** How far the search is, or why there is no report. */

@@ -90,7 +90,11 @@ function Head({ verification, violation }: Omit<ViolationViewProps, "editor">) {
   const answer: Answer | undefined = report?.properties.find(
     (each) => each.property === violation.property && each.required === violation.required,
   );
-  const outcome = answer && report ? outcomeOf(answer, report.strict) : "violated";
+  const isWithout = answer?.without?.violation === violation;
+  const outcome =
+    answer && report
+      ? outcomeOf(isWithout ? { ...answer, verdict: "violated" } : answer, report.strict)
+      : "violated";
   return (
     <>
       <h2>
@@ -99,6 +103,7 @@ function Head({ verification, violation }: Omit<ViolationViewProps, "editor">) {
       </h2>
       {answer?.author && <p class="m2v-author">“{answer.author}”</p>}
       {answer && <p>{answer.says}</p>}
+      {isWithout && <p>{fill(words.without, { assumed: answer.assumed })}</p>}
       <p class={outcome === "warning" ? "m2v-wrong m2v-wrong-warning" : "m2v-wrong"}>
         {violation.text}
       </p>

@@ -39,6 +39,11 @@ export interface Answer {
   note: string;
   required: boolean;
   author: string;
+  /** What the verdict assumes; "": nothing. */
+  assumed: string;
+  /** The same with the answer where nothing is assumed, for people; "": nothing to say. */
+  condition: string;
+  without: { verdict: Verdict; note: string; violation: Violation | null } | null;
 }
 
 export interface Report {
@@ -47,6 +52,8 @@ export interface Report {
   data: Record<string, unknown>;
   verdict: Verdict;
   strict: boolean;
+  /** What the whole check assumes. */
+  assumed: string;
   coverage: {
     states: number;
     transitions: number;

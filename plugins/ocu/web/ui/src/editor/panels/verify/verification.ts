@@ -32,6 +32,9 @@ export class Verification {
   readonly exhaustive = signal(false);
   /** More requirements, as the text of a YAML file. */
   readonly spec = signal("");
+  /** What all runs are taken to do, such as "no-failures". */
+  readonly assume = signal("");
+  readonly allPools = signal(false);
   readonly job = new Job<VerificationTold>("/verifications");
   readonly made = signal<Made | null>(null);
   readonly isStale = signal(false);
@@ -54,6 +57,8 @@ export class Verification {
         strict: this.strict.value,
         ...(this.exhaustive.value ? { exhaustive: true } : {}),
         ...(this.inOrder.value ? { timers: "in-order" } : {}),
+        ...(this.assume.value.trim() ? { assume: [this.assume.value] } : {}),
+        ...(this.allPools.value ? { all_pools: true } : {}),
       };
     });
     if (told?.state !== "done" || !told.report) return;

@@ -112,6 +112,9 @@ describe("a report", () => {
     note: "",
     required: false,
     author: "",
+    assumed: "",
+    condition: "",
+    without: null,
     ...more,
   });
   const report = {
