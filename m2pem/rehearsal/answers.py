@@ -29,6 +29,7 @@ from m2pem.engine.records import (
 )
 from m2pem.errors import OperatorError
 from m2pem.findings import Finding
+from m2pem.fleet.fleet import Fleet
 from m2pem.fleet.yaml_source import YamlSource
 from m2pem.mission.mission import Mission
 from m2pem.rehearsal.answers_file import (
@@ -38,6 +39,7 @@ from m2pem.rehearsal.answers_file import (
     ServiceEntry,
     TimedEntry,
     check,
+    check_vehicles,
     read_answers,
 )
 from m2pem.units import US_PER_S
@@ -306,6 +308,10 @@ def load_answers(answers: str | Path | bytes) -> Answers:
     return Answers(*read_answers(answers if isinstance(answers, bytes) else Path(answers)))
 
 
-def check_answers(answers: Answers, mission: Mission) -> list[Finding]:
-    """What in the answers does not fit the mission: elements, decisions, signals, messages."""
-    return check(answers.model, answers.source, mission)
+def check_answers(answers: Answers, mission: Mission, fleet: Fleet | None = None) -> list[Finding]:
+    """What in the answers does not fit the mission: elements, decisions, signals, messages; nor
+    the fleet: vehicles and their settings."""
+    findings = check(answers.model, answers.source, mission)
+    if fleet is not None:
+        findings += check_vehicles(answers.model, answers.source, fleet)
+    return findings

@@ -14,11 +14,14 @@ from pydantic import (
     model_validator,
 )
 
+from m2pem.api.arbiter import Connection
 from m2pem.engine.elements.behaviors import RECOVERY_DECISIONS
 from m2pem.engine.elements.subprocesses import COMPLETE
-from m2pem.errors import AnswersError
+from m2pem.errors import AnswersError, FleetError
 from m2pem.findings import Finding
+from m2pem.fleet.fleet import Fleet
 from m2pem.fleet.yaml_source import YamlSource, note_shape_findings, parse_yaml, read_yaml
+from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.elements import (
     Activity,
     AdHocSubProcess,
@@ -29,6 +32,7 @@ from m2pem.mission.elements import (
     UserTask,
 )
 from m2pem.mission.mission import Mission
+from m2pem.simulation.settings import SETTING_KEYS, read_settings
 from m2pem.suggestions import suggest
 from m2pem.units import Dimension, quantity
 
@@ -70,13 +74,15 @@ class ServiceEntry(_Model):
 class BehaviorEntry(_Model):
     """The end of one behavior that a task commands on simulated vehicles or payloads."""
 
-    after: Seconds
-    end: Literal["succeeded", "failed", "stalled", "lost"]
+    after: Seconds = 0.0
+    end: Literal["succeeded", "failed", "stalled", "lost", "simulated"]
     error: Text | None = None
 
     @model_validator(mode="after")
     def _error_of_a_failure(self) -> Self:
-        if self.error is not None and self.end in ("succeeded", "stalled"):
+        if ("after" in self.model_fields_set) != (self.end != "simulated"):
+            raise ValueError("'after' goes with every end but 'simulated', which comes by itself")
+        if self.error is not None and self.end in ("succeeded", "stalled", "simulated"):
             raise ValueError(f"'error' goes with 'end: failed' or 'end: lost', not {self.end}")
         return self
 
@@ -107,8 +113,16 @@ class TimedEntry(_Model):
     data: dict[Text, Any] = Field(default_factory=dict)
 
 
+class Wind(_Model):
+    """The wind in which simulated aircraft fly; `from` is clockwise from north."""
+
+    speed: Any
+    from_: Any = Field("0 deg", alias="from")
+
+
 class AnswersModel(_Model):
-    """A whole file. Lists are used visit by visit."""
+    """A whole file. Lists are used visit by visit. `vehicles`: settings of simulated vehicles and
+    payloads, in place of those of the fleet."""
 
     answers: dict[Text, list[Text]] = Field(default_factory=dict)
     signals: list[TimedEntry] = Field(default_factory=list)
@@ -116,6 +130,15 @@ class AnswersModel(_Model):
     services: dict[Text, list[ServiceEntry]] = Field(default_factory=dict)
     behaviors: dict[Text, list[BehaviorEntry]] = Field(default_factory=dict)
     incidents: dict[Text, list[IncidentEntry]] = Field(default_factory=dict)
+    vehicles: dict[Text, dict[Text, Any]] = Field(default_factory=dict)
+    wind: Wind | None = None
+
+    def settings_of(self, resource: str) -> dict[str, Any]:
+        """Return the settings of a simulated vehicle or payload that the file changes."""
+        settings = dict(self.vehicles.get(resource, {}))
+        if self.wind is not None:
+            settings = {"wind": self.wind.speed, "wind_from": self.wind.from_, **settings}
+        return settings
 
 
 def read_answers(answers: Path | bytes) -> tuple[AnswersModel, YamlSource]:
@@ -146,6 +169,47 @@ def check(model: AnswersModel, source: YamlSource, mission: Mission) -> list[Fin
     findings.events("signals", model.signals, mission.signals)
     findings.events("messages", model.messages, mission.messages)
     return findings.source.findings
+
+
+def check_vehicles(model: AnswersModel, source: YamlSource, fleet: Fleet) -> list[Finding]:
+    """A finding for each setting of a simulated vehicle that cannot be, and for the wind."""
+    noted = YamlSource(source.file, lines=source.lines)
+    known = [*fleet.vehicles, *fleet.payloads]
+    if model.wind is not None:
+        wind = {"wind": model.wind.speed, "wind_from": model.wind.from_}
+        _check_settings(
+            noted, ("wind",), "air", wind, fleet, {"wind": "speed", "wind_from": "from"}
+        )
+    for name, settings in model.vehicles.items():
+        path = ("vehicles", name)
+        if name not in known:
+            message = f"{fleet.file} has no vehicle or payload '{name}'"
+            noted.error(path, "unknown-resource", message, suggest(name, known, "vehicles"))
+            continue
+        for key in settings:
+            if key not in SETTING_KEYS:
+                message = f"a simulated vehicle has no setting '{key}'"
+                remedy = suggest(key, SETTING_KEYS, "settings")
+                noted.error((*path, key), "unknown-key", message, remedy)
+        _check_settings(noted, path, name, settings, fleet)
+    return noted.findings
+
+
+def _check_settings(
+    noted: YamlSource,
+    path: tuple[str, ...],
+    resource: str,
+    settings: Mapping[str, Any],
+    fleet: Fleet,
+    keys: Mapping[str, str] | None = None,
+) -> None:
+    try:
+        read_settings(Connection(ResourceId(resource), "air", settings), fleet.origin)
+    except FleetError as error:
+        for finding in error.findings:
+            key = finding.element.rpartition(".connection.")[2].partition("[")[0]
+            key = (keys or {}).get(key, key)
+            noted.error((*path, key), "bad-value", finding.message, finding.remedy)
 
 
 class _Check:

@@ -101,7 +101,7 @@ class DebugSession:
         """
         self._rehearser = Rehearser(mission, fleet, plugins, process)
         self._answers = answers or Answers()
-        refuse_misfits(self._answers, mission)
+        refuse_misfits(self._answers, mission, self._rehearser.fleet)
         self.mission = mission
         self._data = data
         self._start_us = start_us
@@ -205,7 +205,7 @@ class DebugSession:
         """
         self._refuse_ended()
         if isinstance(change, AnswersModel):
-            refuse_misfits(Answers(change), self.mission)
+            refuse_misfits(Answers(change), self.mission, self._rehearser.fleet)
         moment = self._rehearsed.moment
         if refusal := self._rehearsed.change(change):
             raise OperatorError(refusal)

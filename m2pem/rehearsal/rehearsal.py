@@ -234,10 +234,15 @@ class Rehearser:
         on_record: OnRecord | None = None,
         observed: bool = True,
         telemetry_every_s: float | None = None,
+        fits: bool = False,
     ) -> RehearsalResult:
-        """Rehearse it once; see the function `rehearse`."""
+        """Rehearse it once; see the function `rehearse`.
+
+        `fits`: it is known that the answers fit the mission and the fleet.
+        """
         script = answers if isinstance(answers, Answers) else _load(answers)
-        refuse_misfits(script, self.mission)
+        if not fits:
+            refuse_misfits(script, self.mission, self.fleet)
         collected: list[StampedRecord] = []
         rehearsal = Rehearsal(
             self,
@@ -268,13 +273,14 @@ def _load(answers: Path | str | bytes | None) -> Answers:
     return Answers() if answers is None else load_answers(answers)
 
 
-def refuse_misfits(answers: Answers, mission: Mission) -> None:
-    """Refuse answers for elements, decisions, signals and messages that a mission does not have.
+def refuse_misfits(answers: Answers, mission: Mission, fleet: Fleet) -> None:
+    """Refuse answers for elements, decisions, signals and messages that a mission does not have, or
+    for vehicles that the fleet does not have.
 
     Raises:
         AnswersError: with every finding.
     """
-    findings = check_answers(answers, mission)
+    findings = check_answers(answers, mission, fleet)
     if has_errors(findings):
         raise AnswersError(f"{answers.source.file} does not fit {mission.file}", findings)
 

@@ -2,11 +2,13 @@
 
 import logging
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, cast
 
 from m2pem.api.arbiter import Arbiter, ArbiterContext, BehaviorRequest, Connection
 from m2pem.api.service import Service, ServiceContext, ServiceError
 from m2pem.findings import Finding
+from m2pem.fleet.fleet import SIMULATED
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.values import Value
 from m2pem.plugins import Plugins
@@ -51,6 +53,11 @@ class ScriptedPlugins:
         def make_scripted(
             connections: Mapping[ResourceId, Connection], context: ArbiterContext
         ) -> Arbiter:
+            if name == SIMULATED:
+                connections = {
+                    resource: _with_settings(each, self._answers.model.settings_of(resource))
+                    for resource, each in connections.items()
+                }
             arbiter = make(connections, context)
             if isinstance(arbiter, SimArbiter):
                 self.simulated.append(arbiter)
@@ -83,6 +90,15 @@ class ScriptedPlugins:
     def real_service(self, name: str) -> Service:
         """The plugins' own service of that name; errors as for the plugins."""
         return self._plugins.service(name)()
+
+
+def _with_settings(connection: Connection, changed: Mapping[str, Any]) -> Connection:
+    if not changed:
+        return connection
+    settings = dict(connection.settings)
+    own = settings.get("sim")
+    settings = {"sim": {**own, **changed}} if isinstance(own, Mapping) else {**settings, **changed}
+    return replace(connection, settings=settings)
 
 
 class ScriptedArbiter:
@@ -125,7 +141,8 @@ class ScriptedArbiter:
         run, number, *part = request.id.split(".", 2)
         scripted = self._answers.behavior(run, f"{run}.{number}")
         # Of a team's behavior each member's own part is scripted, not what it takes over later.
-        if scripted is not None and part in ([], [*request.resources]):
+        own = part in ([], [*request.resources])
+        if scripted is not None and own and scripted[1].end != "simulated":
             element, entry = scripted
             if isinstance(self._arbiter, SimArbiter):
                 error = entry.error or ""

@@ -5,6 +5,7 @@ import json
 import math
 from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from m2pem.api.arbiter import (
@@ -199,6 +200,7 @@ class SimArbiter:
         now_us = self._clock.now_us()
         began_us, known = self._open_files(now_us)
         self._detectors.begin(began_us, lambda payload: known.get(payload, ()))
+        self._plan_link_losses(began_us)
         self._links.muted = True
         self._event_queue.run_due(now_us)
         self._links.muted = False
@@ -356,11 +358,7 @@ class SimArbiter:
 
     def restore_link(self, resource: ResourceId) -> None:
         """Mend the link: what could not be said or commanded meanwhile is now."""
-        now_us = self._catch_up()
-        vehicle = carrier_of(resource)
-        self._links.mend(vehicle, now_us)
-        for body in self._of_vehicle(vehicle):
-            self.broadcast.send(body, now_us)
+        self._restore_link(carrier_of(resource), self._catch_up())
 
     # --- behind it ------------------------------------------------------------------------------
 
@@ -416,6 +414,23 @@ class SimArbiter:
 
     def _lose_link(self, vehicle: ResourceId, now_us: int) -> None:
         self._reach.lose(vehicle, now_us)
+
+    def _plan_link_losses(self, began_us: int) -> None:
+        for resource, settings in self._settings.items():
+            if "/" in resource:
+                continue  # it has its vehicle's settings, and its link
+            for loss in settings.link_lost:
+                at_us = began_us + round(loss.at_s * US_PER_S)
+                lose = partial(self._lose_link, resource)
+                self._event_queue.at(at_us, lose, background=True)
+                if loss.for_s < math.inf:
+                    until_us = at_us + round(loss.for_s * US_PER_S)
+                    self._event_queue.at(until_us, partial(self._restore_link, resource))
+
+    def _restore_link(self, vehicle: ResourceId, now_us: int) -> None:
+        self._links.mend(vehicle, now_us)
+        for body in self._of_vehicle(vehicle):
+            self.broadcast.send(body, now_us)
 
     def _lost_after_s(self, resource: ResourceId) -> float:
         own = self._connections[resource].lost_after_s if resource in self._connections else None

@@ -152,6 +152,18 @@ def _bend(before: Line, after: Line, radius_m: float) -> tuple[Bend | None, floa
     return bend, cut_m
 
 
+class RefusedError(Exception):
+    """The behavior cannot be done; the text says why, `code` is that of the report."""
+
+    def __init__(self, reason: str, code: str = "REJECTED") -> None:
+        self.reason = reason
+        self.code = code
+        super().__init__(reason)
+
+
+SLOWEST_M_S = 0.5
+"""A vehicle that the wind lets go no faster than this does not get there."""
+
 ALOFT_M = 0.5
 """Higher above its ground than this, a flying vehicle is in the air."""
 
@@ -260,7 +272,7 @@ class Course:
     def back_up(self, distance_m: float, speed_m_s: float | None = None) -> Self:
         """Straight back, without turning."""
         kinematics = self._craft.kinematics
-        limit = min(speed_m_s or self._craft.cruise_m_s, kinematics.max_speed_m_s)
+        limit = min(speed_m_s or self._craft.cruise_m_s, self._upwind())
         if distance_m > 0:
             [profile] = chain(
                 [(distance_m, limit)], kinematics.acceleration_m_s2, kinematics.deceleration_m_s2
@@ -288,7 +300,7 @@ class Course:
         accel, decel = kinematics.acceleration_m_s2, kinematics.deceleration_m_s2
         limit = min(
             speed_m_s or self._craft.cruise_m_s,
-            kinematics.max_speed_m_s,
+            self._upwind(),
             radius * kinematics.turn_rate_rad_s,
         )
         self.turn_to(angle + math.pi / 2)
@@ -309,10 +321,24 @@ class Course:
     def _limit(self, piece: Piece, limit: float) -> float:
         kinematics = self._craft.kinematics
         if isinstance(piece, Bend):
-            limit = min(limit, piece.radius_m * kinematics.turn_rate_rad_s)
+            limit = min(limit, piece.radius_m * kinematics.turn_rate_rad_s, self._upwind())
+        elif piece.level_m > 1e-6:
+            east, north = piece.end[0] - piece.start[0], piece.end[1] - piece.start[1]
+            limit = min(limit, self._in_wind(kinematics.ground_speed_m_s(east, north)))
         if piece.climb_m and kinematics.climb_rate_m_s:
             limit = min(limit, kinematics.climb_rate_m_s * piece.length_m / abs(piece.climb_m))
         return limit
+
+    def _upwind(self) -> float:
+        return self._in_wind(self._craft.kinematics.upwind_m_s)
+
+    def _in_wind(self, speed_m_s: float) -> float:
+        if speed_m_s < SLOWEST_M_S:
+            wind_m_s = math.hypot(*self._craft.kinematics.wind_m_s)
+            raise RefusedError(
+                f"{self._craft.name} makes no headway in a wind of {wind_m_s:.1f} m/s", "WIND"
+            )
+        return speed_m_s
 
     def _add(self, piece: Piece, profile: Profile) -> None:
         if isinstance(piece, Line):

@@ -40,9 +40,10 @@ from m2pem.mission.elements import (
 )
 from m2pem.mission.events import TimerEventDefinition
 from m2pem.mission.mission import Mission
+from m2pem.simulation.course import RefusedError
 from m2pem.simulation.frame import FlatFrame
 from m2pem.simulation.gimbals import GAZES
-from m2pem.simulation.local_parameters import LocalParameters, RefusedError
+from m2pem.simulation.local_parameters import LocalParameters
 from m2pem.simulation.manoeuvres import MANOEUVRES
 from m2pem.simulation.segments import Pose
 from m2pem.simulation.settings import read_settings

@@ -11,8 +11,8 @@ from m2pem.api.arbiter import BehaviorId
 from m2pem.api.telemetry import GeoPosition
 from m2pem.geo.polyline import Polyline
 from m2pem.mission.values import Value
-from m2pem.simulation.course import turned
-from m2pem.simulation.local_parameters import LocalParameters, RefusedError
+from m2pem.simulation.course import RefusedError, turned
+from m2pem.simulation.local_parameters import LocalParameters
 from m2pem.simulation.manoeuvres import yaw_of
 from m2pem.simulation.segments import Look, Pose, Slew, Vector
 from m2pem.simulation.settings import Gimbal

@@ -5,18 +5,9 @@ from collections.abc import Callable, Mapping
 from m2pem.api.arbiter import ResolvedValue
 from m2pem.api.behavior_parameters import BehaviorParameters
 from m2pem.mission.geometry import Area, Coordinate, Point, Route, VehiclePosition
-from m2pem.simulation.course import Craft
+from m2pem.simulation.course import Craft, RefusedError
 from m2pem.simulation.frame import FlatFrame
 from m2pem.simulation.segments import Pose, Vector
-
-
-class RefusedError(Exception):
-    """The behavior cannot be done; the text says why, `code` is that of the report."""
-
-    def __init__(self, reason: str, code: str = "REJECTED") -> None:
-        self.reason = reason
-        self.code = code
-        super().__init__(reason)
 
 
 class LocalParameters(BehaviorParameters):

@@ -14,8 +14,8 @@ from m2pem.geo.lawn_mower import lawn_mower, longest_edge_yaw, strip_width_m
 from m2pem.geo.polygon import middle_of
 from m2pem.geo.polyline import Polyline
 from m2pem.geo.survey_tracks import SurveyTracks
-from m2pem.simulation.course import Course, Craft
-from m2pem.simulation.local_parameters import LocalParameters, RefusedError
+from m2pem.simulation.course import Course, Craft, RefusedError
+from m2pem.simulation.local_parameters import LocalParameters
 from m2pem.simulation.pursuit import Pursuit
 from m2pem.simulation.segments import Pose, Vector
 from m2pem.simulation.trajectory import Plan

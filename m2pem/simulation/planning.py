@@ -15,10 +15,11 @@ from m2pem.api.telemetry import GeoPosition, VehicleState
 from m2pem.fleet.behaviors import SHARED
 from m2pem.mission.behavior import BehaviorType
 from m2pem.mission.catalogue import BehaviorSpec, ResourceId
+from m2pem.simulation.course import RefusedError
 from m2pem.simulation.executions import Aim, Body, Chase
 from m2pem.simulation.frame import FlatFrame
 from m2pem.simulation.gimbals import GAZES, MAST_M, Shots
-from m2pem.simulation.local_parameters import LocalParameters, RefusedError
+from m2pem.simulation.local_parameters import LocalParameters
 from m2pem.simulation.manoeuvres import MANOEUVRES, Manoeuvre
 from m2pem.simulation.payloads import SimPayload
 from m2pem.simulation.segments import Pose

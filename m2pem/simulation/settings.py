@@ -37,6 +37,14 @@ class Target:
 
 
 @dataclass(frozen=True, slots=True)
+class LinkLoss:
+    """The link to a vehicle is lost `at_s` after the arbiter connected, for `for_s`."""
+
+    at_s: float
+    for_s: float = math.inf
+
+
+@dataclass(frozen=True, slots=True)
 class Gimbal:
     """Bounds of a payload, in rad, rad/s and s. Zoom 1 has the whole `view_rad`."""
 
@@ -64,6 +72,7 @@ class Settings:
     detections: tuple[PlannedDetection, ...] = ()
     targets: tuple[Target, ...] = ()
     faults: tuple[Fault, ...] = ()
+    link_lost: tuple[LinkLoss, ...] = ()
     telemetry_hz: float | None = None
     state: str = ""
 
@@ -95,6 +104,15 @@ _GIMBAL = {
 _MAY_BE_ZERO = {"turn_radius", "climb_rate", "default_altitude", "tilt_low", "tilt_high", "shutter"}
 
 
+SETTING_KEYS = (
+    *_KINEMATICS,
+    *_GIMBAL,
+    *("home", "heading", "battery", "kind", "range", "detections", "targets", "faults"),
+    *("link_lost", "wind", "wind_from", "telemetry_hz", "state"),
+)
+"""Every setting of a simulated vehicle or payload."""
+
+
 def read_settings(connection: Connection, origin: Origin) -> Settings:
     """Read the settings of one resource; positions must be near the fleet's `origin`.
 
@@ -106,7 +124,10 @@ def read_settings(connection: Connection, origin: Origin) -> Settings:
     said = {"cruise_speed_m_s": connection.cruise_speed_m_s, "endurance_s": connection.endurance_s}
     default = dataclasses.replace(default, **{key: v for key, v in said.items() if v is not None})
     settings = Settings(
-        kinematics=dataclasses.replace(default, **reader.numbers(_KINEMATICS)),
+        kinematics=dataclasses.replace(
+            dataclasses.replace(default, wind_m_s=reader.wind(connection.domain)),
+            **reader.numbers(_KINEMATICS),
+        ),
         gimbal=dataclasses.replace(Gimbal(), **reader.numbers(_GIMBAL)),
         home=reader.position("home"),
         heading_rad=reader.number("heading", Dimension.ANGLE, 0.0),
@@ -116,6 +137,7 @@ def read_settings(connection: Connection, origin: Origin) -> Settings:
         detections=reader.items("detections", _detection),
         targets=reader.items("targets", _target),
         faults=tuple(chain(*reader.items("faults", read_faults, (str, Mapping)))),
+        link_lost=reader.items("link_lost", _link_loss),
         telemetry_hz=reader.rate("telemetry_hz"),
         state=reader.text("state"),
     )
@@ -181,6 +203,16 @@ class _Reader:
         except ValueError as error:
             self.wrong(key, error)
             return default
+
+    def wind(self, domain: str) -> tuple[float, float]:
+        """How the air moves, east and north; only what flies is in it."""
+        speed_m_s = self.number("wind", Dimension.SPEED, 0.0)
+        if speed_m_s < 0:
+            self.wrong("wind", f"{speed_m_s:g} m/s is below 0")
+        from_rad = self.number("wind_from", Dimension.ANGLE, 0.0)
+        if domain != "air":
+            return (0.0, 0.0)
+        return (-speed_m_s * math.sin(from_rad), -speed_m_s * math.cos(from_rad))
 
     def rate(self, key: str) -> float | None:
         if self._settings.get(key) is None:
@@ -256,6 +288,16 @@ def _detection(item: Mapping[str, Any]) -> PlannedDetection:
         str(item["type"]),
         None if position is None else coordinates(position),
     )
+
+
+def _link_loss(item: Mapping[str, Any]) -> LinkLoss:
+    loss = LinkLoss(
+        quantity(item["at"], Dimension.DURATION),
+        quantity(item["for"], Dimension.DURATION) if "for" in item else math.inf,
+    )
+    if loss.at_s < 0 or loss.for_s <= 0:
+        raise ValueError("`at` is not below 0, and `for` above it")
+    return loss
 
 
 def _target(item: Mapping[str, Any]) -> Target:

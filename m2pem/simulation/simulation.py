@@ -9,6 +9,7 @@ from msgspec.structs import replace
 from m2pem.api.arbiter import BehaviorRequest
 from m2pem.api.remaining import RemainingWork
 from m2pem.mission.catalogue import BehaviorState, ResourceId
+from m2pem.simulation.course import RefusedError
 from m2pem.simulation.event_queue import EventQueue, TimedCall
 from m2pem.simulation.executions import (
     Aim,
@@ -23,7 +24,6 @@ from m2pem.simulation.executions import (
 from m2pem.simulation.gimbals import aimed
 from m2pem.simulation.kinematics import STANDING_LOAD
 from m2pem.simulation.links import Links
-from m2pem.simulation.local_parameters import RefusedError
 from m2pem.simulation.payloads import SimPayload
 from m2pem.simulation.planning import Assignment, Planner
 from m2pem.simulation.pursuit import STEP_S, Pursuit, steer

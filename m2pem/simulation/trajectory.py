@@ -390,8 +390,10 @@ def _bound(phase: Travel | Curve, limit: float, kinematics: Kinematics) -> float
     length = phase.profile.length
     if isinstance(phase, Curve):
         climb_m = abs(phase.climb)
-        limit = min(limit, phase.radius * kinematics.turn_rate_rad_s)
+        limit = min(limit, phase.radius * kinematics.turn_rate_rad_s, kinematics.upwind_m_s)
     else:
+        if math.hypot(*phase.direction[:2]) > _NOTHING:
+            limit = min(limit, kinematics.ground_speed_m_s(*phase.direction[:2]))
         climb_m = abs(phase.direction[2]) * length
     if climb_m > _NOTHING and kinematics.climb_rate_m_s:
         limit = min(limit, kinematics.climb_rate_m_s * length / climb_m)

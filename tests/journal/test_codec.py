@@ -1,7 +1,8 @@
+import dataclasses
 import enum
 import json
 from types import NoneType, UnionType
-from typing import Any, Union, get_args, get_origin
+from typing import Any, Union, get_args, get_origin, get_type_hints
 
 import msgspec
 import pytest
@@ -35,6 +36,7 @@ OF_TYPE = {
     int: INT_64,
     float: FLOATS,
     bool: st.booleans(),
+    bytes: st.binary(),
     NoneType: st.none(),
 }
 
@@ -48,13 +50,18 @@ def of_type(kind):
         return st.one_of(*map(of_type, arguments))
     if origin is dict:
         return st.dictionaries(of_type(arguments[0]), of_type(arguments[1]), max_size=3)
+    if origin is tuple and arguments[-1] is not ...:
+        return st.tuples(*map(of_type, arguments))
     if origin is tuple:
         return st.lists(of_type(arguments[0]), max_size=3).map(tuple)
     if issubclass(kind, enum.Enum):
         return st.sampled_from(kind)
-    assert issubclass(kind, msgspec.Struct), kind
-    fields = {field.name: of_type(field.type) for field in msgspec.structs.fields(kind)}
-    return st.builds(kind, **fields)
+    if dataclasses.is_dataclass(kind):
+        types = get_type_hints(kind)
+    else:
+        assert issubclass(kind, msgspec.Struct), kind
+        types = {field.name: field.type for field in msgspec.structs.fields(kind)}
+    return st.builds(kind, **{name: of_type(each) for name, each in types.items()})
 
 
 def an_entry(given, *records):

@@ -117,7 +117,7 @@ def test_every_missing_or_wrong_thing_is_found_with_its_line(write: Write) -> No
         (10, "services.Detector[1].after", "bad-value"),
         (11, "services.Detector[2]", "bad-value"),
         (14, "behaviors.Drive[0].end", "bad-value"),
-        (15, "behaviors.Drive[1].after", "missing-key"),
+        (15, "behaviors.Drive[1]", "bad-value"),
         (16, "behaviors.Drive[2]", "bad-value"),
         (17, "anwsers", "unknown-key"),
     }

@@ -710,3 +710,79 @@ def test_answers_that_were_loaded_can_be_handed_in() -> None:
     answers = load_answers(ANSWERS / "vignette1_abort.yaml")
     result = rehearse(VIGNETTE, load_fleet(VIGNETTE_FLEET), plugins=PLUGINS, answers=answers)
     assert result.summary.status is RunStatus.TERMINATED
+
+
+# --- other vehicles than the fleet's --------------------------------------------------------------
+
+
+NEAR = "{&quot;type&quot;: &quot;Point&quot;, &quot;coordinates&quot;: [-77.3, 38.101]}"
+FAR = NEAR.replace("38.101", "38.11")
+
+
+def test_answers_change_the_settings_of_simulated_vehicles(play: Rehearse) -> None:
+    drive = sequence(behavior("Drive", "goto", target=NEAR))
+    as_it_is = play(drive, on=fleet())
+    slow = play(drive, "vehicles: {ugv1: {cruise_speed: 1 m/s}}", on=fleet())
+    assert slow.records[-1].t_s > 3 * as_it_is.records[-1].t_s
+    empty = play(drive, "vehicles: {ugv1: {battery: 0 %}}", on=fleet())
+    assert [record.code for _, record in of(empty, BehaviorEnded)] == ["BATTERY_LOW"]
+
+
+def test_a_link_is_lost_and_restored_by_the_answers(play: Rehearse) -> None:
+    drive = sequence(behavior("Drive", "goto", target=NEAR))
+    lost = play(drive, "vehicles: {ugv1: {link_lost: [{at: 5 s}]}}", on=fleet())
+    assert [(t_s, record.code) for t_s, record in of(lost, BehaviorEnded)] == [(8.0, "LINK_LOST")]
+    restored = play(drive, "vehicles: {ugv1: {link_lost: [{at: 5 s, for: 2 s}]}}", on=fleet())
+    assert restored.summary.status is RunStatus.COMPLETED
+
+
+def test_a_wind_against_an_aircraft_lengthens_its_way_and_one_too_strong_stops_it(
+    play: Rehearse,
+) -> None:
+    fly = sequence(behavior("Fly", "goto", resource="uav1", target=FAR))
+    uav = ResourceId("uav1")
+    aircraft = Fleet(
+        "test",
+        "test.yaml",
+        {uav: Vehicle(uav, Domain.AIR, "sim", {"cruise_speed": "20 m/s"})},
+        {},
+        origin=(38.1, -77.3, 0.0),
+    )
+    took_s = {
+        direction: play(fly, f"wind: {{speed: 10 m/s, from: {direction} deg}}", on=aircraft)
+        .records[-1]
+        .t_s
+        for direction in (0, 90, 180)
+    }
+    calm_s = play(fly, on=aircraft).records[-1].t_s
+    # 1110 m north at 20 m/s; against 10 m/s at 10 m/s; across it at 17.3 m/s.
+    assert took_s[0] - calm_s == pytest.approx(1110 / 10 - 1110 / 20, rel=0.1)
+    assert took_s[90] - calm_s == pytest.approx(1110 / 17.32 - 1110 / 20, rel=0.2)
+    assert took_s[180] == calm_s
+    storm = play(fly, "wind: {speed: 25 m/s}", on=aircraft)
+    assert [record.code for _, record in of(storm, BehaviorEnded)] == ["WIND"]
+
+
+@pytest.mark.parametrize(
+    ("answers", "message"),
+    [
+        ("vehicles: {ugv2: {battery: 10 %}}", "no vehicle or payload 'ugv2'"),
+        ("vehicles:\n  ugv1: {batery: 10 %}", "answers.yaml:2: .*did you mean 'battery'"),
+        ("vehicles:\n  ugv1: {battery: 10 deg}", "answers.yaml:2: vehicles.ugv1.battery"),
+        ("wind: {speed: 5 kg}", "wind.speed"),
+        ("vehicles: {ugv1: {link_lost: [{for: 3 s}]}}", "'at' is missing"),
+    ],
+)
+def test_settings_that_no_simulated_vehicle_has_are_refused(
+    play: Rehearse, answers: str, message: str
+) -> None:
+    with pytest.raises(AnswersError, match=message):
+        play(sequence(behavior("Stop", "drive_stop")), answers, on=fleet())
+
+
+def test_a_behavior_of_which_an_entry_says_nothing_takes_its_own_time(play: Rehearse) -> None:
+    drive = sequence(behavior("Drive", "goto", target=NEAR))
+    as_it_is = play(drive, on=fleet())
+    assert play(drive, "behaviors: {Drive: [{end: simulated}]}", on=fleet()).records == (
+        as_it_is.records
+    )
