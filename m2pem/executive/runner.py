@@ -10,7 +10,7 @@ import logging
 import time
 from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from m2pem.api.alerts import AlertSeverity
 from m2pem.api.clock import Clock
@@ -39,6 +39,9 @@ from m2pem.executive.outages import Outages, StallMonitor
 from m2pem.executive.services import Services
 from m2pem.journal.base import Entry, Journal
 from m2pem.monitors.run_monitors import RunMonitors
+
+if TYPE_CHECKING:
+    from m2pem.monitors.telemetry_conditions import Latest
 
 log = logging.getLogger("m2pem.run")
 
@@ -286,14 +289,37 @@ class Runner:
                     return [self._pause_by_itself() if self._never_waits() else Continue()]
                 continue
             due_us = self.run.next_due_us
+            verdict_us = self._next_verdict_us()
+            if verdict_us is not None and verdict_us <= self._context.clock.now_us():
+                self.monitors.advance(self.run.state.mission_time_us(self._context.clock.now_us()))
+                if found := self.monitors.take():
+                    return list(found)
+                continue
             if due_us is not None and due_us <= self._context.clock.now_us():
                 return [self._pause_by_itself() if self._never_waits() else Tick()]
             self._steps_at_wait = self.run.steps_done
             self._wake.clear()
-            if due_us is None:
-                await self._wake.wait()
+            dues = [each for each in (due_us, verdict_us) if each is not None]
+            if dues:
+                await self._wait_until(min(dues))
             else:
-                await self._wait_until(due_us)
+                await self._wake.wait()
+
+    def _next_verdict_us(self) -> int | None:
+        """When time alone may decide a requirement, in microseconds since the Unix epoch."""
+        due_us, state = self.monitors.due_us, self.run.state
+        if due_us is None or state.status is not RunStatus.RUNNING:
+            return None
+        return due_us + state.started_us + state.paused_total_us
+
+    def measure(self, resource: str, latest: "Latest") -> None:
+        """Telemetry of a vehicle has come, or its link is lost: post what changes for requirements.
+
+        Mission time stops in a pause, so it is looked at again when the run goes on.
+        """
+        if self.run.state.status is RunStatus.RUNNING and not self.done.is_set():
+            for item in self.monitors.measure(resource, latest):
+                self.post(item)
 
     def _exceeds_limit(self) -> str:
         limit = self._context.limit

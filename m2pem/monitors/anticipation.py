@@ -26,6 +26,11 @@ class Verdict(StrEnum):
     SATISFIED = "satisfied"
     VIOLATED = "violated"
 
+    @property
+    def is_certain(self) -> bool:
+        """Whether nothing that follows can change it."""
+        return self is not Verdict.OPEN
+
 
 MOST_STEPS = 100_000
 """Steps of a product of automaton and memory that are looked at, at most. Beyond, a state counts as

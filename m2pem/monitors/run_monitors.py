@@ -2,76 +2,31 @@
 
     monitors = RunMonitors(mission, fleet)
     monitors.observe(step.t_us, step.records)       # after each input, also in a replay
+    monitors.advance(t_us)                          # at `due_us`, if nothing came before
     for item in monitors.take(): ...                # inputs for the run: `RequirementDecided`
 
 Pure: a verdict depends on the records and their mission times alone, so a replay finds the same.
 """
 
 from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
 from m2pem.engine import records as r
-from m2pem.engine.inputs import RequirementDecided
+from m2pem.engine.inputs import RequirementDecided, TelemetryConditionChanged
 from m2pem.fleet.fleet import Fleet
 from m2pem.mission.mission import Mission
-from m2pem.monitors.anticipation import Verdict, anticipation
-from m2pem.monitors.moments import Moments
-from m2pem.verify.ltl import negated, parse
-from m2pem.verify.ltl.formula import Proposition
-from m2pem.verify.requirements.english import English
+
+if TYPE_CHECKING:
+    from m2pem.monitors.anticipation import Verdict
+    from m2pem.monitors.moments import Moments
+    from m2pem.monitors.monitor import Monitor
+    from m2pem.monitors.telemetry_conditions import Latest
+    from m2pem.verify.ltl.formula import Measured
 
 ENDED = "the run has ended"
 BEGINNING = "from the beginning"
-
-
-class Monitor:
-    """The monitor of one requirement in one run.
-
-    `known`: the propositions of the run's letters, by bit.
-    """
-
-    def __init__(
-        self, monitored: r.RequirementMonitored, known: Sequence[Proposition], english: English
-    ) -> None:
-        self.id = monitored.requirement
-        self.verdict = Verdict.OPEN
-        self._anticipation = anticipation(parse(monitored.formula))
-        own = self._anticipation.propositions
-        self._bits = [(1 << known.index(each), 1 << n, each) for n, each in enumerate(own)]
-        self.mask = sum(bit for bit, _, _ in self._bits)
-        self._english = english
-        self._letters: dict[int, int] = {}
-        self._state = self._anticipation.start
-        self._letter = 0
-
-    def _own(self, letter: int) -> int:
-        """The letter of the formula, given that of the run."""
-        masked = letter & self.mask
-        own = self._letters.get(masked)
-        if own is None:
-            own = sum(mine for theirs, mine, _ in self._bits if masked & theirs)
-            self._letters[masked] = own
-        return own
-
-    def read(self, letter: int) -> bool:
-        """Read the letter of a moment. True: the verdict is certain now."""
-        own = self._own(letter)
-        self._state = self._anticipation.step(self._state, own)
-        self._letter = own
-        self.verdict = self._anticipation.verdicts[self._state]
-        return self.verdict is not Verdict.OPEN
-
-    def end(self) -> bool:
-        """The run has ended: its last moment remains for ever. True: the verdict is certain now."""
-        self.verdict = self._anticipation.at_end(self._state, self._letter)
-        return self.verdict is not Verdict.OPEN
-
-    def changes(self, before: int, letter: int) -> str:
-        """What became true or false from one letter of the run to the next, in words."""
-        return ", ".join(
-            self._english.of(each if letter & theirs else negated(each))
-            for theirs, _, each in self._bits
-            if (before ^ letter) & theirs
-        )
+TIME_IS_OVER = "its time is over"
+_NO_LETTER = -1
 
 
 class RunMonitors:
@@ -82,26 +37,54 @@ class RunMonitors:
         self._fleet = fleet
         self._moments: Moments | None = None
         self._open: dict[str, Monitor] = {}
+        self._timed: list[Monitor] = []
         self._recorded: set[str] = set()
         self._found: dict[str, RequirementDecided] = {}
-        self._letter = -1
+        self._conditions: dict[str, tuple[int, Measured]] = {}
+        self._measured: dict[str, bool | None] = {}
+        self._letter = _NO_LETTER
+        self._unknown = 0
         self._t_us = 0
+
+    # --- records and time -----------------------------------------------------------------------
 
     def observe(self, t_us: int, records: Sequence[r.Record]) -> None:
         """Read the records of one input. `t_us`: their mission time."""
-        if self._moments is None:
+        moments = self._moments
+        if moments is None:
             if not records or type(records[0]) is not r.RunStarted:
                 return
             self._begin(records)
-            if self._moments is None:
+            moments = self._moments
+            if moments is None:
                 return
+        if self._conditions:
+            self._read_conditions(t_us, records)
+        if self._timed:
+            self.advance(t_us)
         self._t_us = t_us
-        self._moments.read(records)
+        moments.read(records)
         for record in records:
             if type(record) is r.RunEnded:
                 self._end(record)
             elif type(record) is r.RequirementDecided:
                 self._note(record.requirement)
+
+    def advance(self, t_us: int) -> None:
+        """Mission time has passed without a record."""
+        for each in [each for each in self._timed if each.id in self._open]:
+            while (due_us := each.evaluation.due_us) is not None and due_us <= t_us:
+                if self._is_certain(each, each.evaluation.advance(due_us)):
+                    # A bound belongs to its interval: it is over in the next microsecond.
+                    self._decide(each, due_us - 1, TIME_IS_OVER)
+
+    @property
+    def due_us(self) -> int | None:
+        """The mission time at which time alone may make a verdict certain; None: it cannot."""
+        if not self._timed:
+            return None
+        dues = (each.evaluation.due_us for each in self._timed if each.id in self._open)
+        return min((due for due in dues if due is not None), default=None)
 
     def take(self) -> list[RequirementDecided]:
         """Return what has become certain, and is not recorded yet; each once."""
@@ -114,47 +97,117 @@ class RunMonitors:
         monitored = [each for each in records if type(each) is r.RequirementMonitored]
         if not monitored:
             return
-        formulas = [parse(each.formula) for each in monitored]
-        known = tuple(
-            dict.fromkeys(
-                proposition
-                for formula in formulas
-                for proposition in anticipation(formula).propositions
-            )
-        )
+        # What reads formulas takes time to load, and most runs have none.
+        from m2pem.monitors.moments import Moments  # noqa: PLC0415
+        from m2pem.monitors.monitor import Monitor, propositions_of  # noqa: PLC0415
+        from m2pem.verify.ltl.formula import Measured, show_measured  # noqa: PLC0415
+        from m2pem.verify.requirements.english import English  # noqa: PLC0415
+
+        known = propositions_of(monitored)
         names = {each.id: each.name for each in (*self._mission.nodes, *self._mission.processes)}
         english = English(names)
         self._open = {each.requirement: Monitor(each, known, english) for each in monitored}
+        self._timed = [each for each in self._open.values() if each.is_timed]
+        self._conditions = {
+            show_measured(each): (1 << bit, each)
+            for bit, each in enumerate(known)
+            if isinstance(each, Measured)
+        }
+        self._unknown = sum(bit for bit, _ in self._conditions.values())
         self._moments = Moments(known, self._mission, self._fleet, self._read)
 
     def _read(self, letter: int) -> None:
         before = self._letter
-        first = before < 0
-        changed = letter ^ before
-        if not (changed or first):
+        if letter == before:
             return
         self._letter = letter
+        self._read_changed(before, ~0 if before == _NO_LETTER else letter ^ before)
+
+    def _read_changed(self, before: int, changed: int) -> None:
+        """Have those monitors read a moment that something has changed for."""
+        letter, unknown, t_us = self._letter, self._unknown, self._t_us
+        first = before == _NO_LETTER
         certain = [
             each
             for each in self._open.values()
-            if (first or changed & each.mask) and each.read(letter)
+            if (first or changed & each.mask)
+            and self._is_certain(each, each.read(t_us, letter, unknown))
         ]
         for each in certain:
             because = each.changes(0 if first else before, letter)
-            self._decide(each, because or BEGINNING)
+            self._decide(each, t_us, because or BEGINNING)
+
+    # --- telemetry ------------------------------------------------------------------------------
+
+    @property
+    def conditions(self) -> "list[Measured]":
+        """The conditions on telemetry in requirements that are open."""
+        mask = 0
+        for each in self._open.values():
+            mask |= each.mask
+        return [condition for bit, condition in self._conditions.values() if bit & mask]
+
+    def measure(self, resource: str, latest: "Latest") -> list[TelemetryConditionChanged]:
+        """Return what telemetry says now of the conditions on a vehicle that it did not say before.
+
+        `latest`: the newest states.
+        """
+        if not self._conditions:
+            return []
+        from m2pem.monitors.telemetry_conditions import holds  # noqa: PLC0415  # as in `_begin`
+
+        found = []
+        for text, (_, condition) in self._conditions.items():
+            if resource in condition.resources:
+                now = holds(condition, latest)
+                if now is not self._measured.get(text):
+                    self._measured[text] = now
+                    found.append(TelemetryConditionChanged(text, now))
+        return found
+
+    def _read_conditions(self, t_us: int, records: Iterable[r.Record]) -> None:
+        for record in records:
+            if type(record) is r.RunClaimed:
+                # No executive has looked since the last record.
+                for text in self._conditions:
+                    self._set_condition(text, None)
+            elif type(record) is r.TelemetryConditionChanged:
+                self.advance(t_us)
+                self._t_us = t_us
+                self._set_condition(record.condition, record.holds)
+
+    def _set_condition(self, text: str, now: bool | None) -> None:
+        if text not in self._conditions or self._moments is None:
+            return
+        bit = self._conditions[text][0]
+        before, unknown = self._letter, self._unknown
+        self._measured[text] = now
+        self._unknown = self._unknown | bit if now is None else self._unknown & ~bit
+        if unknown == self._unknown and bool(before & bit) == bool(now):
+            return
+        self._moments.state = self._moments.state | bit if now else self._moments.state & ~bit
+        self._letter = self._moments.state
+        self._read_changed(before, bit)
+
+    # --- verdicts -------------------------------------------------------------------------------
+
+    def _is_certain(self, monitor: "Monitor", verdict: "Verdict") -> bool:
+        monitor.verdict = verdict
+        return verdict.is_certain
 
     def _end(self, record: r.RunEnded) -> None:
         """Decide all, unless operators have stopped the run: it could have gone on."""
         if record.outcome is not r.RunOutcome.STOPPED:
-            for each in [each for each in self._open.values() if each.end()]:
-                self._decide(each, ENDED)
+            for each in list(self._open.values()):
+                if self._is_certain(each, each.evaluation.end()):
+                    self._decide(each, self._t_us, ENDED)
         self._open.clear()
 
-    def _decide(self, monitor: Monitor, because: str) -> None:
+    def _decide(self, monitor: "Monitor", t_us: int, because: str) -> None:
         del self._open[monitor.id]
         if monitor.id not in self._recorded:
             verdict = r.RequirementVerdict(monitor.verdict.value)
-            self._found[monitor.id] = RequirementDecided(monitor.id, verdict, self._t_us, because)
+            self._found[monitor.id] = RequirementDecided(monitor.id, verdict, t_us, because)
 
     def _note(self, requirement: str) -> None:
         """A verdict is recorded, perhaps by an earlier release: it stays."""

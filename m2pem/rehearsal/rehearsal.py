@@ -1,6 +1,7 @@
 """Rehearses a mission: the whole executive on simulated vehicles, in virtual time."""
 
 import asyncio
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
@@ -135,7 +136,11 @@ SETTINGS = {"telemetry_hz": 0, "state": ""}
 """Settings of every simulated resource: telemetry has changes only, and no state file."""
 
 SPACE_HZ = 1.0
-"""Telemetry of a fleet whose tasks wait for space: so often is looked who has left it."""
+"""Telemetry of a fleet whose tasks wait for space, and of a mission whose requirements are about
+telemetry: each second is looked at it."""
+
+_TELEMETRY = re.compile(rb"requirement\b[^>]*\b(?:distance|altitude|speed|battery|link)\s*\(")
+"""What the file of a mission with a requirement about telemetry contains."""
 
 EXIT_STATUS = {
     RunStatus.COMPLETED: 0,
@@ -217,7 +222,8 @@ class Rehearser:
             refuse_commands(mission)
             fleet = NO_FLEET
         self.mission = mission
-        seen = {"telemetry_hz": SPACE_HZ} if waits_for_space(fleet) else {}
+        looks = waits_for_space(fleet) or _TELEMETRY.search(mission.source)
+        seen = {"telemetry_hz": SPACE_HZ} if looks else {}
         # A script answers: it may answer what any operator may.
         self.fleet = simulated_fleet(replace(fleet, operators={}), {**SETTINGS, **seen})
         self.plugins = plugins
@@ -423,6 +429,7 @@ class Rehearsal:
         state = runner.run.state
         return (
             runner.run.next_due_us is not None
+            or runner.monitors.due_us is not None
             or self._answers.to_send > 0
             or self._answers.resolving > 0
             or self._scripted.ending > 0

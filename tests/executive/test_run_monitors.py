@@ -149,16 +149,21 @@ def test_a_mission_whose_requirements_cannot_be_read_does_not_start(
     assert message in play(story)
 
 
-def left_behind(source: bytes, *inputs: Input) -> MemoryJournal:
+def left_behind(
+    source: bytes,
+    *given: Input,
+    formula: str = "[]!active(Second)",
+    vehicles: tuple[str, ...] = ("ugv1",),
+) -> MemoryJournal:
     """A journal in which run r1 got `inputs`, and then its executive died; it has no verdict."""
 
     async def write() -> MemoryJournal:
         journal = MemoryJournal()
-        vehicles = fleet("ugv1")
-        number = await journal.create(RunHeader("m.bpmn", source, "P", dump(vehicles)))
-        run = MissionRun(parse_mission(source, "m.bpmn", accepted=True), vehicles, number)
-        required = MonitoredRequirement("safe", "[]!active(Second)", "Never.")
-        for item in (StartRun("P", requirements=(required,)), *inputs):
+        used = fleet(*vehicles)
+        number = await journal.create(RunHeader("m.bpmn", source, "P", dump(used)))
+        run = MissionRun(parse_mission(source, "m.bpmn", accepted=True), used, number)
+        required = MonitoredRequirement("safe", formula, "Never.")
+        for item in (StartRun("P", requirements=(required,)), *given):
             step = run.receive(item, START_US)
             await journal.append(
                 [Entry(number, 1, step.seq, START_US, step.t_us, item, tuple(step.records))]

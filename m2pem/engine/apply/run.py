@@ -19,6 +19,7 @@ def run_started(state: RunState, record: r.RunStarted) -> None:
 
 def run_claimed(state: RunState, record: r.RunClaimed) -> None:
     state.epoch = record.epoch
+    state.telemetry_conditions.clear()  # no executive has looked meanwhile
     state.last_allocation += record.lost
     state.last_keeping += record.lost
     state.last_behavior += record.lost

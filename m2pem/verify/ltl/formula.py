@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Any, TypeAlias, Union
 
 from m2pem.mission.expression import Expression
+from m2pem.units import US_PER_S
 
 # --- propositions: what is true or false of one moment of a run ----------------------------------
 
@@ -57,9 +58,40 @@ class Data:
     position: int = field(default=0, compare=False)
 
 
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """A comparison of what telemetry says of vehicles: `distance(a, b) < 5 m`.
+
+    `value`: in SI (metres, m/s), a fraction (battery), or the state of a link. `text`: the value as
+    written.
+    """
+
+    quantity: str
+    resources: tuple[str, ...]
+    operator: str
+    value: float | str
+    text: str = field(default="", compare=False)
+    position: int = field(default=0, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Timed:
+    """An operator of the future with bounds: `<>[0 s, 30 s] a`. Times are microseconds of mission
+    time from the moment of which it is said; both bounds belong to it.
+
+    `operand`: one `Eventually`, `Always` or `Until`; within it, each operator of the future has
+    bounds. So its truth is known after `high_us` and the bounds within, and the rest of a formula
+    takes it as a proposition.
+    """
+
+    operand: "Formula"
+    low_us: int
+    high_us: int
+
+
 OUTCOMES = ("completed", "terminated", "failed")
 
-Proposition: TypeAlias = Union[Active, Completed, Commanded, Ended, Data]
+Proposition: TypeAlias = Union[Active, Completed, Commanded, Ended, Data, Measured, Timed]
 
 # --- formulas ------------------------------------------------------------------------------------
 
@@ -182,6 +214,8 @@ Formula: TypeAlias = Union[
     Commanded,
     Ended,
     Data,
+    Measured,
+    Timed,
     Constant,
     Not,
     And,
@@ -199,7 +233,7 @@ Formula: TypeAlias = Union[
     Count,
 ]
 
-PROPOSITIONS = (Active, Completed, Commanded, Ended, Data)
+PROPOSITIONS = (Active, Completed, Commanded, Ended, Data, Measured, Timed)
 PAST = (Once, Historically, Since, Count)
 FUTURE = (Always, Eventually, Until, WeakUntil, Next)
 
@@ -245,7 +279,7 @@ def children(formula: Formula) -> tuple[Formula, ...]:
             return formula.operands
         case Implies() | Iff() | Until() | WeakUntil() | Since():
             return (formula.left, formula.right)
-        case Not() | Always() | Eventually() | Next() | Once() | Historically():
+        case Not() | Always() | Eventually() | Next() | Once() | Historically() | Timed():
             return (formula.operand,)
         case _:
             return ()
@@ -275,14 +309,29 @@ def walk(formula: Formula) -> Iterator[Formula]:
 
 
 def propositions(formula: Formula) -> tuple[Proposition, ...]:
-    """The propositions of a formula, each once, in the order in which they are written."""
-    found = (each for each in walk(formula) if isinstance(each, PROPOSITIONS))
-    return tuple(dict.fromkeys(found))
+    """The propositions of a formula, each once, in the order in which they are written.
+
+    An operator with bounds is one, and what is within it is not.
+    """
+    found: dict[Proposition, None] = {}
+    waiting = [formula]
+    while waiting:
+        current = waiting.pop()
+        if isinstance(current, PROPOSITIONS):
+            found.setdefault(current)
+        else:
+            waiting += reversed(children(current))
+    return tuple(found)
 
 
 def needs_steps(formula: Formula) -> bool:
     """Whether a formula observes single steps, so that a search may leave none out."""
     return any(isinstance(each, Next) for each in walk(formula))
+
+
+def needs_runs(formula: Formula) -> bool:
+    """Whether a formula is about time or telemetry, which only runs have."""
+    return any(isinstance(each, Timed | Measured) for each in walk(formula))
 
 
 _LOOSE, _IFF, _IMPLIES, _OR, _AND, _UNTIL, _UNARY = range(7)
@@ -313,6 +362,10 @@ def _show(formula: Formula, around: int) -> str:
             return f"ended({formula.outcome})" if formula.outcome else "ended"
         case Data():
             return f"({formula.expression.text.strip()})" if around else formula.expression.text
+        case Measured():
+            return show_measured(formula)
+        case Timed(operand):
+            return _show_timed(formula, operand, around)
         case Constant():
             return "true" if formula.value else "false"
         case Count():
@@ -337,6 +390,27 @@ def _show(formula: Formula, around: int) -> str:
                 f"{_show(formula.left, strength + 1)} {word} {_show(formula.right, strength + 1)}"
             )
             return f"({text})" if around > strength or around == _UNARY else text
+
+
+def show_measured(each: Measured) -> str:
+    """Return a comparison of telemetry as text."""
+    names = ", ".join(map(_name, each.resources))
+    return f"{each.quantity}({names}) {each.operator} {each.text or each.value}"
+
+
+def show_us(time_us: int) -> str:
+    """Return a duration as text: "30 s", "1.5 s"."""
+    return f"{time_us / US_PER_S:.6f}".rstrip("0").rstrip(".") + " s"
+
+
+def _show_timed(formula: Timed, operand: Formula, around: int) -> str:
+    bounds = f"[{show_us(formula.low_us)}, {show_us(formula.high_us)}]"
+    if isinstance(operand, Until):
+        left, right = _show(operand.left, _UNARY), _show(operand.right, _UNARY)
+        text = f"{left} U{bounds} {right}"
+        return f"({text})" if around >= _UNTIL else text
+    assert isinstance(operand, Always | Eventually)
+    return f"{PREFIXES[type(operand)]}{bounds} {_show(operand.operand, _UNARY)}"
 
 
 def _joined(word: str, operands: tuple[Formula, ...], strength: int, around: int) -> str:

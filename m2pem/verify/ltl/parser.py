@@ -6,7 +6,7 @@ conditions, so they have the same meaning.
 """
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from typing import NoReturn
 
 from m2pem.errors import ExpressionSyntaxError
@@ -15,6 +15,7 @@ from m2pem.mission.expression.dialect import Dialect
 from m2pem.mission.expression.functions import FUNCTIONS
 from m2pem.mission.expression.parser import Parser
 from m2pem.suggestions import did_you_mean
+from m2pem.units import US_PER_S, Dimension, UnitError, quantity
 from m2pem.verify.ltl import formula as f
 
 _SPACE = re.compile(r"\s*")
@@ -155,7 +156,14 @@ class Reader:
 
 MAX_DEPTH = 100
 MAX_COUNT = 1_000
-ATOMS = ("active(E)", "completed(E)", "commanded(RESOURCE, BEHAVIOR)", "ended", "count(...) >= N")
+ATOMS = (
+    "active(E)",
+    "completed(E)",
+    "commanded(RESOURCE, BEHAVIOR)",
+    "ended",
+    "count(...) >= N",
+    "distance(A, B) < 5 m",
+)
 """Propositions, besides comparisons of data."""
 
 _PREFIXES: dict[str, Callable[[f.Formula], f.Formula]] = {
@@ -168,6 +176,22 @@ _OPERATOR = re.compile(rf"({'|'.join(_OPERATORS)})(?![\w.])")
 _WORD = re.compile(r"[^\W\d][\w.]*")
 _CALL = re.compile(r"([^\W\d][\w.]*)\s*\(")
 _OF_DATA = re.compile(r"\+|-(?!>)|\*|/|<=|<(?!->|>)|>|==|!=|\?|in\b|not\s+in\b")
+_NUMBER = r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)"
+_BOUNDS = re.compile(rf"\[\s*({_NUMBER}\s*[a-z]+)\s*,\s*({_NUMBER}\s*[a-z]+)\s*\]")
+_OPENS_BOUNDS = re.compile(rf"\[\s*{_NUMBER}\s*[a-z]*\s*,")
+_COMPARED = re.compile(r"<=|>=|==|!=|<(?!->)|>")
+_MEASURED = re.compile(rf"(-?{_NUMBER})\s*(%|[^\W\d][\w/²^]*)?")
+_WITH_UNIT = re.compile(rf"\s*(?:{_COMPARED.pattern})\s*-?{_NUMBER}\s*[^\W\d_]")
+MAX_BOUND_S = 30 * 24 * 3600.0
+QUANTITIES: Mapping[str, Dimension | None] = {
+    "distance": Dimension.DISTANCE,
+    "altitude": Dimension.DISTANCE,
+    "speed": Dimension.SPEED,
+    "battery": None,
+    "link": None,
+}
+"""What telemetry says of vehicles. A battery is a fraction or has "%", a link has a state."""
+LINK_STATES = ("connected", "degraded", "lost")
 _BOUND = re.compile(r"(>=|<=|==|!=|>|<)\s*(\d+)")
 _OPERATOR_AND, _OPERATOR_OR = re.compile(r"&&|and(?![\w.])"), re.compile(r"\|\||or(?![\w.])")
 _OTHER_NOTATIONS = {
@@ -245,14 +269,15 @@ class _Parser:
         found = self.reader.match(_OPERATOR)
         if not found:
             return left
+        bounds = self._bounds() if found[1] == "U" else None
         right = self._unary()
         if self.reader.peek(_OPERATOR):
             self.reader.fail("U, W and since do not chain; use parentheses")
-        formula = _OPERATORS[found[1]](left, right)
+        formula = self._timed(_OPERATORS[found[1]](left, right), bounds, start)
         return self._past(formula, "since", start) if found[1] == "since" else formula
 
     def _unary(self) -> f.Formula:
-        signs: list[str] = []
+        signs: list[tuple[str, tuple[int, int] | None, int]] = []
         while not self.reader.text.startswith("!=", self.reader.skip()):
             sign = next((each for each in _PREFIXES if self.reader.take(each)), None)
             if sign is None and self._next_word() == "not":
@@ -260,13 +285,47 @@ class _Parser:
                 sign = "!"
             if sign is None:
                 break
-            signs.append(sign)
+            at = self.reader.position
+            signs.append((sign, self._bounds() if sign in ("[]", "<>") else None, at))
             if len(signs) > MAX_DEPTH:
                 self.reader.fail(f"nested deeper than {MAX_DEPTH} levels")
         formula = self._primary()
-        for sign in reversed(signs):
-            formula = _PREFIXES[sign](formula)
+        for sign, bounds, at in reversed(signs):
+            formula = self._timed(_PREFIXES[sign](formula), bounds, at)
         return formula
+
+    def _bounds(self) -> tuple[int, int] | None:
+        """Read the bounds of an operator, in microseconds, if it has any."""
+        start = self.reader.skip()
+        found = self.reader.match(_BOUNDS)
+        if not found:
+            if self.reader.peek(_OPENS_BOUNDS):
+                self.reader.fail("bounds are two times with their units, as in [0 s, 30 s]")
+            return None
+        try:
+            low, high = (quantity(each, Dimension.DURATION) for each in found.groups())
+        except UnitError as error:
+            self.reader.fail(str(error), start)
+        if low > high:
+            self.reader.fail(f"{found[1]} is later than {found[2]}", start)
+        if high > MAX_BOUND_S:
+            self.reader.fail("bounds go up to 30 days", start)
+        return round(low * US_PER_S), round(high * US_PER_S)
+
+    def _timed(
+        self, formula: f.Formula, bounds: tuple[int, int] | None, position: int
+    ) -> f.Formula:
+        if bounds is None:
+            return formula
+        inner = [part for each in f.children(formula) for part in _without_bounded(each)]
+        if any(isinstance(each, f.PAST) for each in f.walk(formula)):
+            self.reader.fail("once, historically, since and count look beyond bounds", position)
+        if any(isinstance(each, f.FUTURE) for each in inner):
+            self.reader.fail(
+                "in an operator with bounds each [], <> and U has bounds, and there is no W",
+                position,
+            )
+        return f.Timed(formula, *bounds)
 
     def _next_word(self) -> str:
         found = self.reader.peek(_WORD)
@@ -304,11 +363,22 @@ class _Parser:
                 "commanded": self._commanded,
                 "count": self._count,
             }
+            if called[1] in QUANTITIES and self._is_measured(called):
+                self.reader.match(_CALL)
+                return self._measured(called[1], start)
             if called[1] in readers:
                 self.reader.match(_CALL)
                 return readers[called[1]](start)
             if called[1] not in FUNCTIONS and "." not in called[1]:
-                known = [*readers, "ended", "once", "historically", "since", *FUNCTIONS]
+                known = [
+                    *readers,
+                    *QUANTITIES,
+                    "ended",
+                    "once",
+                    "historically",
+                    "since",
+                    *FUNCTIONS,
+                ]
                 hint = did_you_mean(called[1], known)
                 said = f"there is no '{called[1]}(...)'; {_listed()}"
                 self.reader.fail(f"{said}; {hint}" if hint else said, start)
@@ -367,6 +437,48 @@ class _Parser:
             self.reader.fail(f"counts go up to {MAX_COUNT}", bound.start(2))
         return self._past(f.Count(tuple(operands), bound[1], int(bound[2])), "count", start)
 
+    def _is_measured(self, called: re.Match[str]) -> bool:
+        """Whether it is no function of data of the same name: a value with a unit follows."""
+        if called[1] not in FUNCTIONS:
+            return True
+        end = self.reader.after_parenthesis(called.end() - 1)
+        return end > 0 and bool(_WITH_UNIT.match(self.reader.text, end))
+
+    def _measured(self, name: str, start: int) -> f.Formula:
+        resources = [self.reader.argument("a vehicle")[0]]
+        if name == "distance":
+            self.reader.expect(",", "between the two vehicles of distance(A, B)")
+            resources.append(self.reader.argument("a vehicle")[0])
+        self.reader.expect(")", f"to close {name}(")
+        operator = self.reader.match(_COMPARED)
+        if not operator:
+            self.reader.fail(f"expected a comparison after {name}(...), as in '< 5 m'")
+        value, text = self._value_of(name, operator[0])
+        return f.Measured(name, tuple(resources), operator[0], value, text, start)
+
+    def _value_of(self, name: str, operator: str) -> tuple[float | str, str]:
+        at = self.reader.skip()
+        if name == "link":
+            state, position = self.reader.argument("the state of a link")
+            if state not in LINK_STATES or operator not in ("==", "!="):
+                states = ", ".join(LINK_STATES)
+                self.reader.fail(f"a link is compared by == or != with {states}", position)
+            return state, state
+        found = self.reader.match(_MEASURED)
+        if not found:
+            self.reader.fail(f"expected a quantity, found {self.reader.found()}")
+        number, unit = found[1], found[2] or ""
+        text = f"{number} {unit}".rstrip()
+        dimension = QUANTITIES[name]
+        if dimension is None:
+            if unit not in ("", "%"):
+                self.reader.fail("a battery is compared with a fraction, or with %", at)
+            return float(number) / (100 if unit else 1), text
+        try:
+            return quantity(text, dimension), text
+        except UnitError as error:
+            self.reader.fail(str(error), at)
+
     def _past(self, formula: f.Formula, word: str, start: int) -> f.Formula:
         if any(isinstance(each, f.FUTURE) for each in f.walk(formula)):
             self.reader.fail(f"{word} looks back: no [], <>, U or W can stand in it", start)
@@ -388,6 +500,14 @@ class _Parser:
 
     def _looks_like_data(self, start: int) -> bool:
         return bool(re.match(r"[^\W\d][\w.]*\s*(?:[=!<>]=|[<>])", self.reader.text[start:]))
+
+
+def _without_bounded(formula: f.Formula) -> Iterator[f.Formula]:
+    """The formula and all below it, but for operators with bounds and what is within them."""
+    if not isinstance(formula, f.Timed):
+        yield formula
+        for each in f.children(formula):
+            yield from _without_bounded(each)
 
 
 def _listed() -> str:

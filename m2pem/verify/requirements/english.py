@@ -18,13 +18,17 @@ from m2pem.verify.ltl.formula import (
     Historically,
     Iff,
     Implies,
+    Measured,
     Next,
     Not,
     Once,
     Or,
     Since,
+    Timed,
     Until,
     WeakUntil,
+    show_measured,
+    show_us,
 )
 
 _ENDS = {
@@ -45,8 +49,8 @@ _BOUNDS = {
 _STARTS = frozenset(
     {
         *("after", "again", "always", "at", "before", "each", "exactly", "fewer"),
-        *("from", "if", "in", "more", "never", "not", "nothing", "of"),
-        *("on", "once", "the", "until", "whatever", "whenever"),
+        *("between", "for", "from", "if", "in", "more", "never", "not", "nothing", "of"),
+        *("on", "once", "the", "until", "whatever", "whenever", "within"),
     }
 )
 """First words of sentences that get a capital letter; names of vehicles and data do not."""
@@ -81,6 +85,10 @@ class English:
         match formula:
             case Active() | Completed() | Commanded() | Ended() | Data():
                 return self._proposition(formula, "is")
+            case Measured():
+                return show_measured(formula)
+            case Timed(operand):
+                return self._timed(formula, operand)
             case Constant():
                 return "whatever happens" if formula.value else "nothing may happen"
             case Not(operand):
@@ -130,13 +138,31 @@ class English:
             case _:
                 raise TypeError(f"no formula: {formula}")
 
+    def _timed(self, formula: Timed, operand: Formula) -> str:
+        high = show_us(formula.high_us)
+        if formula.low_us:
+            when = f"between {show_us(formula.low_us)} and {high} from then"
+        else:
+            when = f"for {high}" if isinstance(operand, Always) else f"within {high}"
+        match operand:
+            case Always(inner) if formula.low_us:
+                return f"{when} always {self._inside(inner)}"
+            case Always(inner) | Eventually(inner):
+                return f"{when} {self._inside(inner)}"
+            case Until(left, right):
+                return f"{self._inside(left)} until {self._inside(right)}, which comes {when}"
+            case _:
+                raise TypeError(f"no operator with bounds: {operand}")
+
     def _then(self, formula: Formula) -> str:
         if isinstance(formula, Eventually):
             return f"then or later {self._inside(formula.operand)}"
         return self.of(formula)
 
     def _inside(self, formula: Formula) -> str:
-        simple = isinstance(formula, (Active, Completed, Commanded, Ended, Data, Constant, Once))
+        simple = isinstance(
+            formula, (Active, Completed, Commanded, Ended, Data, Constant, Once, Measured)
+        )
         if simple or (isinstance(formula, Not) and not isinstance(formula.operand, (And, Or))):
             return self.of(formula)
         return f"({self.of(formula)})"

@@ -23,6 +23,7 @@ from m2pem.verify.ltl.formula import (
     Completed,
     Data,
     Formula,
+    Measured,
     rebuilt,
 )
 
@@ -175,6 +176,18 @@ class Names:
             f"{suggest(name, known, 'vehicles, payloads and teams')}"
         )
 
+    def vehicle(self, name: str) -> str:
+        """A vehicle, of which telemetry says where it is.
+
+        Raises:
+            UnknownNameError: the fleet has none of that name.
+        """
+        if name in self.fleet.vehicles:
+            return name
+        raise UnknownNameError(
+            f"the fleet has no vehicle '{name}'; {suggest(name, self.fleet.vehicles, 'vehicles')}"
+        )
+
     def behavior(self, name: str) -> str:
         """A behavior that the mission uses, or that all arbiters share.
 
@@ -258,6 +271,10 @@ class Names:
                         return Commanded(each.resource, each.behavior, each.position, at)
                     case Data():
                         self._data(each.expression)
+                        return each
+                    case Measured():
+                        for resource in each.resources:
+                            self.vehicle(resource)
                         return each
                     case _:
                         return rebuilt(each, resolve)

@@ -7,7 +7,7 @@ from m2pem.fleet.fleet import Fleet
 from m2pem.mission.mission import Mission
 from m2pem.verify.check import SHARE_REDUCED, Report, full_states, share, size_limit_of
 from m2pem.verify.ltl import model_check, propositions
-from m2pem.verify.ltl.formula import Active, Completed
+from m2pem.verify.ltl.formula import Active, Completed, needs_runs
 from m2pem.verify.net.petri_net import PetriNet
 from m2pem.verify.properties.results import Result, Verdict, Violation
 from m2pem.verify.requirements.check import (
@@ -30,6 +30,9 @@ from m2pem.verify.spin.queries import Storage
 from m2pem.verify.spin.search import SpinExploration, WantedRuns
 from m2pem.verify.spin.search import search as search_with_spin
 from m2pem.verify.translate import Options, TooLargeError
+
+IN_RUNS = "time and telemetry are checked in runs only"
+"""Why a requirement has no answer: it is no question about the net."""
 
 Show = Callable[[Progress], None] | None
 
@@ -107,6 +110,11 @@ def with_requirements(
         SpinMissingError: Spin or a compiler is not installed.
         InternalError: Spin's answer is wrong.
     """
+    in_runs = [each.id for each in requirements if needs_runs(each.formula)]
+    if in_runs:
+        note = f"{IN_RUNS}: {', '.join(in_runs)}"
+        report = replace(report, notes=(*report.notes, note))
+        requirements = [each for each in requirements if each.id not in in_runs]
     if not requirements:
         return report
     limits = limits or Limits(tokens=3)
