@@ -48,9 +48,8 @@ class TimedEvaluation:
             if not isinstance(each, Timed)
         ]
         self._horizon_us = max((horizon_us(each) for _, each in self._timed), default=0)
-        self._delays_us = sorted(
-            frozenset(chain.from_iterable(delays_us(each) for _, each in self._timed))
-        )
+        delays = frozenset(chain.from_iterable(delays_us(each) for _, each in self._timed))
+        self._delays_us = sorted(delays) or [0]
         self._starts: list[int] = []
         self._changes_us: list[int] = []
         """When moments began that may still decide it, as time passes."""
