@@ -132,7 +132,7 @@ def router(control: MissionControl, folder: MissionFolder, hub: Hub) -> APIRoute
 
     @routes.get("/{run}/mission")
     async def mission(_: Viewer, run: str) -> RunMissionModel:
-        """What a run executes, as it was when it began."""
+        """What a run executes now; a run that is over, what it had in the end."""
         summary = await find_run(control, run)
         found = await control.mission(run)
         files = await file_models(control, found.files())

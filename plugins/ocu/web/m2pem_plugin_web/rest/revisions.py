@@ -1,0 +1,130 @@
+"""/api/runs/{run}/revision: a running mission goes on with a new version of its file."""
+
+from typing import Annotated
+
+from fastapi import APIRouter
+from pydantic import BaseModel, Field
+
+from m2pem.api import Draft, MissionControl, RevisionPreview
+from m2pem_plugin_web.access.permissions import Commander, Operator
+from m2pem_plugin_web.missions.folder import MissionFolder
+from m2pem_plugin_web.problems import RESPONSES
+from m2pem_plugin_web.rest.drafts import WrittenName, of_folder
+from m2pem_plugin_web.rest.incidents import OutlookModel
+from m2pem_plugin_web.rest.models import Body, FindingModel, Name, finding_models, known_run
+
+MOST_MOVES = 1000
+
+
+class NewVersionModel(Body):
+    """A new version: a mission of the folder. `version`: of that mission, None for its newest.
+
+    `moves`: by element, the element or sequence flow that its token goes to first; "": it ends.
+    """
+
+    mission: WrittenName
+    version: str | None = None
+    moves: Annotated[dict[Name, str], Field(max_length=MOST_MOVES)] = Field(default_factory=dict)
+
+
+class RevisionModel(NewVersionModel):
+    """As for a plan. `plan`: that which was seen. `even_if_stuck`: an operator has confirmed that
+    the mission cannot complete after it."""
+
+    plan: Name
+    even_if_stuck: bool = False
+
+
+class EffectModel(BaseModel):
+    """What a revision does to a token, or to an event that is awaited."""
+
+    kind: str
+    element: str
+    token: int
+    text: str
+
+
+class RefusalModel(BaseModel):
+    """Why it cannot be. `candidates`: where the token can go instead."""
+
+    element: str
+    token: int
+    text: str
+    candidates: list[str]
+
+
+class PlanModel(BaseModel):
+    """What a revision would do. `possible`: nothing speaks against it but what may be confirmed;
+    `approval`: who must approve the new version before, "" if that is not needed."""
+
+    plan: str
+    version: str
+    previous: str
+    possible: bool
+    changes: list[str]
+    effects: list[EffectModel]
+    refusals: list[RefusalModel]
+    findings: list[FindingModel]
+    outlook: OutlookModel | None
+    approval: str
+
+
+def plan_model(preview: RevisionPreview) -> PlanModel:
+    """Return a plan as JSON."""
+    outlook = preview.outlook
+    return PlanModel(
+        plan=preview.plan,
+        version=preview.version,
+        previous=preview.previous,
+        possible=preview.is_possible,
+        changes=list(preview.changes),
+        effects=[
+            EffectModel(kind=each.kind, element=each.element, token=each.token, text=each.text)
+            for each in preview.effects
+        ],
+        refusals=[
+            RefusalModel(
+                element=each.element,
+                token=each.token,
+                text=each.text,
+                candidates=list(each.candidates),
+            )
+            for each in preview.refusals
+        ],
+        findings=finding_models(preview.findings),
+        outlook=None
+        if outlook is None
+        else OutlookModel(verdict=outlook.verdict.value, reason=outlook.reason, text=str(outlook)),
+        approval=preview.approval,
+    )
+
+
+def router(control: MissionControl, folder: MissionFolder) -> APIRouter:
+    """The routes of revisions. `folder`: where new versions are."""
+    routes = APIRouter(prefix="/api/runs", tags=["runs"], responses=RESPONSES)
+
+    async def draft(wanted: NewVersionModel) -> Draft:
+        source = await of_folder(folder.source, wanted.mission, wanted.version)
+        return Draft(folder.file(wanted.mission), source)
+
+    @routes.post("/{run}/revision/plan")
+    async def plan(_: Operator, run: str, wanted: NewVersionModel) -> PlanModel:
+        """What it would do to a run to go on with a new version of its mission."""
+        async with known_run(control, run):
+            found = await control.plan_revision(run, await draft(wanted), moves=wanted.moves)
+        return plan_model(found)
+
+    @routes.post("/{run}/revision", status_code=204)
+    async def revise(person: Commander, run: str, wanted: RevisionModel) -> None:
+        """Go on with a new version of a run's mission, by a plan that was seen."""
+        async with known_run(control, run):
+            await control.revise(
+                run,
+                await draft(wanted),
+                wanted.plan,
+                moves=wanted.moves,
+                by=person.name,
+                even_if_stuck=wanted.even_if_stuck,
+            )
+
+    return routes
