@@ -123,6 +123,10 @@ def _requirement_monitored(_: RunView, record: r.RequirementMonitored) -> _Sente
     return text, Importance.DETAIL
 
 
+def _requirement_dropped(_: RunView, record: r.RequirementDropped) -> _Sentence:
+    return f"requirement {record.requirement} is no longer monitored", Importance.NORMAL
+
+
 def _requirement_decided(_: RunView, record: r.RequirementDecided) -> _Sentence:
     violated = record.verdict is r.RequirementVerdict.VIOLATED
     said = record.english.rstrip(".")
@@ -568,6 +572,7 @@ _SENTENCES: dict[type, Callable[[RunView, Any], _Sentence]] = {
     r.CompensationBegan: _compensation_began,
     r.TransactionCancelled: _transaction_cancelled,
     r.RequirementMonitored: _requirement_monitored,
+    r.RequirementDropped: _requirement_dropped,
     r.RequirementDecided: _requirement_decided,
     r.TelemetryConditionChanged: _condition_changed,
 }
@@ -588,6 +593,7 @@ _KINDS: dict[type, Kind] = {
             r.InputDeferred,
             r.InputSeen,
             r.RequirementMonitored,
+            r.RequirementDropped,
             r.RequirementDecided,
             r.MissionRevised,
         ),

@@ -428,9 +428,18 @@ class RunView:
     # --- requirements ---------------------------------------------------------------------------
 
     def _monitor(self, record: r.RequirementMonitored) -> None:
-        self.requirements[record.requirement] = RequirementState(
-            record.requirement, record.english, record.elements
-        )
+        known = self.requirements.get(record.requirement)
+        if known is None:
+            self.requirements[record.requirement] = RequirementState(
+                record.requirement, record.english, record.elements
+            )
+        else:  # in the words of a new version of the mission
+            known.english, known.elements = record.english, record.elements
+        if self.changes is not None:
+            self.changes.requirements.add(record.requirement)
+
+    def _drop(self, record: r.RequirementDropped) -> None:
+        self.requirements.pop(record.requirement, None)
         if self.changes is not None:
             self.changes.requirements.add(record.requirement)
 
@@ -741,6 +750,7 @@ _FOLDS: dict[type, Callable[[RunView, Any], None]] = {
     r.EventAwaited: RunView._await_event,
     r.EventTriggered: RunView._trigger_event,
     r.RequirementMonitored: RunView._monitor,
+    r.RequirementDropped: RunView._drop,
     r.RequirementDecided: RunView._decide,
     r.MissionRevised: RunView._revise,
 }

@@ -332,7 +332,8 @@ class Revise(_Input, frozen=True):
     `version`: of the files (`m2pem.mission.version`). `mission_name`, `mission`, `library`: as in
     the header of a run. `moves`: where a token on an element goes first, by the ids of elements or,
     at a join, of sequence flows; "": it ends there. `plan`: the digest of the plan that was shown;
-    the run is only revised if that is what the revision does now.
+    the run is only revised if that is what the revision does now. `requirements`: those that the
+    run is monitored for from then on.
     """
 
     version: str
@@ -342,6 +343,7 @@ class Revise(_Input, frozen=True):
     library: tuple[Source, ...] = ()
     moves: dict[str, str] = msgspec.field(default_factory=dict)
     by: str = ""
+    requirements: tuple[MonitoredRequirement, ...] = ()
 
 
 class OperatorNoted(_Input, frozen=True):

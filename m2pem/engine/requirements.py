@@ -12,13 +12,21 @@ from m2pem.engine.triggering import throw_signal
 
 
 def monitor(x: Execution, requirements: tuple[i.MonitoredRequirement, ...]) -> None:
-    """Record which requirements the run is monitored for, as it begins."""
+    """Record which requirements the run is monitored for from now on.
+
+    One of the same formula as before goes on, with its verdict; another one begins.
+    """
+    before = x.state.requirements
+    formulas = {each.id: each.formula for each in requirements}
+    for number, known in list(before.items()):
+        if formulas.get(number) != known.formula:
+            x.emit(r.RequirementDropped(number))
     for each in requirements:
-        x.emit(
-            r.RequirementMonitored(
-                each.id, each.formula, each.english, each.elements, each.on_violation
-            )
+        record = r.RequirementMonitored(
+            each.id, each.formula, each.english, each.elements, each.on_violation
         )
+        if before.get(each.id) != record:
+            x.emit(record)
 
 
 def requirement_decided(x: Execution, item: i.RequirementDecided) -> None:

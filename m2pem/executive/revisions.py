@@ -9,10 +9,12 @@ from m2pem.api.authoring import MissionSource
 from m2pem.api.revision import RevisionEffect, RevisionPreview, RevisionRefusal
 from m2pem.api.runs import IncidentPreview, RunId
 from m2pem.bpmn.one_task import is_one_task
-from m2pem.engine.inputs import Revise
+from m2pem.engine.inputs import MonitoredRequirement, Revise
 from m2pem.engine.revision import RevisionPlan, plan_revision
+from m2pem.engine.state import RunState
 from m2pem.errors import MissionError, OperatorError
 from m2pem.executive.incidents import IncidentChoices
+from m2pem.executive.loading import monitored_requirements
 from m2pem.executive.run_starter import RunStarter
 from m2pem.executive.runner import Runner
 from m2pem.executive.supervisor import Supervisor
@@ -60,13 +62,46 @@ class RunRevisions:
             process = None  # which the plan refuses
         names = tuple(root.data) if root is not None else ()
         found = await asyncio.to_thread(self._starter.findings, loaded, process, names)
+        requirements = await asyncio.to_thread(self._requirements, state, loaded, names)
         if loaded.chooses_resources or waits_for_space(self._supervisor.fleet):
             await asyncio.to_thread(load_solver)
         # From here nothing is awaited: the plan is of this moment.
         plan = plan_revision(state, loaded, moves, self._supervisor.clock.now_us())
         files = (loaded.file, loaded.source, plan.digest, loaded.library)
-        return Prepared(
-            loaded, plan, tuple(found), Revise(plan.version, *files, moves=dict(moves), by=by)
+        item = Revise(plan.version, *files, moves=dict(moves), by=by, requirements=requirements)
+        return Prepared(loaded, plan, tuple(found), item)
+
+    def _requirements(
+        self, state: RunState, new: Mission, names: Sequence[str]
+    ) -> tuple[MonitoredRequirement, ...]:
+        """Return what the run is monitored for with a new version: the requirements of that, and
+        those that were given at its start beside those of its file."""
+        # What reads formulas takes time to load, and most runs are never revised.
+        from m2pem.verify.requirements.requirement import RequirementsError  # noqa: PLC0415
+
+        fleet, plugins = self._supervisor.fleet, self._supervisor.plugins
+        try:
+            theirs = monitored_requirements(new, fleet, plugins, names)
+        except RequirementsError:  # among the findings, too
+            theirs = ()
+        try:
+            before = monitored_requirements(state.mission, fleet, plugins, names)
+        except RequirementsError:
+            before = ()
+        of_files = {each.id for each in (*before, *theirs)}
+        given = (each for each in state.requirements.values() if each.requirement not in of_files)
+        return (
+            *theirs,
+            *(
+                MonitoredRequirement(
+                    each.requirement,
+                    each.formula,
+                    each.english,
+                    each.elements,
+                    each.on_violation,
+                )
+                for each in given
+            ),
         )
 
     def _runner(self, run: RunId) -> Runner:
@@ -86,7 +121,10 @@ class RunRevisions:
             plan.digest,
             plan.version,
             plan.previous,
-            tuple(described(plan.difference)),
+            (
+                *described(plan.difference),
+                *_monitored(self._runner(run).run.state, prepared.item.requirements),
+            ),
             tuple(
                 RevisionEffect(each.kind.value, each.element, each.token, each.text)
                 for each in plan.effects
@@ -146,6 +184,24 @@ def described(difference: Difference) -> Sequence[str]:
         f"changed: {name!r}, a route, area or point of the file" for name in difference.geometries
     ]
     return lines
+
+
+def _monitored(state: RunState, now: Sequence[MonitoredRequirement]) -> Sequence[str]:
+    """Return what becomes of the requirements that the run is monitored for."""
+    if not now and not state.requirements:
+        return []
+    from m2pem.monitors.selection import carried_over  # noqa: PLC0415  # as in `_requirements`
+
+    before = state.requirements
+    goes_on = carried_over(before, now)
+    lines = [
+        f"requirement {each.id}: monitored from here on"
+        f"{', with another formula' if each.id in before else ''}"
+        for each in now
+        if each.id not in goes_on
+    ]
+    left = before.keys() - {each.id for each in now}
+    return lines + [f"requirement {each}: no longer monitored" for each in sorted(left)]
 
 
 def _name(element: object) -> str:

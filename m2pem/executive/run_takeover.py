@@ -90,7 +90,7 @@ class RunTakeover:
                     "%s goes on as it was begun, but would not begin now: %s", number, finding
                 )
         run = MissionRun(mission, supervisor.fleet, number, supervisor.settings.steps_at_once)
-        monitors = RunMonitors(mission, supervisor.fleet)
+        monitors = RunMonitors(run.state, supervisor.fleet)
         last_us = await replay(supervisor.journal, run, monitors, supervisor.settings.on_records)
         mission = run.state.mission  # the version that holds now
         if mission.chooses_resources or waits_for_space(supervisor.fleet):

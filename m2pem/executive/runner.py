@@ -127,7 +127,7 @@ class Runner:
         monitors: RunMonitors | None = None,
     ) -> None:
         self.run = run
-        self.monitors = monitors or RunMonitors(run.state.mission, None)
+        self.monitors = monitors or RunMonitors(run.state, None)
         self.id: RunId = run.state.run
         self.epoch = epoch
         self.failure: M2pemError | None = None

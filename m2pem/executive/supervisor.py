@@ -355,7 +355,7 @@ class Supervisor:
             self.counts,
             self.settings.limit,
         )
-        monitors = monitors or RunMonitors(run.state.mission, self.fleet)
+        monitors = monitors or RunMonitors(run.state, self.fleet)
         runner = Runner(run, epoch, context, self.fleet.steps_between_waits, monitors)
         self.runners[runner.id] = runner
         return runner

@@ -10,6 +10,7 @@ from enum import IntEnum
 from typing import Any
 
 from m2pem.engine import records as r
+from m2pem.engine.state import BehaviorPhase, RunState
 from m2pem.errors import ExpressionError
 from m2pem.fleet.allocation import spelled_out
 from m2pem.fleet.fleet import Fleet
@@ -108,6 +109,43 @@ class Moments:
             case Data():
                 for name in each.expression.names:
                     self._read.setdefault(name.partition(".")[0], []).append((bit, each))
+                self._set(bit, self._holds(each))
+
+    def extend(self, propositions: Sequence[Proposition], state: RunState) -> None:
+        """Go on with a new version of the mission, and more propositions: those before come first.
+
+        The new ones are as the state says, after all records that were read.
+        """
+        self._elements = state.mission.elements
+        known = len(self.propositions)
+        self.propositions = tuple(propositions)
+        for number, each in enumerate(self.propositions[known:], known):
+            self._add(1 << number, each, state.mission)
+            self._take_from(state, 1 << number, each)
+
+    def take_data(self, state: RunState) -> None:
+        """Take what was written before from the state."""
+        root = state.scopes.get(_ROOT)
+        self._process = state.root.container.id if state.root is not None else ""
+        self._data = {_ROOT: dict(root.data) if root else {}, _SHARED: dict(state.shared.data)}
+
+    def _take_from(self, state: RunState, bit: int, each: Proposition) -> None:
+        match each:
+            case Active(element):
+                self._count(bit, sum(token.node.id == element for token in state.tokens.values()))
+                if element == self._process:
+                    self._set(bit, True)
+                elif element in self._processes:
+                    there = (token.node.container.process.id for token in state.tokens.values())
+                    self._count(bit, sum(process == element for process in there))
+            case Commanded():
+                _, wanted, name = self._commanded[-1]
+                for behavior in state.behaviors.values():
+                    meant = wanted <= {*behavior.resources} and name in ("", behavior.name)
+                    if meant and behavior.phase is not BehaviorPhase.CANCELLING:
+                        self._behaviors.setdefault(behavior.id, []).append(bit)
+                        self._count(bit, 1)
+            case Data():
                 self._set(bit, self._holds(each))
 
     def read(self, records: Iterable[r.Record]) -> None:

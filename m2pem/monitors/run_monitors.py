@@ -1,11 +1,14 @@
 """The monitors of one run: they read its records, and find what is certain of its requirements.
 
-    monitors = RunMonitors(mission, fleet)
+    monitors = RunMonitors(run.state, fleet)
     monitors.observe(step.t_us, step.records)       # after each input, also in a replay
     monitors.advance(t_us)                          # at `due_us`, if nothing came before
     for item in monitors.take(): ...                # inputs for the run: `RequirementDecided`
 
 Pure: a verdict depends on the records and their mission times alone, so a replay finds the same.
+
+When the mission is revised, a requirement of the same formula goes on, and its monitor with what it
+knows. Another one is monitored from the revision on, as if the run began there.
 """
 
 from collections.abc import Iterable, Sequence
@@ -13,18 +16,19 @@ from typing import TYPE_CHECKING
 
 from m2pem.engine import records as r
 from m2pem.engine.inputs import RequirementDecided, TelemetryConditionChanged
+from m2pem.engine.state import RunState
 from m2pem.fleet.fleet import Fleet
-from m2pem.mission.mission import Mission
 
 if TYPE_CHECKING:
     from m2pem.monitors.anticipation import Verdict
     from m2pem.monitors.moments import Moments
     from m2pem.monitors.monitor import Monitor
     from m2pem.monitors.telemetry_conditions import Latest
-    from m2pem.verify.ltl.formula import Measured
+    from m2pem.verify.ltl.formula import Measured, Proposition
 
 ENDED = "the run has ended"
 BEGINNING = "from the beginning"
+FROM_THE_REVISION = "as the mission was revised"
 TIME_IS_OVER = "its time is over"
 _NO_LETTER = -1
 
@@ -32,8 +36,9 @@ _NO_LETTER = -1
 class RunMonitors:
     """The monitors of one run. Records `RequirementMonitored` say which there are."""
 
-    def __init__(self, mission: Mission, fleet: Fleet | None) -> None:
-        self._mission = mission
+    def __init__(self, state: RunState, fleet: Fleet | None) -> None:
+        """`state`: of the run, to which records are applied before they are observed."""
+        self._state = state
         self._fleet = fleet
         self._moments: Moments | None = None
         self._open: dict[str, Monitor] = {}
@@ -50,11 +55,16 @@ class RunMonitors:
 
     def observe(self, t_us: int, records: Sequence[r.Record]) -> None:
         """Read the records of one input. `t_us`: their mission time."""
+        revised = any(type(each) is r.MissionRevised for each in records)
         moments = self._moments
         if moments is None:
+            if revised:
+                self._t_us = t_us
+                self._revise(records)
+                return
             if not records or type(records[0]) is not r.RunStarted:
                 return
-            self._begin(records)
+            self._begin([each for each in records if type(each) is r.RequirementMonitored])
             moments = self._moments
             if moments is None:
                 return
@@ -69,6 +79,8 @@ class RunMonitors:
                 self._end(record)
             elif type(record) is r.RequirementDecided:
                 self._note(record.requirement)
+        if revised:
+            self._revise(records)
 
     def advance(self, t_us: int) -> None:
         """Mission time has passed without a record."""
@@ -93,28 +105,69 @@ class RunMonitors:
         found, self._found = list(self._found.values()), {}
         return found
 
-    def _begin(self, records: Iterable[r.Record]) -> None:
-        monitored = [each for each in records if type(each) is r.RequirementMonitored]
+    def _begin(self, monitored: Sequence[r.RequirementMonitored]) -> None:
         if not monitored:
             return
         # What reads formulas takes time to load, and most runs have none.
         from m2pem.monitors.moments import Moments  # noqa: PLC0415
-        from m2pem.monitors.monitor import Monitor, propositions_of  # noqa: PLC0415
+        from m2pem.monitors.monitor import propositions_of  # noqa: PLC0415
+
+        known = propositions_of(monitored)
+        self._moments = Moments(known, self._state.mission, self._fleet, self._read)
+        self._add(monitored, known)
+
+    def _add(
+        self, monitored: Sequence[r.RequirementMonitored], known: Sequence["Proposition"]
+    ) -> "list[Monitor]":
+        """Monitor requirements from now on. `known`: the propositions of the run's letters."""
+        from m2pem.monitors.monitor import Monitor  # noqa: PLC0415  # as in `_begin`
         from m2pem.verify.ltl.formula import Measured, show_measured  # noqa: PLC0415
         from m2pem.verify.requirements.english import English  # noqa: PLC0415
 
-        known = propositions_of(monitored)
-        names = {each.id: each.name for each in (*self._mission.nodes, *self._mission.processes)}
-        english = English(names)
-        self._open = {each.requirement: Monitor(each, known, english) for each in monitored}
+        mission = self._state.mission
+        english = English({each.id: each.name for each in (*mission.nodes, *mission.processes)})
+        added = [Monitor(each, known, english) for each in monitored]
+        self._open |= {each.id: each for each in added}
         self._timed = [each for each in self._open.values() if each.is_timed]
-        self._conditions = {
-            show_measured(each): (1 << bit, each)
-            for bit, each in enumerate(known)
-            if isinstance(each, Measured)
-        }
-        self._unknown = sum(bit for bit, _ in self._conditions.values())
-        self._moments = Moments(known, self._mission, self._fleet, self._read)
+        for bit, each in enumerate(known):
+            if isinstance(each, Measured) and show_measured(each) not in self._conditions:
+                self._conditions[show_measured(each)] = (1 << bit, each)
+                self._unknown |= 1 << bit
+        return added
+
+    def _revise(self, records: Iterable[r.Record]) -> None:
+        """Follow the requirements of a new version of the mission."""
+        dropped = [each.requirement for each in records if type(each) is r.RequirementDropped]
+        for number in dropped:
+            self._open.pop(number, None)
+            self._found.pop(number, None)
+            self._recorded.discard(number)
+        self._timed = [each for each in self._open.values() if each.is_timed]
+        begun = [
+            each
+            for each in records
+            if type(each) is r.RequirementMonitored and not self._goes_on(each.requirement)
+        ]
+        if not begun:
+            if self._moments is not None:
+                self._moments.extend(self._moments.propositions, self._state)
+            return
+        from m2pem.monitors.moments import Moments  # noqa: PLC0415  # as in `_begin`
+        from m2pem.monitors.monitor import propositions_of  # noqa: PLC0415
+
+        if self._moments is None:
+            self._moments = Moments((), self._state.mission, self._fleet, self._read)
+            self._moments.take_data(self._state)
+        before = self._moments.propositions
+        known = tuple(dict.fromkeys((*before, *propositions_of(begun))))
+        self._moments.extend(known, self._state)
+        self._letter = self._moments.state
+        for each in self._add(begun, known):
+            if self._is_certain(each, each.read(self._t_us, self._letter, self._unknown)):
+                self._decide(each, self._t_us, FROM_THE_REVISION)
+
+    def _goes_on(self, requirement: str) -> bool:
+        return any(requirement in each for each in (self._open, self._recorded, self._found))
 
     def _read(self, letter: int) -> None:
         before = self._letter

@@ -44,7 +44,10 @@ ACCEPTED = BehaviorReported("r1.b1", 1, BehaviorState.ACCEPTED)
 RUNNING = BehaviorReported("r1.b1", 2, BehaviorState.RUNNING, native_ref="native")
 
 
-def left_behind(source: bytes, *inputs: Input) -> MemoryJournal:
+START = StartRun("P")
+
+
+def left_behind(source: bytes, *inputs: Input, start: StartRun = START) -> MemoryJournal:
     """A journal in which run r1 got `inputs`, a second apart, and then its executive died."""
 
     async def write() -> MemoryJournal:
@@ -52,7 +55,7 @@ def left_behind(source: bytes, *inputs: Input) -> MemoryJournal:
         vehicles = fleet("ugv1")
         number = await journal.create(RunHeader("m.bpmn", source, "P", dump(vehicles)))
         run = MissionRun(parse_mission(source, "m.bpmn", accepted=True), vehicles, number)
-        for second, item in enumerate((StartRun("P"), *inputs)):
+        for second, item in enumerate((start, *inputs)):
             at_us = START_US + second * 1_000_000
             step = run.receive(item, at_us)
             await journal.append(

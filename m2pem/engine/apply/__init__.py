@@ -100,6 +100,7 @@ APPLIERS: dict[type, Callable[[RunState, Any], None]] = {
     r.ScopeReopened: compensation.scope_reopened,
     r.TransactionCancelled: tokens.transaction_cancelled,
     r.RequirementMonitored: requirements.requirement_monitored,
+    r.RequirementDropped: requirements.requirement_dropped,
     r.RequirementDecided: requirements.requirement_decided,
     r.TelemetryConditionChanged: requirements.telemetry_condition_changed,
 }

@@ -8,6 +8,11 @@ def requirement_monitored(state: RunState, record: r.RequirementMonitored) -> No
     state.requirements[record.requirement] = record
 
 
+def requirement_dropped(state: RunState, record: r.RequirementDropped) -> None:
+    del state.requirements[record.requirement]
+    state.verdicts.pop(record.requirement, None)
+
+
 def requirement_decided(state: RunState, record: r.RequirementDecided) -> None:
     state.verdicts[record.requirement] = record.verdict
 

@@ -38,6 +38,7 @@ from m2pem.engine.records.incidents import (
 )
 from m2pem.engine.records.requirements import (
     RequirementDecided,
+    RequirementDropped,
     RequirementMonitored,
     TelemetryConditionChanged,
 )
@@ -151,6 +152,7 @@ __all__ = [
     "PromptWithdrawn",
     "Record",
     "RequirementDecided",
+    "RequirementDropped",
     "RequirementMonitored",
     "RequirementVerdict",
     "ResourceKept",
@@ -256,6 +258,7 @@ Record: TypeAlias = Union[
     ScopeReopened,
     TransactionCancelled,
     RequirementMonitored,
+    RequirementDropped,
     RequirementDecided,
     TelemetryConditionChanged,
 ]

@@ -19,6 +19,13 @@ class RequirementMonitored(BaseRecord, frozen=True):
     on_violation: str = ""
 
 
+class RequirementDropped(BaseRecord, frozen=True):
+    """The run is no longer monitored for a requirement: the new version of its mission does not
+    have it, or has another formula for it."""
+
+    requirement: str
+
+
 class RequirementDecided(BaseRecord, frozen=True):
     """It is certain that the run satisfies or violates a requirement, whatever follows.
 

@@ -12,6 +12,7 @@ from m2pem.engine.elements.activities import activate_later
 from m2pem.engine.execution import Execution, definitions_of
 from m2pem.engine.inputs import Revise
 from m2pem.engine.records import TokenOutcome
+from m2pem.engine.requirements import monitor
 from m2pem.engine.revision.plan import Arming, Move, RevisionPlan
 from m2pem.engine.revision.planning import plan_revision
 from m2pem.engine.scopes import stop_activity
@@ -59,6 +60,7 @@ def _carry_out(x: Steps, plan: RevisionPlan, item: Revise) -> None:
         )
     )
     x.read_mission()
+    monitor(x, item.requirements)
     for move in plan.moves:
         _enter(x, move)
     for arming in plan.armings:
