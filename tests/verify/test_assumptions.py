@@ -26,6 +26,7 @@ from m2pem.verify.translate import Options, translate
 from m2pem.verify.translate.context import behavior_of
 from tests.engine.notation import mission as notation
 from tests.engine.random_missions import graph, structured
+from tests.verify import random_space
 from tests.verify.missions import pair
 from tests.verify.random_needs import OPEN, branches_with_needs, fleet_of
 from tests.verify.test_spin_agreement import one_answer, same
@@ -254,6 +255,38 @@ def test_so_are_those_of_missions_whose_tasks_choose_their_vehicles(text: str) -
         mission = notation(branches_with_needs(Random(seed)))
         looked_at += agree(mission, fleet_of(mission), OPEN, text)
     assert looked_at >= 5
+
+
+def stuck(found: Exploration) -> set[State]:
+    names = states_of(found)
+    ends = {found.net.places[p].name for p in found.net.ends}
+    return {names[n] for n in found.terminals if not any(name in ends for name, _ in names[n])}
+
+
+@pytest.mark.parametrize("text", [*TEXTS, "reliable(ugv1, ugv2)", "messages-within 1 s"])
+def test_an_assumption_makes_no_deadlock(text: str) -> None:
+    """Also where a behavior was refused a shared space, and can only fail."""
+    looked_at = 0
+    for seed in range(30):
+        dice = Random(seed)
+        if seed % 2:
+            mission = notation(dice.choice((structured, graph))(dice))
+            fleet, options = fleet_for(mission), Options(open_world=True)
+        else:
+            fleet = random_space.random_fleet(dice)
+            mission = notation(random_space.random_mission(dice))
+            options = random_space.options_of(fleet)
+        assumed = parse(text)
+        if not assumed.reliable <= {*fleet.vehicles}:
+            continue
+        options = replace(options, distinguished=assumed.resources(fleet))
+        full = explore(translate(mission, fleet, options=options), FEW)
+        net = translate(mission, fleet, options=replace(options, assumed=assumed))
+        found = explore(net, MANY)
+        if full.complete and found.complete:
+            assert stuck(found) <= stuck(full)
+            looked_at += 1
+    assert looked_at >= 2
 
 
 # --- timers while a message is awaited ------------------------------------------------------------
