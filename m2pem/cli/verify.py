@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -16,7 +16,6 @@ from m2pem.cli.options import (
     data_option,
     example,
     fleet_option,
-    format_option,
     mission_argument,
     path_option,
     process_option,
@@ -95,8 +94,8 @@ if TYPE_CHECKING:
     type=click.Path(dir_okay=False, path_type=Path),
     metavar="FILE",
     multiple=True,
-    help="Write a report: FILE.md with pictures beside it, FILE.json for programs, or FILE.svg "
-    "with the first violation. Can be given again.",
+    help="Write a report: FILE.md with pictures beside it, FILE.json for programs, FILE.sarif for "
+    "CI services, or FILE.svg with the first violation. Can be given again.",
 )
 @click.option(
     "--max-states",
@@ -118,7 +117,14 @@ if TYPE_CHECKING:
     help="Search on after a violation, to the end or to these limits. Otherwise a large search "
     "ends soon after it.",
 )
-@format_option
+@click.option(
+    "--format",
+    "output",
+    type=click.Choice(["text", "json", "sarif"]),
+    default="text",
+    show_default=True,
+    help="Print for people, or for programs: JSON, or SARIF 2.1.0 for CI services.",
+)
 def verify(
     mission: str,
     fleet_file: str | None,
@@ -172,14 +178,14 @@ def verify(
         tokens=TOKENS_ON_A_PLACE,
         after_violation=None if exhaustive else AFTER_VIOLATION_STATES,
     )
-    lines = None if output == "json" else _lines(asked, strict=strict)
+    lines = _lines(asked, strict=strict) if output == "text" else None
     found = findings(asked, SearchEngine(engine, storage, limits), strict=strict, lines=lines)
     for file in reports:
         write(file, found)
-    if lines is None:
-        click.echo(as_json(as_data(found)))
-    else:
+    if lines is not None:
         click.echo(as_text(found, _paint(), printed=lines.printed))
+    else:
+        click.echo(as_json(as_data(found) if output == "json" else _sarif(found)))
     return found.exit_status
 
 
@@ -205,6 +211,13 @@ def _emit(text: str, file: str) -> None:
         Path(file).write_text(text, encoding="utf-8")
     except OSError as error:
         raise UnusableError(f"{file} cannot be written: {error.strerror}") from error
+
+
+def _sarif(found: "Findings") -> "dict[str, Any]":
+    from m2pem import __version__
+    from m2pem.verify.report.sarif import as_sarif
+
+    return as_sarif(found, __version__)
 
 
 def _lines(asked: "SearchRequest", *, strict: bool) -> "ResultLines":
@@ -296,7 +309,7 @@ def _line(searched: "Progress") -> str:
     return ", ".join(said)
 
 
-KINDS = (".md", ".json", ".svg")
+KINDS = (".md", ".json", ".sarif", ".svg")
 """Endings of reports' files."""
 
 
@@ -311,6 +324,8 @@ def write(file: Path, findings: "Findings") -> None:
             from m2pem.verify.report.data import as_data
 
             file.write_text(as_json(as_data(findings)) + "\n", encoding="utf-8")
+        elif file.suffix == ".sarif":
+            file.write_text(as_json(_sarif(findings)) + "\n", encoding="utf-8")
         elif file.suffix == ".svg":
             first = next(iter(findings.violations), None)
             _write_pictures(file, _pictures(findings, first))

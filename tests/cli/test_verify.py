@@ -85,7 +85,7 @@ def test_an_unknown_process_is_unusable(invoke: Invoke) -> None:
 def test_a_report_of_an_unknown_kind_is_refused_before_anything_is_done(invoke: Invoke) -> None:
     status, _, err = invoke("verify", MISSION, "--report", "report.pdf")
     assert status == 2
-    assert ".md, .json, .svg" in err
+    assert ".md, .json, .sarif, .svg" in err
 
 
 def test_json_on_standard_output_is_the_report(invoke: Invoke) -> None:
