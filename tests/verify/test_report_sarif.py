@@ -12,6 +12,8 @@ import pytest
 from m2pem.cli.group import run_command_line
 from m2pem.verify.properties import NAMES
 from m2pem.verify.properties.help import HELP
+from tests.engine.notation import xml
+from tests.verify.test_report_pictures import CALLED, MAIN
 
 ROOT = Path(__file__).parents[2]
 BROKEN = sorted(file.name for file in (ROOT / "docs" / "broken").glob("*.bpmn"))
@@ -120,3 +122,22 @@ def test_help_is_what_the_documentation_says() -> None:
         name: (each.means, each.correction) for name, each in HELP.items()
     }
     assert tuple(HELP) == NAMES
+
+
+def test_what_is_in_a_called_file_is_shown_there(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "my tour.bpmn").write_text(xml(MAIN), encoding="utf-8")
+    (tmp_path / "look.bpmn").write_text(xml(CALLED), encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    run = sarif(capsys, "my tour.bpmn")
+    (result,) = [each for each in run["results"] if each["ruleId"] == "decisions-handled"]
+    (place,) = result["locations"]
+    assert place["logicalLocations"][0]["name"] == "look:Which"
+    assert place["physicalLocation"]["artifactLocation"]["uri"] == "look.bpmn"
+    line = place["physicalLocation"]["region"]["startLine"]
+    lines = (tmp_path / "look.bpmn").read_text(encoding="utf-8").splitlines()
+    assert 'id="Which"' in lines[line - 1]
+    steps = result["codeFlows"][0]["threadFlows"][0]["locations"]
+    files = {s["location"]["physicalLocation"]["artifactLocation"]["uri"] for s in steps}
+    assert files == {"my%20tour.bpmn", "look.bpmn"}
