@@ -38,6 +38,7 @@ COMMANDS = {
     "verify": "Prove properties and requirements of a mission, or show a run that violates them.",
     "simulate": "Rehearse a mission on a virtual clock.",
     "debug": "Rehearse a mission step by step: stop, look, change, go back.",
+    "campaign": "Rehearse a mission many times, with faults and times that are drawn.",
     "runs": "List the runs of a journal.",
     "export": "Export runs for other programs.",
     "journal": "Show the state of a journal, check it, back it up, salvage or compact it.",

@@ -122,12 +122,11 @@ def read_settings(connection: Connection, origin: Origin) -> Settings:
     reader = _Reader(connection, origin)
     default = DEFAULTS.get(connection.domain, DEFAULTS["ground"])
     said = {"cruise_speed_m_s": connection.cruise_speed_m_s, "endurance_s": connection.endurance_s}
-    default = dataclasses.replace(default, **{key: v for key, v in said.items() if v is not None})
+    given: dict[str, Any] = {key: value for key, value in said.items() if value is not None}
+    default = dataclasses.replace(default, **given)
+    moves: dict[str, Any] = {**reader.numbers(_KINEMATICS)}
     settings = Settings(
-        kinematics=dataclasses.replace(
-            dataclasses.replace(default, wind_m_s=reader.wind(connection.domain)),
-            **reader.numbers(_KINEMATICS),
-        ),
+        kinematics=dataclasses.replace(default, **moves, wind_m_s=reader.wind(connection.domain)),
         gimbal=dataclasses.replace(Gimbal(), **reader.numbers(_GIMBAL)),
         home=reader.position("home"),
         heading_rad=reader.number("heading", Dimension.ANGLE, 0.0),

@@ -1,0 +1,1 @@
+"""Campaigns: one mission rehearsed many times, with drawn faults, times and conditions."""

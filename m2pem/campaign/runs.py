@@ -1,0 +1,179 @@
+"""The runs of a campaign, a chunk at a time: what each process of a pool or cluster does."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from m2pem.api.authoring import MissionFiles
+from m2pem.api.runs import RunStatus, StampedRecord
+from m2pem.campaign.variations import DrawnRun, Variations, read_variations
+from m2pem.engine import records as r
+from m2pem.errors import M2pemError
+from m2pem.executive.loading import load_source
+from m2pem.fleet.fleet import dump, restore
+from m2pem.mission.elements import EndEvent
+from m2pem.mission.mission import Mission
+from m2pem.mission.values import Value
+from m2pem.plugins import PluginManager
+from m2pem.rehearsal.answers import Answers
+from m2pem.rehearsal.answers_file import AnswersModel
+from m2pem.rehearsal.rehearsal import RehearsalResult, Rehearser
+
+if TYPE_CHECKING:
+    from m2pem.fleet.fleet import Fleet
+
+Row = dict[str, Any]
+"""One run: `run`, `outcome`, `end`, `took_s`, `records`, `error`; `battery.VEHICLE` at its end, a
+fraction; `drawn.NAME`. `error`: why it could not be rehearsed; such a run has nothing else."""
+
+ONLY_AT_THE_END_S = 1e9
+"""The period of samples: one at the beginning, and one at the end."""
+
+MAX_STEPS = 100_000
+"""Engine steps after which a run is given up."""
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """All that the runs of a campaign depend on but their numbers. It is pickled for other
+    processes; `variations` is the text of the file."""
+
+    mission: MissionFiles
+    fleet: bytes
+    variations: bytes
+    seed: int
+    process: str | None
+    data: Mapping[str, Value]
+    max_steps: int = MAX_STEPS
+
+    def __hash__(self) -> int:
+        return hash((self.mission.source, self.fleet, self.variations, self.seed, self.process))
+
+
+def order_of(
+    mission: Mission,
+    fleet: "Fleet",
+    variations: bytes,
+    seed: int,
+    *,
+    process: str | None = None,
+    data: Mapping[str, Value] | None = None,
+    max_steps: int = MAX_STEPS,
+) -> Order:
+    """Return the order of a campaign.
+
+    Raises:
+        AnswersError: the variations cannot be used, or do not fit mission and fleet.
+    """
+    read_variations(variations).refuse_misfits(mission, fleet)
+    files = MissionFiles(mission.file, mission.source, mission.library)
+    return Order(files, dump(fleet), variations, seed, process, dict(data or {}), max_steps)
+
+
+@lru_cache(maxsize=2)
+def _prepared(order: Order) -> tuple[Rehearser, Variations]:
+    """Read and check everything once in this process."""
+    mission = load_source(order.mission)
+    rehearser = Rehearser(mission, restore(order.fleet), PluginManager(), order.process)
+    return rehearser, read_variations(order.variations)
+
+
+def rehearse_runs(order: Order, runs: Sequence[int]) -> list[Row]:
+    """Rehearse some runs of a campaign, and return a row for each, in their order."""
+    return [rehearse_run(order, run) for run in runs]
+
+
+def rehearse_run(order: Order, run: int) -> Row:
+    """Rehearse one run, and return its row."""
+    rehearser, variations = _prepared(order)
+    drawn = variations.draw(order.seed, run)
+    try:
+        result = _rehearse(rehearser, order, drawn)
+    except M2pemError as error:
+        return {"run": run, "error": str(error)}
+    return row_of(run, rehearser.mission, result, drawn)
+
+
+def replayed(order: Order, run: int) -> tuple[DrawnRun, RehearsalResult]:
+    """Rehearse a run again: what was drawn for it, and its result with all records."""
+    rehearser, variations = _prepared(order)
+    drawn = variations.draw(order.seed, run)
+    return drawn, _rehearse(rehearser, order, drawn)
+
+
+def _rehearse(rehearser: Rehearser, order: Order, drawn: DrawnRun) -> RehearsalResult:
+    return rehearser.rehearse(
+        data=order.data,
+        answers=Answers(AnswersModel.model_validate(drawn.answers)),
+        max_steps=order.max_steps,
+        observed=False,
+        telemetry_every_s=ONLY_AT_THE_END_S,
+        fits=True,
+    )
+
+
+def row_of(run: int, mission: Mission, result: RehearsalResult, drawn: DrawnRun) -> Row:
+    """Return the row of a run that was rehearsed."""
+    summary = result.summary
+    row: Row = {
+        "run": run,
+        "outcome": summary.status.value,
+        "end": end_of(mission, summary.status, result.records),
+        "took_s": summary.took_s,
+        "records": len(result.records),
+        "error": "",
+    }
+    for vehicle, state in result.telemetry[-1].vehicles.items():
+        row[f"battery.{vehicle}"] = state.battery_fraction
+    row.update({f"drawn.{key}": value for key, value in drawn.values.items()})
+    return row
+
+
+def end_of(mission: Mission, status: RunStatus, records: Iterable[StampedRecord]) -> str:
+    """Return how a run has ended: the end events of its process that were reached, sorted, or the
+    code of the error that no event caught."""
+    ends: set[str] = set()
+    code = ""
+    first = ""
+    for stamped in records:
+        match stamped.record:
+            case r.RunStarted():
+                first = stamped.record.process
+            case r.TokenEntered() as entered:
+                node = mission.elements.get(entered.element)
+                if isinstance(node, EndEvent):
+                    ends.add(node.id)
+            case r.ErrorThrown():
+                code = stamped.record.code
+            case _:
+                pass
+    if status is RunStatus.FAILED:
+        return code or "given up"
+    own = {node.id for node in mission.process(first or None).nodes if isinstance(node, EndEvent)}
+    return ", ".join(sorted(ends & own))
+
+
+def answers_text(drawn: DrawnRun, remark: str) -> str:
+    """Return a drawn run as an answers file, that begins with a remark."""
+    from io import StringIO  # noqa: PLC0415  # only what writes files needs it
+
+    from ruamel.yaml import YAML  # noqa: PLC0415
+
+    out = StringIO()
+    yaml = YAML(typ="safe", pure=True)
+    yaml.default_flow_style = None
+    yaml.width = 120
+    yaml.dump(drawn.answers, out)
+    return f"# {remark}\n{out.getvalue()}"
+
+
+def read_text(file: Path) -> bytes:
+    """Read the text of a variations file, whose shape is checked with its name.
+
+    Raises:
+        AnswersError: it cannot be read or used.
+    """
+    read_variations(file)
+    return file.read_bytes()

@@ -1,0 +1,340 @@
+"""What a campaign varies: the shape of a variations file, and the answers that are drawn by it.
+
+A drawn run is an answers file (docs/rehearsal.md), which `m2pem simulate` replays.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    StringConstraints,
+    ValidationError,
+)
+
+from m2pem.api.simulator_settings import fraction
+from m2pem.campaign.distributions import Distribution, Draw, read_distribution, weighted
+from m2pem.errors import AnswersError
+from m2pem.findings import has_errors
+from m2pem.fleet.fleet import Fleet
+from m2pem.fleet.yaml_source import YamlSource, note_shape_findings, parse_yaml, read_yaml
+from m2pem.mission.mission import Mission
+from m2pem.rehearsal.answers import Answers, check_answers
+from m2pem.rehearsal.answers_file import AnswersModel
+from m2pem.units import Dimension, quantity
+
+VISITS = 8
+"""For so many visits of an element what happens is drawn, unless the file says otherwise."""
+
+_SETTINGS: Mapping[str, Dimension] = {
+    "max_speed": Dimension.SPEED,
+    "cruise_speed": Dimension.SPEED,
+    "climb_rate": Dimension.SPEED,
+    "endurance": Dimension.DURATION,
+    "wind": Dimension.SPEED,
+    "wind_from": Dimension.ANGLE,
+}
+"""Settings of simulated vehicles that may be drawn, besides `battery`."""
+
+
+def _of(dimension: Dimension) -> BeforeValidator:
+    def read(said: object) -> float:
+        value = quantity(said, dimension)
+        if value < 0 and dimension is not Dimension.ANGLE:
+            raise ValueError(f"{said!r} is below 0")
+        return value
+
+    return BeforeValidator(
+        lambda said: said if isinstance(said, Distribution) else read_distribution(said, read)
+    )
+
+
+def _speed(said: object) -> float:
+    return quantity(said, Dimension.SPEED)
+
+
+Text = Annotated[str, StringConstraints(min_length=1)]
+Seconds = Annotated[Distribution, _of(Dimension.DURATION)]
+Speed = Annotated[Distribution, _of(Dimension.SPEED)]
+Angle = Annotated[Distribution, _of(Dimension.ANGLE)]
+Probability = Annotated[float, Field(ge=0, le=1, strict=False)]
+Weight = Annotated[float, Field(ge=0, strict=False)]
+Setting = Annotated[Any, BeforeValidator(lambda said: said)]
+_NOW = read_distribution(0.0, lambda _: 0.0)
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(
+        strict=True, extra="forbid", frozen=True, arbitrary_types_allowed=True
+    )
+
+
+class Failure(_Model):
+    """With what probability a behavior or service fails, when after its start, and with what."""
+
+    probability: Probability
+    after: Seconds = _NOW
+    error: Text = "FAILED"
+
+
+class VariedBehavior(_Model):
+    """Of each visit of a task with a behavior. `duration`: its own, in place of the vehicle's."""
+
+    duration: Seconds | None = None
+    fails: Failure | None = None
+
+
+class WeightedData(_Model):
+    """Data that a service writes, as often as its weight says."""
+
+    weight: Weight = 1.0
+    data: dict[Text, Any]
+
+
+class VariedService(_Model):
+    """Of each visit of a service task."""
+
+    after: Seconds = _NOW
+    fails: Failure | None = None
+    write: list[WeightedData] = Field(default_factory=list)
+
+
+class Arrival(_Model):
+    """A signal or message from outside, which may also not come."""
+
+    id: Text
+    at: Seconds
+    probability: Probability = 1.0
+    data: dict[Text, Any] = Field(default_factory=dict)
+
+
+class VariedLink(_Model):
+    """A link to a vehicle that is lost at a time, for a while, with a probability."""
+
+    vehicle: Text
+    at: Seconds
+    for_: Seconds | None = Field(None, alias="for")
+    probability: Probability = 1.0
+
+
+class VariedWind(_Model):
+    """The wind. Without `from`, it comes from any direction."""
+
+    speed: Speed
+    from_: Angle = Field(
+        read_distribution("0 deg..360 deg", lambda each: quantity(each, Dimension.ANGLE)),
+        alias="from",
+    )
+
+
+class VariationsModel(_Model):
+    """A whole file."""
+
+    visits: Annotated[int, Field(ge=1, le=1000)] = VISITS
+    behaviors: dict[Text, VariedBehavior] = Field(default_factory=dict)
+    services: dict[Text, VariedService] = Field(default_factory=dict)
+    answers: dict[Text, dict[Text, Weight]] = Field(default_factory=dict)
+    signals: list[Arrival] = Field(default_factory=list)
+    messages: list[Arrival] = Field(default_factory=list)
+    links: list[VariedLink] = Field(default_factory=list)
+    vehicles: dict[Text, dict[Text, Setting]] = Field(default_factory=dict)
+    wind: VariedWind | None = None
+
+
+Drawn = float | bool | str
+
+
+@dataclass(frozen=True, slots=True)
+class DrawnRun:
+    """One run that was drawn. `answers`: the content of its answers file; `values`: what was drawn
+    for the first visit of each element, and for the whole run, by its name."""
+
+    answers: dict[str, Any]
+    values: dict[str, Drawn]
+
+
+class Variations:
+    """What a campaign varies; made by `read_variations`."""
+
+    def __init__(self, model: VariationsModel, source: YamlSource) -> None:
+        self.model = model
+        self.source = source
+        self._settings = {
+            vehicle: {key: _setting(key, said) for key, said in settings.items()}
+            for vehicle, settings in model.vehicles.items()
+        }
+
+    def draw(self, seed: int, run: int) -> DrawnRun:
+        """Return what happens in one run. The same seed and run give the same."""
+        return _Drawing(self.model, self._settings, Draw(seed, run)).whole()
+
+    def refuse_misfits(self, mission: Mission, fleet: Fleet) -> None:
+        """Check that the mission and the fleet have all that is varied.
+
+        Raises:
+            AnswersError: with every finding, by the lines of the file.
+        """
+        drawing = _Drawing(self.model, self._settings, Draw(0, 0), everything=True)
+        answers = Answers(AnswersModel.model_validate(drawing.whole().answers), self.source)
+        findings = check_answers(answers, mission, fleet)
+        if has_errors(findings):
+            raise AnswersError(f"{self.source.file} does not fit {mission.file}", findings)
+
+
+def read_variations(said: Path | bytes) -> Variations:
+    """Read a variations file, or its text (JSON, too).
+
+    Raises:
+        AnswersError: with every finding, each with its line.
+    """
+    source = parse_yaml(said, "variations.yaml") if isinstance(said, bytes) else read_yaml(said)
+    model = VariationsModel()
+    if not source.findings and source.data is not None:
+        try:
+            model = VariationsModel.model_validate(source.data)
+        except ValidationError as error:
+            note_shape_findings(source, error, VariationsModel)
+    for vehicle, settings in model.vehicles.items():
+        for key, said_so in settings.items():
+            try:
+                _setting(key, said_so)
+            except ValueError as error:
+                source.error(("vehicles", vehicle, key), "bad-value", str(error))
+    if source.findings:
+        what = f"{source.file} is no variations file that can be used"
+        raise AnswersError(what, source.findings)
+    return Variations(model, source)
+
+
+def _setting(key: str, said: object) -> Distribution:
+    if key == "battery":
+        return read_distribution(said, fraction)
+    if key not in _SETTINGS:
+        known = ", ".join(["battery", *_SETTINGS])
+        raise ValueError(f"{key} of a vehicle cannot be drawn; what can: {known}")
+    return read_distribution(said, lambda each: quantity(each, _SETTINGS[key]))
+
+
+def _as_setting(key: str, value: float) -> float | str:
+    return f"{value!r} rad" if _SETTINGS.get(key) is Dimension.ANGLE else value
+
+
+class _Drawing:
+    """Draws one run. `everything`: also what comes with a probability only."""
+
+    def __init__(
+        self,
+        model: VariationsModel,
+        settings: Mapping[str, Mapping[str, Distribution]],
+        draw: Draw,
+        *,
+        everything: bool = False,
+    ) -> None:
+        self._model = model
+        self._settings = settings
+        self._draw = draw
+        self._everything = everything
+        self._values: dict[str, Drawn] = {}
+
+    def whole(self) -> DrawnRun:
+        model, visits = self._model, range(self._model.visits)
+        answers: dict[str, Any] = {
+            "answers": {
+                element: [self._decision(element, weights, visit) for visit in visits]
+                for element, weights in model.answers.items()
+            },
+            "services": {
+                name: [self._service(name, varied, visit) for visit in visits]
+                for name, varied in model.services.items()
+            },
+            "behaviors": {
+                element: [self._behavior(element, varied, visit) for visit in visits]
+                for element, varied in model.behaviors.items()
+            },
+            "signals": self._arrivals("signals", model.signals),
+            "messages": self._arrivals("messages", model.messages),
+            "vehicles": self._vehicles(),
+        }
+        if model.wind is not None:
+            speed = self._number("wind", model.wind.speed)
+            from_rad = self._number("wind.from", model.wind.from_)
+            answers["wind"] = {"speed": speed, "from": f"{from_rad!r} rad"}
+        return DrawnRun({key: said for key, said in answers.items() if said}, self._values)
+
+    def _number(self, key: str, distribution: Distribution, visit: int = 0) -> float:
+        value = distribution.value(self._draw.share(key, visit))
+        if visit == 0:
+            self._values[key] = value
+        return value
+
+    def _happens(self, key: str, probability: float, visit: int = 0) -> bool:
+        happens = self._draw.share(key, visit) < probability
+        if visit == 0:
+            self._values[key] = happens
+        return happens or self._everything
+
+    def _decision(self, element: str, weights: Mapping[str, float], visit: int) -> str:
+        if self._everything:
+            names = list(weights)
+            return names[visit % len(names)]
+        key = f"answers.{element}"
+        decision = weighted(weights, self._draw.share(key, visit))
+        if visit == 0:
+            self._values[key] = decision
+        return decision
+
+    def _behavior(self, element: str, varied: VariedBehavior, visit: int) -> dict[str, Any]:
+        key = f"behaviors.{element}"
+        if (fails := varied.fails) and self._happens(f"{key}.fails", fails.probability, visit):
+            after_s = fails.after.value(self._draw.share(f"{key}.fails.after", visit))
+            return {"after": after_s, "end": "failed", "error": fails.error}
+        if varied.duration is not None:
+            after_s = self._number(f"{key}.duration", varied.duration, visit)
+            return {"after": after_s, "end": "succeeded"}
+        return {"end": "simulated"}
+
+    def _service(self, name: str, varied: VariedService, visit: int) -> dict[str, Any]:
+        key = f"services.{name}"
+        if (fails := varied.fails) and self._happens(f"{key}.fails", fails.probability, visit):
+            after_s = fails.after.value(self._draw.share(f"{key}.fails.after", visit))
+            return {"after": after_s, "error": fails.error}
+        after_s = self._number(f"{key}.after", varied.after, visit)
+        if not varied.write:
+            return {"after": after_s}
+        weights = {str(place): each.weight for place, each in enumerate(varied.write)}
+        place = int(weighted(weights, self._draw.share(f"{key}.write", visit)))
+        if visit == 0:
+            self._values[f"{key}.write"] = json.dumps(varied.write[place].data, sort_keys=True)
+        return {"after": after_s, "write": varied.write[place].data}
+
+    def _arrivals(self, kind: str, arrivals: list[Arrival]) -> list[dict[str, Any]]:
+        found = []
+        for number, each in enumerate(arrivals):
+            key = f"{kind}.{each.id}" + (f".{number}" if number else "")
+            if self._happens(f"{key}.comes", each.probability):
+                at_s = self._number(f"{key}.at", each.at)
+                found.append({"at": at_s, "id": each.id, "data": each.data})
+        return found
+
+    def _vehicles(self) -> dict[str, dict[str, Any]]:
+        vehicles: dict[str, dict[str, Any]] = {
+            vehicle: {
+                key: _as_setting(key, self._number(f"vehicles.{vehicle}.{key}", distribution))
+                for key, distribution in settings.items()
+            }
+            for vehicle, settings in self._settings.items()
+        }
+        for number, link in enumerate(self._model.links):
+            key = f"links.{link.vehicle}" + (f".{number}" if number else "")
+            if self._happens(f"{key}.lost", link.probability):
+                loss = {"at": self._number(f"{key}.at", link.at)}
+                if link.for_ is not None:
+                    loss["for"] = self._number(f"{key}.for", link.for_)
+                vehicles.setdefault(link.vehicle, {}).setdefault("link_lost", []).append(loss)
+        return vehicles

@@ -1,0 +1,142 @@
+"""Campaigns: the same table whoever rehearses, and whatever happens meanwhile."""
+
+import os
+import signal
+from pathlib import Path
+
+import pytest
+
+from m2pem.campaign import campaign as campaigns
+from m2pem.campaign.campaign import run_campaign
+from m2pem.campaign.pool import rehearse_on_processes
+from m2pem.campaign.report import write_report
+from m2pem.campaign.runs import Order, Row, rehearse_runs, replayed
+from m2pem.campaign.statistics import SequentialTest, estimated, is_good
+from m2pem.errors import OperatorError
+from m2pem.executive.loading import load_source
+from m2pem.fleet.fleet import restore
+from m2pem.plugins import PluginManager
+from m2pem.rehearsal.rehearsal import Rehearser, rehearse
+from tests.campaign.conftest import MakeOrder
+
+KILLED = "M2PEM_TEST_KILLED"
+
+
+def test_rows_are_the_same_in_one_process_in_chunks_and_after_a_resume(
+    order: MakeOrder, folder: Path
+) -> None:
+    whole = run_campaign(order(), 30, chunk=30).rows
+    first = run_campaign(order(), 12, chunk=5, folder=folder)
+    assert [row["run"] for row in first.rows] == list(range(12))
+    rest = run_campaign(order(), 30, chunk=7, folder=folder, resume=True)
+    assert rest.rows == whole
+    with pytest.raises(OperatorError, match="--resume"):
+        run_campaign(order(), 30, folder=folder)
+    with pytest.raises(OperatorError, match="differs in: seed"):
+        run_campaign(order(8), 30, folder=folder, resume=True)
+
+
+def test_a_pool_gives_the_table_of_one_process(order: MakeOrder) -> None:
+    alone = run_campaign(order(), 20, chunk=20).rows
+    assert run_campaign(order(), 20, workers=2, chunk=4).rows == alone
+
+
+def test_a_cluster_of_two_workers_gives_the_table_of_one_process(order: MakeOrder) -> None:
+    from distributed import LocalCluster
+
+    alone = run_campaign(order(), 20, chunk=20).rows
+    with LocalCluster(
+        n_workers=2,
+        threads_per_worker=1,
+        processes=True,
+        host="127.0.0.1",
+        dashboard_address=None,
+    ) as cluster:
+        found = run_campaign(order(), 20, cluster=cluster.scheduler_address, chunk=4).rows
+    assert found == alone
+
+
+def killing(order: Order, chunk: tuple[int, ...]) -> list[Row]:
+    """Rehearse a chunk; the process dies at run 6 the first time, and at run 9 every time."""
+    note = Path(os.environ[KILLED])
+    if 9 in chunk or (6 in chunk and not note.exists()):
+        note.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return rehearse_runs(order, chunk)
+
+
+def test_a_process_that_is_killed_loses_nothing_and_the_run_that_kills_is_named(
+    order: MakeOrder, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(KILLED, str(tmp_path / "killed"))
+    monkeypatch.setattr("m2pem.campaign.pool.rehearse_runs", killing)
+    chunks = [(0, 1, 2), (3, 4, 5), (6, 7, 8), (9, 10), (11, 12)]
+    rows = [row for part in rehearse_on_processes(order(), chunks, 2) for row in part]
+    alone = rehearse_runs(order(), range(13))
+    found = sorted(rows, key=lambda row: row["run"])
+    assert [row["run"] for row in found] == list(range(13))
+    assert [row for row in found if row["run"] != 9] == [row for row in alone if row["run"] != 9]
+    assert "killed" in found[9]["error"]
+
+
+def test_an_interrupt_keeps_what_is_done(
+    order: MakeOrder, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(order: Order, chunk: tuple[int, ...]) -> list[Row]:
+        if 10 in chunk:
+            raise KeyboardInterrupt
+        return rehearse_runs(order, chunk)
+
+    monkeypatch.setattr(campaigns, "rehearse_runs", interrupted)
+    part = run_campaign(order(), 20, chunk=5, folder=folder)
+    assert part.interrupted
+    assert len(part.rows) == 10
+    monkeypatch.undo()
+    whole = run_campaign(order(), 20, chunk=5, folder=folder, resume=True)
+    assert whole.rows == run_campaign(order(), 20).rows
+
+
+def test_a_known_probability_lies_in_its_interval_in_95_of_100_campaigns(order: MakeOrder) -> None:
+    inside = 0
+    for seed in range(20):
+        rows = run_campaign(order(seed), 60).rows
+        estimate = estimated(sum(not is_good(row) for row in rows), len(rows))
+        inside += estimate.low <= 0.28 <= estimate.high
+    assert inside >= 17  # of 20; with 95 % each, fewer come in 1 of 60 tries, and seeds are fixed
+
+
+def test_a_sequential_test_ends_a_campaign_when_it_is_decided(order: MakeOrder) -> None:
+    test = SequentialTest(0.05, 0.2, 0.05, 0.05)
+    result = run_campaign(order(), 2000, test=test, chunk=10)
+    assert result.decision == "p1"
+    assert result.decided_after <= len(result.rows) < 400
+    parallel = run_campaign(order(), 2000, test=test, chunk=3)
+    assert (parallel.decision, parallel.decided_after) == ("p1", result.decided_after)
+
+
+def test_the_worst_run_replays_from_its_answers_file(order: MakeOrder, folder: Path) -> None:
+    result = run_campaign(order(), 30, folder=folder)
+    write_report(folder, result)
+    files = sorted((folder / "worst").iterdir())
+    assert len(files) == 5
+    report = (folder / "report.md").read_text()
+    assert "BLOCKED" in report
+    assert "![What failures depend on](effects.svg)" in report
+    for file in files:
+        run = int(file.stem.removeprefix("run-"))
+        _, expected = replayed(result.order, run)
+        mission = load_source(result.order.mission)
+        fleet = restore(result.order.fleet)
+        again = rehearse(mission, fleet, plugins=PluginManager(), answers=file)
+        assert again.records == expected.records
+
+
+def test_a_run_that_cannot_be_rehearsed_is_a_row_with_its_error(
+    order: MakeOrder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(*_: object) -> None:
+        raise OperatorError("broken")
+
+    monkeypatch.setattr(Rehearser, "rehearse", broken)
+    result = run_campaign(order(), 3)
+    assert [row["error"] for row in result.rows] == ["broken"] * 3
