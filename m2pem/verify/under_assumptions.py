@@ -2,7 +2,8 @@
 
 The answer that counts is the one under the assumptions. Beside it is the answer where nothing is
 assumed, with the run that violates it. Where nothing is assumed and something is violated because a
-behavior fails, a short search says whether it would hold if no behavior failed.
+behavior fails, a short search says whether it would hold if no behavior failed; of a requirement
+about all runs, another one whether it holds of fair ones.
 """
 
 import time
@@ -12,8 +13,9 @@ from typing import Protocol
 
 from m2pem.verify.assumptions import NO_FAILURES, NOTHING, Assumptions
 from m2pem.verify.check import Report
+from m2pem.verify.ltl.formula import needs_steps
 from m2pem.verify.net.petri_net import Trigger
-from m2pem.verify.properties.results import Result, Verdict
+from m2pem.verify.properties.results import Result, Verdict, Violation
 from m2pem.verify.requirements.requirement import Requirement
 from m2pem.verify.search.explore import Limits, Stopped
 
@@ -91,7 +93,7 @@ class _Check:
         report = replace(report, results=tuple(results), assumed=self.assumed)
         if self.assumed:
             report = replace(report, without=without)
-        return self._with_hints(report)
+        return self._with_fair_hints(self._with_hints(report))
 
     def _answer(self, report: Report, group: Sequence[Requirement], under: Assumptions) -> Report:
         """Add the answers to requirements that make the same assumptions."""
@@ -138,46 +140,76 @@ class _Check:
 
     def _with_hints(self, report: Report) -> Report:
         doubtful = {_key(each) for each in report.results if self._may_hold_without_failures(each)}
-        rest = self._rest()
-        if not doubtful or _interrupted(report) or report.states > SMALL_STATES or not rest.seconds:
+        small = self._small()
+        if not doubtful or _interrupted(report) or report.states > SMALL_STATES:
             return report
-        small = replace(
-            rest,
-            states=min(rest.states, SMALL_STATES),
-            seconds=min(rest.seconds, SMALL_SECONDS),
-        )
         found = replace(report, results=(), engine="builtin")
         if any(not required for _, required in doubtful):
             found = self.short.properties(NO_FAILURES, small)
         asked = [each for each in self.asked if (each.id, True) in doubtful]
         found = self.short.requirements(found, asked, NO_FAILURES, small)
         holding = {_key(each) for each in found.results if each.verdict is Verdict.HOLDS}
-        return replace(
-            report,
-            results=tuple(
-                replace(each, would_hold_if=NO_FAILURES)
-                if _key(each) in doubtful & holding
+        would_hold = doubtful & holding
+        results = (
+            replace(each, would_hold_if=NO_FAILURES) if _key(each) in would_hold else each
+            for each in report.results
+        )
+        return replace(report, results=tuple(results))
+
+    def _with_fair_hints(self, report: Report) -> Report:
+        """Say which requirements about all runs hold of fair ones, maybe if no behavior fails."""
+        violated = {each.property for each in report.results if _may_hold_of_fair_runs(each)}
+        asked = [
+            replace(each, fair=True)
+            for each in self.asked
+            if each.id in violated and not each.fair and not needs_steps(each.formula)
+        ]
+        for under in (NOTHING, NO_FAILURES):
+            small = self._small()
+            if not asked or _interrupted(report) or report.states > SMALL_STATES:
+                break
+            plain = replace(report, results=(), engine="builtin")
+            found = self.short.requirements(plain, asked, under, small).results
+            holding = {each.property for each in found if each.verdict is Verdict.HOLDS}
+            results = (
+                replace(each, would_hold_if=under, would_hold_if_fair=True)
+                if each.required and each.property in holding
                 else each
                 for each in report.results
-            ),
-        )
+            )
+            report = replace(report, results=tuple(results))
+            asked = [each for each in asked if each.id not in holding]
+        return report
+
+    def _small(self) -> Limits:
+        rest = self._rest()
+        seconds = min(rest.seconds, SMALL_SECONDS)
+        return replace(rest, states=min(rest.states, SMALL_STATES), seconds=seconds)
 
     def _may_hold_without_failures(self, result: Result) -> bool:
         """Whether all runs that are known to violate it have a failure, and nothing is assumed."""
         if result.assumed or not (result.required or result.property in WOULD_HOLD):
             return False
-        net = result.net
-        return (
-            result.verdict is Verdict.VIOLATED
-            and net is not None
-            and all(
-                any(
-                    net.transitions[n].trigger is Trigger.FAILS
-                    for n in (*violation.run, *violation.cycle)
-                )
-                for violation in result.violations
-            )
+        return result.verdict is Verdict.VIOLATED and all(
+            _has_failure(result, violation) for violation in result.violations
         )
+
+
+def _has_failure(result: Result, violation: Violation) -> bool:
+    net = result.net
+    return net is not None and any(
+        net.transitions[n].trigger is Trigger.FAILS for n in (*violation.run, *violation.cycle)
+    )
+
+
+def _may_hold_of_fair_runs(result: Result) -> bool:
+    """Whether a requirement is violated, where nothing is assumed, by runs that go on for ever, or
+    have a failure: each other run has fair ones that begin with it."""
+    if not result.required or result.assumed or result.would_hold_if:
+        return False
+    return result.verdict is Verdict.VIOLATED and all(
+        violation.cycle or _has_failure(result, violation) for violation in result.violations
+    )
 
 
 def _key(result: Result) -> tuple[str, bool]:

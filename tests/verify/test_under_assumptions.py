@@ -1,6 +1,7 @@
 """Each verdict is given under its assumptions and without them, from the file to the reports."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -10,7 +11,7 @@ from m2pem.scripting.verification import VerificationResult, verify
 from m2pem.verify.properties.results import Result, Verdict
 from m2pem.verify.requirements.requirement import RequirementsError
 from tests.engine.notation import mission as notation
-from tests.verify.missions import in_a_row, pair, survey, task
+from tests.verify.missions import approval, in_a_row, pair, survey, task
 
 TWO_EACH = (
     "{id: two, pattern: visits_at_least, args: {resource: each, behavior: area_survey, times: 2}}"
@@ -63,6 +64,27 @@ def test_without_an_assumption_it_is_said_what_would_hold_if_nothing_failed(engi
     assert "it holds if no behavior fails" in line_of(found, "two/uav2")
     assert "it holds if no behavior fails" in line_of(found, "end")
     assert not asked(found, "two/uav1").would_hold_if  # two surveys of one place are not two places
+
+
+@pytest.mark.parametrize(
+    ("fails", "said"),
+    [
+        (False, "it holds if only fair runs count (fair true)"),
+        (
+            True,
+            "it holds if no behavior fails and only fair runs count "
+            "(assume no-failures, fair true)",
+        ),
+    ],
+)
+def test_of_a_loop_it_is_said_that_it_ends_in_fair_runs(fails: bool, said: str) -> None:
+    lines = approval().source
+    if not fails:
+        lines = re.sub(rb"<script>.*?</script>", b"", lines, flags=re.S)
+        lines = lines.replace(b"scriptTask", b"task")
+    found = verify(reread(lines), requirements=spec("{id: r, ltl: '<> ended(completed)'}"))
+    assert asked(found, "r").verdict is Verdict.VIOLATED
+    assert line_of(found, "r").endswith(said)
 
 
 def test_a_violation_without_a_failure_has_no_such_remark() -> None:

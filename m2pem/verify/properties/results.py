@@ -59,6 +59,8 @@ class Result:
     """The answer to the same where nothing is assumed."""
     would_hold_if: Assumptions = NOTHING
     """Violated, where nothing is assumed: it holds under this assumption."""
+    would_hold_if_fair: bool = False
+    """The same, of a requirement about all runs: it holds of fair runs, if that is assumed, too."""
     net: PetriNet | None = None
     """The net whose transitions the runs number; None: as `Report.transitions_of` says."""
 

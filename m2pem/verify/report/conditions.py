@@ -16,8 +16,8 @@ def condition_of(findings: Findings, answer: Result) -> str:
     Of a property of every mission, nothing is said where it has one verdict with and without what
     the whole check assumes.
     """
-    if answer.would_hold_if:
-        return f"it holds if {answer.would_hold_if.english} (assume {answer.would_hold_if})"
+    if answer.would_hold_if or answer.would_hold_if_fair:
+        return _would_hold(answer)
     if not answer.assumed:
         return ""
     without = answer.without
@@ -34,6 +34,18 @@ def condition_of(findings: Findings, answer: Result) -> str:
         return said
     shown = " and ".join(steps[:_MOST_STEPS]) + (", ..." if steps[_MOST_STEPS:] else "")
     return f"{said}, by a run in which {shown}"
+
+
+def _would_hold(answer: Result) -> str:
+    """Return when a requirement or property that is violated holds, and how that is written."""
+    when, written = [], []
+    if answer.would_hold_if:
+        when.append(answer.would_hold_if.english)
+        written.append(f"assume {answer.would_hold_if}")
+    if answer.would_hold_if_fair:
+        when.append("only fair runs count")
+        written.append("fair true")
+    return f"it holds if {' and '.join(when)} ({', '.join(written)})"
 
 
 def _verdict(findings: Findings, answer: Result) -> str:

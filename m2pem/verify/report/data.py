@@ -49,6 +49,7 @@ def as_data(findings: Findings) -> dict[str, Any]:
                 "condition": condition_of(findings, answer),
                 "without": _without(findings, answer),
                 "would_hold_if": str(answer.would_hold_if),
+                "would_hold_if_fair": answer.would_hold_if_fair,
             }
             for answer in findings.results
         ],
