@@ -107,7 +107,7 @@ def test_a_name_that_the_fleet_lacks_is_refused() -> None:
         refuse_unknown(parse("reliable(uav3)"), fleet)
 
 
-def test_a_vehicle_stands_for_its_payloads_and_a_team_for_its_members() -> None:
+def test_a_vehicle_includes_its_payloads_and_a_team_its_members() -> None:
     lines = (
         '<startEvent id="s"/>',
         '<scriptTask id="t">do look evsg1/ptz team:alpha</scriptTask>',

@@ -43,7 +43,7 @@ def round_of(*names: str, first: tuple[str, ...] = ()) -> str:
 
 
 def fork(*names: str) -> str:
-    """The tasks at once, each by a vehicle of its own."""
+    """The tasks at once, each by another vehicle."""
     tasks = "".join(task(each, f"uav{n}") for n, each in enumerate(names))
     flows = "\n".join(f"f -> {each} -> j" for each in names)
     gateways = '<parallelGateway id="f"/><parallelGateway id="j"/>'
