@@ -6,7 +6,7 @@ industrial business process models. Data & Knowledge Engineering 70, 2011). FOLD
 with PNML files: `artifact/benchmark/IBM_SAP_bench` of the repository p-offtermatt/FastForward. It
 has `ibm/lib_*/pnml/*.pnml`, and `all-ibm.txt` with the verdicts: the last column is 1 for sound.
 
-Each net is written as BPMN (`nets`) and verified in a process of its own. Times are CPU time, from
+Each net is written as BPMN (`nets`) and verified in another process. Times are CPU time, from
 the text of the file to all verdicts.
 """
 
@@ -69,7 +69,7 @@ def nets(folder: Path) -> Iterator[tuple[str, str, bool, str]]:
 
 
 def checked(library: str, name: str, sound: bool, text: str) -> Checked:
-    """Verify one net, in a process of its own: its memory is its own, too."""
+    """Verify one net, in another process: its memory is measured alone."""
     reading, writing = os.pipe()
     child = os.fork()
     if not child:

@@ -101,16 +101,16 @@ def test_a_specification_timers_strictness_and_limits_are_handed_on() -> None:
 
 
 def test_progress_says_what_is_certain_already_and_what_the_search_needs() -> None:
-    told: list[SearchProgress] = []
+    sent: list[SearchProgress] = []
 
     async def story(control: Control) -> Any:
         limits = SearchLimits(states=150_000, exhaustive=True)
         mission = tangled(handled=False).encode()
-        return await control.verify(mission, limits=limits, on_progress=told.append)
+        return await control.verify(mission, limits=limits, on_progress=sent.append)
 
     found = with_control(story)
     assert found["coverage"]["states"] > 150_000, "it has gone on after the violation"
-    last = told[-1]
+    last = sent[-1]
     assert last.decided["decisions-handled"] == "violated"
     assert last.decided["can-be-triggered"] == "holds"
     assert "no-livelock" not in last.decided
