@@ -80,7 +80,7 @@ async def left_by(journal: Journal, line: RunInfo) -> tuple[Fleet, dict[Resource
     """
     fleet = fleet_of(line.header)
     run = MissionRun(mission_of(line.header), fleet, line.run)
-    await replay(journal, run, None, None)
+    await replay(journal, run, None)
     commanded = {
         resource: (behavior.id, behavior.native_ref)
         for behavior in run.state.behaviors.values()

@@ -48,7 +48,10 @@ UNASKED = "its arbiter could not be asked after a restart"
 
 
 async def replay(
-    journal: Journal, run: MissionRun, monitors: RunMonitors | None, on_records: OnRecords | None
+    journal: Journal,
+    run: MissionRun,
+    on_records: OnRecords | None,
+    monitors: RunMonitors | None = None,
 ) -> int:
     """Fold all of a run's records; returns when the last was decided (us since the Unix epoch).
 

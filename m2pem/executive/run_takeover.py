@@ -91,7 +91,7 @@ class RunTakeover:
                 )
         run = MissionRun(mission, supervisor.fleet, number, supervisor.settings.steps_at_once)
         monitors = RunMonitors(run.state, supervisor.fleet)
-        last_us = await replay(supervisor.journal, run, monitors, supervisor.settings.on_records)
+        last_us = await replay(supervisor.journal, run, supervisor.settings.on_records, monitors)
         mission = run.state.mission  # the version that holds now
         if mission.chooses_resources or waits_for_space(supervisor.fleet):
             await asyncio.to_thread(load_solver)

@@ -163,6 +163,7 @@ class Anticipation:
         self.verdicts = [self._verdict(*self._pairs[0])]
         """By state, what is certain there."""
         self._after: dict[tuple[int, int, int], int] = {}
+        self._at_end: dict[tuple[int, int, int], Verdict] = {}
 
     @staticmethod
     def _verdict(yes: int, no: int) -> Verdict:
@@ -193,11 +194,15 @@ class Anticipation:
 
         It is OPEN only if it depends on what is unknown.
         """
-        yes, no = self._pairs[state]
-        return self._verdict(
-            int(self._yes.accepts_for_ever(yes, letter, unknown)),
-            int(self._no.accepts_for_ever(no, letter, unknown)),
-        )
+        key = (state, letter, unknown)
+        verdict = self._at_end.get(key)
+        if verdict is None:
+            yes, no = self._pairs[state]
+            verdict = self._at_end[key] = self._verdict(
+                int(self._yes.accepts_for_ever(yes, letter, unknown)),
+                int(self._no.accepts_for_ever(no, letter, unknown)),
+            )
+        return verdict
 
 
 anticipation = lru_cache(maxsize=1_000)(Anticipation)

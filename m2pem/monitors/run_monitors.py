@@ -22,7 +22,7 @@ from m2pem.fleet.fleet import Fleet
 if TYPE_CHECKING:
     from m2pem.monitors.anticipation import Verdict
     from m2pem.monitors.moments import Moments
-    from m2pem.monitors.monitor import Monitor
+    from m2pem.monitors.monitor import Monitor, MonitorPlan
     from m2pem.monitors.telemetry_conditions import Latest
     from m2pem.verify.ltl.formula import Measured, Proposition
 
@@ -110,23 +110,25 @@ class RunMonitors:
             return
         # What reads formulas takes time to load, and most runs have none.
         from m2pem.monitors.moments import Moments  # noqa: PLC0415
-        from m2pem.monitors.monitor import propositions_of  # noqa: PLC0415
+        from m2pem.monitors.monitor import plans  # noqa: PLC0415
 
-        known = propositions_of(monitored)
+        known, planned = plans(tuple(each.formula for each in monitored))
         self._moments = Moments(known, self._state.mission, self._fleet, self._read)
-        self._add(monitored, known)
+        self._add(monitored, planned, known)
 
     def _add(
-        self, monitored: Sequence[r.RequirementMonitored], known: Sequence["Proposition"]
+        self,
+        monitored: Sequence[r.RequirementMonitored],
+        planned: "Sequence[MonitorPlan]",
+        known: "Sequence[Proposition]",
     ) -> "list[Monitor]":
         """Monitor requirements from now on. `known`: the propositions of the run's letters."""
         from m2pem.monitors.monitor import Monitor  # noqa: PLC0415  # as in `_begin`
         from m2pem.verify.ltl.formula import Measured, show_measured  # noqa: PLC0415
-        from m2pem.verify.requirements.english import English  # noqa: PLC0415
 
-        mission = self._state.mission
-        english = English({each.id: each.name for each in (*mission.nodes, *mission.processes)})
-        added = [Monitor(each, known, english) for each in monitored]
+        added = [
+            Monitor(each.requirement, plan) for each, plan in zip(monitored, planned, strict=True)
+        ]
         self._open |= {each.id: each for each in added}
         self._timed = [each for each in self._open.values() if each.is_timed]
         for bit, each in enumerate(known):
@@ -153,16 +155,16 @@ class RunMonitors:
                 self._moments.extend(self._moments.propositions, self._state)
             return
         from m2pem.monitors.moments import Moments  # noqa: PLC0415  # as in `_begin`
-        from m2pem.monitors.monitor import propositions_of  # noqa: PLC0415
+        from m2pem.monitors.monitor import plans  # noqa: PLC0415
 
         if self._moments is None:
             self._moments = Moments((), self._state.mission, self._fleet, self._read)
             self._moments.take_data(self._state)
         before = self._moments.propositions
-        known = tuple(dict.fromkeys((*before, *propositions_of(begun))))
+        known, planned = plans(tuple(each.formula for each in begun), before)
         self._moments.extend(known, self._state)
         self._letter = self._moments.state
-        for each in self._add(begun, known):
+        for each in self._add(begun, planned, known):
             if self._is_certain(each, each.read(self._t_us, self._letter, self._unknown)):
                 self._decide(each, self._t_us, FROM_THE_REVISION)
 
@@ -187,8 +189,12 @@ class RunMonitors:
             and self._is_certain(each, each.read(t_us, letter, unknown))
         ]
         for each in certain:
-            because = each.changes(0 if first else before, letter)
-            self._decide(each, t_us, because or BEGINNING)
+            self._decide(each, t_us, self._because(each, 0 if first else before) or BEGINNING)
+
+    def _because(self, monitor: "Monitor", before: int) -> str:
+        from m2pem.monitors.monitor import english_of  # noqa: PLC0415  # as in `_begin`
+
+        return monitor.changes(before, self._letter, english_of(self._state.mission))
 
     # --- telemetry ------------------------------------------------------------------------------
 

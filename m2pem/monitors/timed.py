@@ -42,10 +42,9 @@ class TimedEvaluation:
         self._state = self._anticipation.start
         own = self._anticipation.propositions
         self._timed = [(1 << n, each) for n, each in enumerate(own) if isinstance(each, Timed)]
+        self._bits: dict[Formula, int] = {each: 1 << n for n, each in enumerate(self.base)}
         self._direct = [
-            (1 << self.base.index(each), 1 << n)
-            for n, each in enumerate(own)
-            if not isinstance(each, Timed)
+            (self._bits[each], 1 << n) for n, each in enumerate(own) if not isinstance(each, Timed)
         ]
         self._horizon_us = max((horizon_us(each) for _, each in self._timed), default=0)
         delays = frozenset(chain.from_iterable(delays_us(each) for _, each in self._timed))
@@ -155,7 +154,7 @@ class TimedEvaluation:
         future = [] if known else [segments.range_of(len(self._letters))]
 
         def of_proposition(each: Formula) -> Known:
-            bit = 1 << self.base.index(each)
+            bit = self._bits[each]
             certain, possible = [], list(future)
             for number, (letter, unknown) in enumerate(self._letters):
                 span = segments.range_of(number)

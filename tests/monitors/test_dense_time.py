@@ -44,7 +44,8 @@ def random_formula(dice: Random, depth: int) -> Formula:
 
 def random_timeline(dice: Random) -> Timeline:
     """Moments at whole microseconds, some at the same time."""
-    at, found = 0, []
+    at = 0
+    found: Timeline = []
     for _ in range(dice.randint(1, 5)):
         found.append((at, frozenset(each for each in ATOMS if dice.random() < 0.5)))
         at += dice.choice((0, 1, 1, 2, 4))
