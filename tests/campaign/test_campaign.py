@@ -134,7 +134,7 @@ def test_the_worst_run_replays_from_its_answers_file(order: MakeOrder, folder: P
 def test_a_run_that_cannot_be_rehearsed_is_a_row_with_its_error(
     order: MakeOrder, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def broken(*_: object) -> None:
+    def broken(*_: object, **__: object) -> None:
         raise OperatorError("broken")
 
     monkeypatch.setattr(Rehearser, "rehearse", broken)
