@@ -7,11 +7,13 @@ place: `m2pem.api.RunView`.
 import asyncio
 from collections import OrderedDict
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from typing import Any
 
 import msgspec
 
 from m2pem.api import Mission, MissionControl, RunId, RunStatus, RunSummary, RunView, StampedRecord
+from m2pem.api.records import MissionRevised
 from m2pem.api.run_view import Changes
 from m2pem.errors import M2pemError
 from m2pem_plugin_web.live.live_run import command
@@ -42,6 +44,9 @@ class RecordPages:
         """Return the records after `after`, about `limit` of them, as JSON."""
         page = await self._control.records(summary.run, after, limit)
         view = self._views.pop((summary.run, after), None) or await self._view(summary, after)
+        if any(isinstance(each.record, MissionRevised) for each in page):
+            with suppress(M2pemError):  # then its names are those of the version before
+                view.mission = await self._control.mission(summary.run)
         # In a thread, as thousands of records take longer than the executive may wait.
         content = await asyncio.to_thread(page_of, page, view, limit)
         if page:

@@ -5,7 +5,7 @@ import { ConfirmOrder } from "../fleet/ConfirmOrder";
 import { ApiError, get } from "../shared/api";
 import { connection, isOver, listen } from "../shared/executive";
 import { fill, strings } from "../strings";
-import type { RunSummary } from "../shared/types";
+import type { RunSummary, ServerMessage } from "../shared/types";
 import { operateContext, OperatingProvider, type OperateContext } from "./context";
 import { Layout } from "./layout/Layout";
 import { loadReplay, loadStage, pathOf, type Progress, type Source, type Stage } from "./loading";
@@ -49,7 +49,10 @@ export default function Operate({ source }: { source: Source }) {
     const stop = listen((message) => {
       const here =
         source.kind === "run" && message.type === "run" && message.run.run === source.run;
-      if (here && isOver(message.run) && context.peek()?.scene.mode === "live") ended.value = true;
+      const live = context.peek()?.scene.mode === "live";
+      if (here && isOver(message.run) && live) ended.value = true;
+      // The diagram is that of the version which holds now, and so are the names.
+      if (live && source.kind === "run" && isRevised(message, source.run)) open();
     });
     return () => {
       stop();
@@ -121,6 +124,14 @@ function Loading({ summary, made }: Opened) {
         })}
       </p>
     </section>
+  );
+}
+
+/** Whether a message says that a run goes on with a new version of its mission. */
+function isRevised(message: ServerMessage, run: string): boolean {
+  return (
+    message.type === "log" &&
+    message.records.some((each) => each.run === run && each.record === "MissionRevised")
   );
 }
 
