@@ -15,7 +15,7 @@ from m2pem.api.connection_reader import ConnectionReader
 from m2pem.api.control import MissionControl
 from m2pem.api.face import FaceSettings
 from m2pem.api.runs import RunId, RunStatus, StampedRecord
-from m2pem.engine.records import MessageThrown, SignalThrown
+from m2pem.engine.records import MessageThrown, MissionRevised, SignalThrown
 from m2pem.errors import ExpressionError, ExpressionSyntaxError, M2pemError, OperatorError
 from m2pem.mission.expression import Expression, literal, parse, template
 from m2pem.mission.mission import Mission
@@ -314,6 +314,8 @@ class ThrownEvents:
 
     async def _meant(self, event: StampedRecord) -> list[tuple[SendRule, Fields]]:
         record = event.record
+        if isinstance(record, MissionRevised):
+            self._missions.pop(event.run, None)
         if not isinstance(record, SignalThrown | MessageThrown) or not record.element:
             return []
         try:

@@ -193,3 +193,35 @@ async def test_missions_get_events_and_what_they_throw_is_sent() -> None:
         throwing.cancel()
     assert sent == (run, {"data": 5, "header": {"frame_id": "map"}, "list": [1, 5]})
     assert {"ros /alarm", "ros /go"} <= {getattr(each.record, "by", "") for each in records}
+
+
+ASKS = """<definitions xmlns="http://www.omg.org/spec/BPMN/20100524/MODEL" targetNamespace="test">
+  <signal id="a" name="alarm"/> <signal id="c" name="{name}"/>
+  <process id="P" isExecutable="true"><startEvent id="S"/>
+    <intermediateThrowEvent id="First"><signalEventDefinition signalRef="a"/>
+    </intermediateThrowEvent>
+    <userTask id="Ask"/>
+    <intermediateThrowEvent id="Last"><signalEventDefinition signalRef="c"/>
+    </intermediateThrowEvent><endEvent id="E"/>
+    <sequenceFlow id="f1" sourceRef="S" targetRef="First"/>
+    <sequenceFlow id="f2" sourceRef="First" targetRef="Ask"/>
+    <sequenceFlow id="f3" sourceRef="Ask" targetRef="Last"/>
+    <sequenceFlow id="f4" sourceRef="Last" targetRef="E"/>
+  </process></definitions>"""
+
+
+async def test_what_a_revised_mission_throws_is_sent_by_its_new_names() -> None:
+    rules = [
+        SendRule.read(FaceSettings("ros", {"topic": "/c", "signal": name}), ["topic"])
+        for name in ("alarm", "cleared")
+    ]
+    async with run_executive(scenarios.fleet("sim", {"rover1": {}})) as control:
+        thrown = aiter(ThrownEvents(control, rules))
+        run = await control.start(ASKS.format(name="other").encode())
+        assert (await anext(thrown))[0] is rules[0]
+        new = ASKS.format(name="cleared").encode()
+        plan = await control.plan_revision(run, new)
+        await control.revise(run, new, plan.plan)
+        (prompt,) = control.prompts()
+        await control.answer(run, prompt.prompt, prompt.decisions[0].value)
+        assert (await anext(thrown))[0] is rules[1]
