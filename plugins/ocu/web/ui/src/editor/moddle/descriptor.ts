@@ -74,7 +74,7 @@ export const m2pemDescriptor = {
       name: "Requirement",
       superClass: ["Element"],
       properties: [
-        ...["id", "ltl", "pattern", "text", "fair", "assume"].map(attribute),
+        ...["id", "ltl", "pattern", "text", "fair", "assume", "monitor", "onViolation"].map(attribute),
         children("args", "Arg"),
       ],
     },

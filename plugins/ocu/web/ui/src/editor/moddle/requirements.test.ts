@@ -33,7 +33,7 @@ async function put(process: ModdleElement, requirements: Requirement[]) {
 
 const BOTH = `<m2pem:requirement id="asked" ltl="[] !active(Drive)" fair="true"/>
   <m2pem:requirement id="both" pattern="visit" text="both fields" tool:note="n"
-    assume="no-failures, operators-answer">
+    assume="no-failures, operators-answer" monitor="false" onViolation="error:UNSAFE">
     <m2pem:arg name="locations" value="North"/><m2pem:arg name="locations" value="South"/>
   </m2pem:requirement>`;
 
@@ -49,6 +49,8 @@ describe("requirements", () => {
         args: {},
         fair: "true",
         assume: "",
+        monitor: "",
+        onViolation: "",
       },
       {
         id: "both",
@@ -58,6 +60,8 @@ describe("requirements", () => {
         args: { locations: ["North", "South"] },
         fair: "",
         assume: "no-failures, operators-answer",
+        monitor: "false",
+        onViolation: "error:UNSAFE",
       },
     ]);
   });
@@ -69,6 +73,8 @@ describe("requirements", () => {
     const { xml } = await moddle.toXML(definitions);
     expect(xml).toContain('text="each field"');
     expect(xml).toContain('tool:note="n"');
+    expect(xml).toContain('monitor="false"');
+    expect(xml).toContain('onViolation="error:UNSAFE"');
     expect(xml).toContain('fair="true"');
     expect(xml).toContain('assume="no-failures, operators-answer"');
     expect(xml).not.toContain('assume=""');

@@ -16,6 +16,10 @@ export interface Requirement {
   fair: "" | "true" | "false";
   /** What is assumed, such as "no-failures"; "": nothing. */
   assume: string;
+  /** Whether runs are monitored for it; "": they are. */
+  monitor: "" | "true" | "false";
+  /** What a violation in a run throws: "error:CODE" or "signal:ID"; "": nothing. */
+  onViolation: string;
 }
 
 export function requirementsOf(process: ModdleElement): Requirement[] {
@@ -61,15 +65,20 @@ function read(element: ModdleElement): Requirement {
   for (const each of list(element, "args")) {
     (args[text(each, "name")] ??= []).push(text(each, "value"));
   }
-  const fair = text(element, "fair");
+  const truth = (name: string) => {
+    const value = text(element, name);
+    return value === "true" || value === "false" ? value : "";
+  };
   return {
     id: text(element, "id"),
     text: text(element, "text"),
     ltl: text(element, "pattern") ? null : text(element, "ltl"),
     pattern: text(element, "pattern"),
     args,
-    fair: fair === "true" || fair === "false" ? fair : "",
+    fair: truth("fair"),
     assume: text(element, "assume"),
+    monitor: truth("monitor"),
+    onViolation: text(element, "onViolation"),
   };
 }
 
@@ -87,6 +96,8 @@ function write(factory: Factory, requirement: Requirement, before?: ModdleElemen
       pattern: requirement.ltl === null ? requirement.pattern : undefined,
       fair: requirement.fair || undefined,
       assume: requirement.assume || undefined,
+      monitor: requirement.monitor || undefined,
+      onViolation: requirement.onViolation || undefined,
       args: args.length ? args : undefined,
     },
     before,

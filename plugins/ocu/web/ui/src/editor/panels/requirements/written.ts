@@ -42,7 +42,17 @@ export function add(editor: EditorContext, pattern: string): string | undefined 
   const taken = placed(editor).map(({ requirement }) => requirement.id);
   const id = freeId((pattern || "formula").replaceAll("_", "-"), taken);
   const ltl = pattern ? null : "";
-  const made = ofPattern({ id, text: "", ltl, pattern, args: {}, fair: "", assume: "" });
+  const made = ofPattern({
+    id,
+    text: "",
+    ltl,
+    pattern,
+    args: {},
+    fair: "",
+    assume: "",
+    monitor: "",
+    onViolation: "",
+  });
   write(editor, process, [...requirementsOf(process), made]);
   return id;
 }
