@@ -1,40 +1,14 @@
-"""The monitor of one requirement in one run."""
+"""What is made once of a formula that runs are monitored for, and what each run has of it."""
 
 from collections.abc import Sequence
 from functools import lru_cache
 
 from m2pem.mission.mission import Mission
 from m2pem.monitors.anticipation import Verdict, anticipation
-from m2pem.monitors.timed import TimedEvaluation, base_propositions
+from m2pem.monitors.timed import TimedEvaluation, TimedPlan, base_propositions
 from m2pem.verify.ltl import negated, parse
 from m2pem.verify.ltl.formula import Formula, Proposition, Timed, propositions
 from m2pem.verify.requirements.english import English
-
-
-class UntimedEvaluation:
-    """What is certain of a formula without bounds. Letters are those of its propositions."""
-
-    due_us = None
-
-    def __init__(self, formula: Formula) -> None:
-        self._anticipation = anticipation(formula)
-        self.base = self._anticipation.propositions
-        self._state = self._anticipation.start
-        self._last = (0, 0)
-
-    def read(self, t_us: int, letter: int, unknown: int) -> Verdict:
-        """A moment begins."""
-        self._last = letter, unknown
-        self._state = self._anticipation.step(self._state, letter, unknown)
-        return self._anticipation.verdicts[self._state]
-
-    def advance(self, t_us: int) -> Verdict:
-        """Time has passed, which changes nothing."""
-        return self._anticipation.verdicts[self._state]
-
-    def end(self) -> Verdict:
-        """The last moment remains for ever."""
-        return self._anticipation.at_end(self._state, *self._last)
 
 
 @lru_cache(maxsize=20)
@@ -45,14 +19,19 @@ def english_of(mission: Mission) -> English:
 
 class MonitorPlan:
     """What all monitors of one formula have in common, whatever the run. `known`: the propositions
-    of the letters of runs, by bit; `mask`: the bits of those that the formula is about."""
+    of the letters of runs, by bit; `mask`: the bits of those that the formula is about.
+
+    `timed`: for a formula with bounds; `untimed`: for one without, a part of a `Product`.
+    """
 
     def __init__(self, formula: Formula, known: Sequence[Proposition]) -> None:
-        self.formula = formula
-        self.is_timed = any(isinstance(each, Timed) for each in propositions(formula))
         base = base_propositions(formula)
-        self.bits = [(1 << known.index(each), 1 << n, each) for n, each in enumerate(base)]
-        self.mask = sum(bit for bit, _, _ in self.bits)
+        self._named = [(1 << known.index(each), each) for each in base]
+        self.bits = tuple((1 << known.index(each), 1 << n) for n, each in enumerate(base))
+        self.mask = sum(bit for bit, _ in self.bits)
+        is_timed = any(isinstance(each, Timed) for each in propositions(formula))
+        self.timed = TimedPlan(formula) if is_timed else None
+        self.untimed = None if is_timed else (anticipation(formula), self.bits)
         self._letters: dict[int, int] = {}
 
     def letter(self, letter: int) -> int:
@@ -60,9 +39,17 @@ class MonitorPlan:
         masked = letter & self.mask
         own = self._letters.get(masked)
         if own is None:
-            own = sum(mine for theirs, mine, _ in self.bits if masked & theirs)
+            own = sum(mine for theirs, mine in self.bits if masked & theirs)
             self._letters[masked] = own
         return own
+
+    def changes(self, before: int, letter: int, english: English) -> str:
+        """What became true or false from one letter of the run to the next, in words."""
+        return ", ".join(
+            english.of(each if letter & theirs else negated(each))
+            for theirs, each in self._named
+            if (before ^ letter) & theirs
+        )
 
 
 @lru_cache(maxsize=100)
@@ -79,28 +66,15 @@ def plans(
     return known, tuple(MonitorPlan(each, known) for each in parsed)
 
 
-class Monitor:
-    """Evaluates a requirement as moments and time come."""
+class TimedMonitor:
+    """Evaluates a formula with bounds as moments and time come."""
 
-    def __init__(self, requirement: str, plan: MonitorPlan) -> None:
-        self.id = requirement
+    def __init__(self, plan: MonitorPlan, timed: TimedPlan) -> None:
         self.mask = plan.mask
-        self.is_timed = plan.is_timed
-        self.verdict = Verdict.OPEN
-        self.evaluation: UntimedEvaluation | TimedEvaluation = (
-            TimedEvaluation(plan.formula) if plan.is_timed else UntimedEvaluation(plan.formula)
-        )
+        self.evaluation = TimedEvaluation(timed)
         self._plan = plan
 
     def read(self, t_us: int, letter: int, unknown: int) -> Verdict:
         """Read the letter of a moment of the run."""
         own = self._plan.letter
         return self.evaluation.read(t_us, own(letter), own(unknown) if unknown else 0)
-
-    def changes(self, before: int, letter: int, english: English) -> str:
-        """What became true or false from one letter of the run to the next, in words."""
-        return ", ".join(
-            english.of(each if letter & theirs else negated(each))
-            for theirs, _, each in self._plan.bits
-            if (before ^ letter) & theirs
-        )

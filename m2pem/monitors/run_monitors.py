@@ -22,7 +22,8 @@ from m2pem.fleet.fleet import Fleet
 if TYPE_CHECKING:
     from m2pem.monitors.anticipation import Verdict
     from m2pem.monitors.moments import Moments
-    from m2pem.monitors.monitor import Monitor, MonitorPlan
+    from m2pem.monitors.monitor import MonitorPlan, TimedMonitor
+    from m2pem.monitors.product import Product, State
     from m2pem.monitors.telemetry_conditions import Latest
     from m2pem.verify.ltl.formula import Measured, Proposition
 
@@ -41,8 +42,11 @@ class RunMonitors:
         self._state = state
         self._fleet = fleet
         self._moments: Moments | None = None
-        self._open: dict[str, Monitor] = {}
-        self._timed: list[Monitor] = []
+        self._open: dict[str, MonitorPlan] = {}
+        self._timed: dict[str, TimedMonitor] = {}
+        self._product: Product | None = None
+        self._product_state: State = ()
+        self._names: tuple[str, ...] = ()
         self._recorded: set[str] = set()
         self._found: dict[str, RequirementDecided] = {}
         self._conditions: dict[str, tuple[int, Measured]] = {}
@@ -55,10 +59,9 @@ class RunMonitors:
 
     def observe(self, t_us: int, records: Sequence[r.Record]) -> None:
         """Read the records of one input. `t_us`: their mission time."""
-        revised = any(type(each) is r.MissionRevised for each in records)
         moments = self._moments
         if moments is None:
-            if revised:
+            if any(type(each) is r.MissionRevised for each in records):
                 self._t_us = t_us
                 self._revise(records)
                 return
@@ -79,23 +82,24 @@ class RunMonitors:
                 self._end(record)
             elif type(record) is r.RequirementDecided:
                 self._note(record.requirement)
-        if revised:
-            self._revise(records)
+            elif type(record) is r.MissionRevised:
+                self._revise(records)
 
     def advance(self, t_us: int) -> None:
         """Mission time has passed without a record."""
-        for each in [each for each in self._timed if each.id in self._open]:
+        for name, each in list(self._timed.items()):
             while (due_us := each.evaluation.due_us) is not None and due_us <= t_us:
-                if self._is_certain(each, each.evaluation.advance(due_us)):
+                verdict = each.evaluation.advance(due_us)
+                if verdict.is_certain:
                     # A bound belongs to its interval: it is over in the next microsecond.
-                    self._decide(each, due_us - 1, TIME_IS_OVER)
+                    self._decide(name, verdict, due_us - 1, TIME_IS_OVER)
 
     @property
     def due_us(self) -> int | None:
         """The mission time at which time alone may make a verdict certain; None: it cannot."""
         if not self._timed:
             return None
-        dues = (each.evaluation.due_us for each in self._timed if each.id in self._open)
+        dues = (each.evaluation.due_us for each in self._timed.values())
         return min((due for due in dues if due is not None), default=None)
 
     def take(self) -> list[RequirementDecided]:
@@ -121,30 +125,36 @@ class RunMonitors:
         monitored: Sequence[r.RequirementMonitored],
         planned: "Sequence[MonitorPlan]",
         known: "Sequence[Proposition]",
-    ) -> "list[Monitor]":
+    ) -> None:
         """Monitor requirements from now on. `known`: the propositions of the run's letters."""
-        from m2pem.monitors.monitor import Monitor  # noqa: PLC0415  # as in `_begin`
+        from m2pem.monitors.monitor import TimedMonitor  # noqa: PLC0415  # as in `_begin`
+        from m2pem.monitors.product import product_of  # noqa: PLC0415
         from m2pem.verify.ltl.formula import Measured, show_measured  # noqa: PLC0415
 
-        added = [
-            Monitor(each.requirement, plan) for each, plan in zip(monitored, planned, strict=True)
-        ]
-        self._open |= {each.id: each for each in added}
-        self._timed = [each for each in self._open.values() if each.is_timed]
-        for bit, each in enumerate(known):
-            if isinstance(each, Measured) and show_measured(each) not in self._conditions:
-                self._conditions[show_measured(each)] = (1 << bit, each)
+        states = dict(zip(self._names, self._product_state, strict=True))
+        for each, plan in zip(monitored, planned, strict=True):
+            self._open[each.requirement] = plan
+            states.pop(each.requirement, None)
+            if plan.timed is not None:
+                self._timed[each.requirement] = TimedMonitor(plan, plan.timed)
+        parts = {name: plan.untimed for name, plan in self._open.items() if plan.untimed}
+        self._names = tuple(parts)
+        self._product = product_of(tuple(parts.values()))
+        begun = zip(self._names, self._product.start, strict=True)
+        self._product_state = tuple(states.get(name, start) for name, start in begun)
+        for bit, named in enumerate(known):
+            if isinstance(named, Measured) and show_measured(named) not in self._conditions:
+                self._conditions[show_measured(named)] = (1 << bit, named)
                 self._unknown |= 1 << bit
-        return added
 
     def _revise(self, records: Iterable[r.Record]) -> None:
         """Follow the requirements of a new version of the mission."""
         dropped = [each.requirement for each in records if type(each) is r.RequirementDropped]
         for number in dropped:
             self._open.pop(number, None)
+            self._timed.pop(number, None)
             self._found.pop(number, None)
             self._recorded.discard(number)
-        self._timed = [each for each in self._open.values() if each.is_timed]
         begun = [
             each
             for each in records
@@ -164,37 +174,43 @@ class RunMonitors:
         known, planned = plans(tuple(each.formula for each in begun), before)
         self._moments.extend(known, self._state)
         self._letter = self._moments.state
-        for each in self._add(begun, planned, known):
-            if self._is_certain(each, each.read(self._t_us, self._letter, self._unknown)):
-                self._decide(each, self._t_us, FROM_THE_REVISION)
+        self._add(begun, planned, known)
+        self._read_moment(~0, _NO_LETTER, FROM_THE_REVISION)
 
     def _goes_on(self, requirement: str) -> bool:
         return any(requirement in each for each in (self._open, self._recorded, self._found))
 
     def _read(self, letter: int) -> None:
         before = self._letter
-        if letter == before:
-            return
-        self._letter = letter
-        self._read_changed(before, ~0 if before == _NO_LETTER else letter ^ before)
+        if letter != before:
+            self._letter = letter
+            changed = ~0 if before == _NO_LETTER else letter ^ before
+            self._read_moment(changed, before, BEGINNING)
 
-    def _read_changed(self, before: int, changed: int) -> None:
-        """Have those monitors read a moment that something has changed for."""
-        letter, unknown, t_us = self._letter, self._unknown, self._t_us
-        first = before == _NO_LETTER
-        certain = [
-            each
-            for each in self._open.values()
-            if (first or changed & each.mask)
-            and self._is_certain(each, each.read(t_us, letter, unknown))
-        ]
-        for each in certain:
-            self._decide(each, t_us, self._because(each, 0 if first else before) or BEGINNING)
+    def _read_moment(self, changed: int, before: int, otherwise: str) -> None:
+        """Have monitors read a moment. `changed`: the bits that differ from the moment before;
+        `otherwise`: what made a verdict certain if none does."""
+        letter, unknown = self._letter, self._unknown
+        certain: list[tuple[str, Verdict]] = []
+        product = self._product
+        if product is not None and changed & product.mask:
+            self._product_state, found = product.step(self._product_state, letter, unknown)
+            for place, verdict in found:
+                certain.append((self._names[place], verdict))
+        for name, each in self._timed.items():
+            if changed & each.mask:
+                verdict = each.read(self._t_us, letter, unknown)
+                if verdict.is_certain:
+                    certain.append((name, verdict))
+        for name, verdict in certain:
+            if name in self._open:
+                because = self._because(name, 0 if before == _NO_LETTER else before)
+                self._decide(name, verdict, self._t_us, because or otherwise)
 
-    def _because(self, monitor: "Monitor", before: int) -> str:
+    def _because(self, name: str, before: int) -> str:
         from m2pem.monitors.monitor import english_of  # noqa: PLC0415  # as in `_begin`
 
-        return monitor.changes(before, self._letter, english_of(self._state.mission))
+        return self._open[name].changes(before, self._letter, english_of(self._state.mission))
 
     # --- telemetry ------------------------------------------------------------------------------
 
@@ -246,30 +262,37 @@ class RunMonitors:
             return
         self._moments.state = self._moments.state | bit if now else self._moments.state & ~bit
         self._letter = self._moments.state
-        self._read_changed(before, bit)
+        self._read_moment(bit, before, BEGINNING)
 
     # --- verdicts -------------------------------------------------------------------------------
-
-    def _is_certain(self, monitor: "Monitor", verdict: "Verdict") -> bool:
-        monitor.verdict = verdict
-        return verdict.is_certain
 
     def _end(self, record: r.RunEnded) -> None:
         """Decide all, unless operators have stopped the run: it could have gone on."""
         if record.outcome is not r.RunOutcome.STOPPED:
-            for each in list(self._open.values()):
-                if self._is_certain(each, each.evaluation.end()):
-                    self._decide(each, self._t_us, ENDED)
+            certain: list[tuple[str, Verdict]] = []
+            if self._product is not None:
+                found = self._product.at_end(self._product_state, self._letter, self._unknown)
+                certain += [(self._names[place], verdict) for place, verdict in found]
+            for name, each in self._timed.items():
+                verdict = each.evaluation.end()
+                if verdict.is_certain:
+                    certain.append((name, verdict))
+            for name, verdict in certain:
+                if name in self._open:
+                    self._decide(name, verdict, self._t_us, ENDED)
         self._open.clear()
+        self._timed.clear()
 
-    def _decide(self, monitor: "Monitor", t_us: int, because: str) -> None:
-        del self._open[monitor.id]
-        if monitor.id not in self._recorded:
-            verdict = r.RequirementVerdict(monitor.verdict.value)
-            self._found[monitor.id] = RequirementDecided(monitor.id, verdict, t_us, because)
+    def _decide(self, name: str, verdict: "Verdict", t_us: int, because: str) -> None:
+        del self._open[name]
+        self._timed.pop(name, None)
+        if name not in self._recorded:
+            decided = r.RequirementVerdict(verdict.value)
+            self._found[name] = RequirementDecided(name, decided, t_us, because)
 
     def _note(self, requirement: str) -> None:
         """A verdict is recorded, perhaps by an earlier release: it stays."""
         self._recorded.add(requirement)
         self._found.pop(requirement, None)
         self._open.pop(requirement, None)
+        self._timed.pop(requirement, None)

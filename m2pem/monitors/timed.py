@@ -7,7 +7,7 @@ decide the formula before.
 
 from itertools import chain
 
-from m2pem.monitors.anticipation import Verdict, anticipation
+from m2pem.monitors.anticipation import Verdict, anticipation, completions
 from m2pem.monitors.dense_time import (
     Known,
     Range,
@@ -29,26 +29,57 @@ def base_propositions(formula: Formula) -> tuple[Proposition, ...]:
     return tuple(dict.fromkeys(found))
 
 
+class TimedPlan:
+    """What all evaluations of a formula with bounds have in common; see `TimedEvaluation`."""
+
+    def __init__(self, formula: Formula) -> None:
+        self.base = base_propositions(formula)
+        self.anticipation = anticipation(formula)
+        own = self.anticipation.propositions
+        self.timed = [(1 << n, each) for n, each in enumerate(own) if isinstance(each, Timed)]
+        self.bits: dict[Formula, int] = {each: 1 << n for n, each in enumerate(self.base)}
+        self.direct = [
+            (self.bits[each], 1 << n) for n, each in enumerate(own) if not isinstance(each, Timed)
+        ]
+        self.horizon_us = max((horizon_us(each) for _, each in self.timed), default=0)
+        delays = frozenset(chain.from_iterable(delays_us(each) for _, each in self.timed))
+        self.delays_us = sorted(delays) or [0]
+        self._free: dict[tuple[int, int, int], int | None] = {}
+
+    def free_step(self, state: int, letter: int, unknown: int) -> int | None:
+        """The state after a moment with this letter of `base`, if no operator with bounds matters
+        in it; else None."""
+        key = (state, letter, unknown)
+        if key not in self._free:
+            own, own_unknown = self.direct_letter(letter, unknown)
+            bounded = sum(bit for bit, _ in self.timed)
+            step = self.anticipation.step
+            after = {step(state, each, own_unknown) for each in completions(own, bounded)}
+            self._free[key] = after.pop() if len(after) == 1 else None
+        return self._free[key]
+
+    def direct_letter(self, letter: int, unknown: int) -> tuple[int, int]:
+        """The letter of the formula, and what is not known of it, without operators with bounds."""
+        own = own_unknown = 0
+        for theirs, mine in self.direct:
+            own |= mine if letter & theirs else 0
+            own_unknown |= mine if unknown & theirs else 0
+        return own, own_unknown
+
+
 class TimedEvaluation:
     """What is certain of a formula with bounds, as moments and time come.
 
     Letters have bit n for the n-th of `base`. Times are microseconds and never go back.
     """
 
-    def __init__(self, formula: Formula) -> None:
-        self.base = base_propositions(formula)
+    def __init__(self, plan: TimedPlan) -> None:
         self.verdict = Verdict.OPEN
-        self._anticipation = anticipation(formula)
-        self._state = self._anticipation.start
-        own = self._anticipation.propositions
-        self._timed = [(1 << n, each) for n, each in enumerate(own) if isinstance(each, Timed)]
-        self._bits: dict[Formula, int] = {each: 1 << n for n, each in enumerate(self.base)}
-        self._direct = [
-            (self._bits[each], 1 << n) for n, each in enumerate(own) if not isinstance(each, Timed)
-        ]
-        self._horizon_us = max((horizon_us(each) for _, each in self._timed), default=0)
-        delays = frozenset(chain.from_iterable(delays_us(each) for _, each in self._timed))
-        self._delays_us = sorted(delays) or [0]
+        self._plan = plan
+        self._anticipation = plan.anticipation
+        self._state = plan.anticipation.start
+        self._timed, self._bits = plan.timed, plan.bits
+        self._horizon_us, self._delays_us = plan.horizon_us, plan.delays_us
         self._starts: list[int] = []
         self._changes_us: list[int] = []
         """When moments began that may still decide it, as time passes."""
@@ -58,6 +89,8 @@ class TimedEvaluation:
     def read(self, t_us: int, letter: int, unknown: int = 0) -> Verdict:
         """A moment begins, with a letter of which some bits are not known."""
         self._now_us = t_us
+        if len(self._letters) <= 1 and self._reads_freely(t_us, letter, unknown):
+            return self.verdict
         self._starts.append(2 * t_us)
         self._changes_us = [
             *(each for each in self._changes_us if each + self._delays_us[-1] >= t_us),
@@ -65,6 +98,24 @@ class TimedEvaluation:
         ]
         self._letters.append((letter, unknown))
         return self._evaluate(2 * t_us)
+
+    def _reads_freely(self, t_us: int, letter: int, unknown: int) -> bool:
+        """Read a moment if operators with bounds matter neither in it nor in the one before, which
+        is the only one that is kept: then nothing waits."""
+        free_step = self._plan.free_step
+        before = self._state
+        if self._letters:
+            after = free_step(before, *self._letters[0])
+            if after is None:
+                return False
+            before = after
+        here = free_step(before, letter, unknown)
+        if here is None:
+            return False
+        self._state = before
+        self._starts, self._letters, self._changes_us = [2 * t_us], [(letter, unknown)], []
+        self.verdict = self._anticipation.verdicts[here]
+        return True
 
     def advance(self, t_us: int) -> Verdict:
         """Time has passed without another moment."""
@@ -91,7 +142,7 @@ class TimedEvaluation:
 
         A bound belongs to its interval: what comes in the same microsecond counts.
         """
-        if self.verdict is not Verdict.OPEN:
+        if not self._changes_us or self.verdict is not Verdict.OPEN:
             return None
         now = self._now_us
         dues = (t_us + delay + 1 for t_us in self._changes_us for delay in self._delays_us)
@@ -134,13 +185,10 @@ class TimedEvaluation:
             cuts |= {first, last + 1}
         order = sorted(cut for cut in cuts if segments.first <= cut <= until)
         found = []
+        direct = self._plan.direct_letter
         for place, first in enumerate(order):
             last = order[place + 1] - 1 if place + 1 < len(order) else until
-            base, base_unknown = self._letters[segments.segment_of(first)]
-            letter = unknown = 0
-            for theirs, mine in self._direct:
-                letter |= mine if base & theirs else 0
-                unknown |= mine if base_unknown & theirs else 0
+            letter, unknown = direct(*self._letters[segments.segment_of(first)])
             for (bit, _), (certain, possible) in zip(self._timed, truths, strict=True):
                 if _has(certain, first):
                     letter |= bit

@@ -89,7 +89,7 @@ def test_another_formula_begins_at_the_revision_and_has_its_own_verdict(
     assert "requirement never: monitored from here on, with another formula" in said
     verdicts = [each for each in seen if type(each) is r.RequirementDecided]
     assert [(each.requirement, each.verdict) for each in verdicts] == [("never", VIOLATED)]
-    assert verdicts[0].because == "as the mission was revised"
+    assert verdicts[0].because == "'Second' is active"
 
 
 def test_requirements_come_with_a_revision_where_there_were_none(

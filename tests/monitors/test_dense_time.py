@@ -5,7 +5,7 @@ from random import Random
 import pytest
 
 from m2pem.monitors.anticipation import Verdict
-from m2pem.monitors.timed import TimedEvaluation, base_propositions
+from m2pem.monitors.timed import TimedEvaluation, TimedPlan, base_propositions
 from m2pem.verify.ltl.formula import (
     Active,
     Always,
@@ -106,7 +106,7 @@ class Definition:
 
 def verdicts(formula: Formula, timeline: Timeline, *, punctual: bool) -> list[tuple[int, Verdict]]:
     """The verdicts as time passes, then the final one. `punctual`: time also passes between."""
-    evaluation = TimedEvaluation(formula)
+    evaluation = TimedEvaluation(TimedPlan(formula))
     base = base_propositions(formula)
     found = []
     for at, true in timeline:
