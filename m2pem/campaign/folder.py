@@ -33,6 +33,7 @@ def manifest_of(order: Order) -> dict[str, Any]:
         "process": order.process,
         "data": dict(order.data),
         "max_steps": order.max_steps,
+        "required": list(order.required),
     }
 
 

@@ -16,6 +16,7 @@ from m2pem.campaign.statistics import (
     is_good,
     quantiles,
     rehearsed,
+    requirements,
     worst,
 )
 
@@ -46,6 +47,7 @@ def report_lines(result: CampaignResult, other: CampaignResult | None = None) ->
         lines.append(_row(outcome, end, f"{estimate.count:,}", *_probability(estimate)))
     bad = estimated(sum(not is_good(row) for row in rows), len(rows))
     lines.append(_row("any failure", "", f"{bad.count:,}", *_probability(bad)))
+    lines += _requirement_lines(rows, result.order.required)
     lines += ["", "## Times and batteries", "", "| | 5 % | median | 95 % | mean |"]
     lines.append("|---|---|---|---|---|")
     lines.append(_quantiles("time, s", [row["took_s"] for row in rows]))
@@ -63,6 +65,21 @@ def report_lines(result: CampaignResult, other: CampaignResult | None = None) ->
 def _probability(estimate: object) -> tuple[str, str]:
     share, _, interval = str(estimate).partition(" ")
     return share, interval.strip("()")
+
+
+def _requirement_lines(rows: Sequence[Row], required: Sequence[str]) -> list[str]:
+    found = requirements(rows)
+    if not found:
+        return []
+    lines = ["", "## Requirements", ""]
+    lines.append("| requirement | satisfied | interval | violated | interval |")
+    lines.append("|---|---|---|---|---|")
+    for name, kept in found.items():
+        shown = f"{name} (required)" if name in required else name
+        lines.append(_row(shown, *_probability(kept.satisfied), *_probability(kept.violated)))
+    if required:
+        lines += ["", "A run that violates what is required counts as a failure."]
+    return lines
 
 
 def _effect_lines(rows: Sequence[Row]) -> list[str]:

@@ -1,6 +1,6 @@
 """The runs of a campaign, a chunk at a time: what each process of a pool or cluster does."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -10,8 +10,8 @@ from m2pem.api.authoring import MissionFiles
 from m2pem.api.runs import RunStatus, StampedRecord
 from m2pem.campaign.variations import DrawnRun, Variations, read_variations
 from m2pem.engine import records as r
-from m2pem.errors import M2pemError
-from m2pem.executive.loading import load_source
+from m2pem.errors import M2pemError, OperatorError
+from m2pem.executive.loading import load_source, monitored_requirements
 from m2pem.fleet.fleet import dump, restore
 from m2pem.mission.elements import EndEvent
 from m2pem.mission.mission import Mission
@@ -20,13 +20,19 @@ from m2pem.plugins import PluginManager
 from m2pem.rehearsal.answers import Answers
 from m2pem.rehearsal.answers_file import AnswersModel
 from m2pem.rehearsal.rehearsal import RehearsalResult, Rehearser
+from m2pem.suggestions import suggest
 
 if TYPE_CHECKING:
     from m2pem.fleet.fleet import Fleet
 
 Row = dict[str, Any]
-"""One run: `run`, `outcome`, `end`, `took_s`, `records`, `error`; `battery.VEHICLE` at its end, a
-fraction; `drawn.NAME`. `error`: why it could not be rehearsed; such a run has nothing else."""
+"""One run: `run`, `outcome`, `end`, `good`, `took_s`, `records`, `error`; `battery.VEHICLE` at its
+end, a fraction; `requirement.ID`: "satisfied", "violated", or "open" if its end has not decided it;
+`drawn.NAME`. `good`: it has completed or was terminated, and violates nothing that is required.
+`error`: why it could not be rehearsed; such a run has nothing else."""
+
+_GOOD = (RunStatus.COMPLETED, RunStatus.TERMINATED)
+_VIOLATED = r.RequirementVerdict.VIOLATED.value
 
 ONLY_AT_THE_END_S = 1e9
 """The period of samples: one at the beginning, and one at the end."""
@@ -38,7 +44,8 @@ MAX_STEPS = 100_000
 @dataclass(frozen=True, slots=True)
 class Order:
     """All that the runs of a campaign depend on but their numbers. It is pickled for other
-    processes; `variations` is the text of the file."""
+    processes; `variations` is the text of the file. `required`: requirements that a good run does
+    not violate."""
 
     mission: MissionFiles
     fleet: bytes
@@ -47,6 +54,7 @@ class Order:
     process: str | None
     data: Mapping[str, Value]
     max_steps: int = MAX_STEPS
+    required: tuple[str, ...] = ()
 
     def __hash__(self) -> int:
         return hash((self.mission.source, self.fleet, self.variations, self.seed, self.process))
@@ -61,15 +69,30 @@ def order_of(
     process: str | None = None,
     data: Mapping[str, Value] | None = None,
     max_steps: int = MAX_STEPS,
+    required: Sequence[str] = (),
 ) -> Order:
-    """Return the order of a campaign.
+    """Return the order of a campaign. `required`: ids of requirements in the mission's file.
 
     Raises:
         AnswersError: the variations cannot be used, or do not fit mission and fleet.
+        OperatorError: runs of the mission are not monitored for such a requirement.
     """
     read_variations(variations).refuse_misfits(mission, fleet)
+    monitored = monitored_requirements(mission, fleet, PluginManager(), data or ())
+    known = {each.id for each in monitored}
+    for name in required:
+        if not any(_is_of(name, each) for each in known):
+            hint = suggest(name, sorted(known), "requirements of runs")
+            raise OperatorError(f"{mission.file} has no requirement {name!r} to monitor; {hint}")
+    meant = tuple(sorted(each for each in known if any(_is_of(name, each) for name in required)))
     files = MissionFiles(mission.file, mission.source, mission.library)
-    return Order(files, dump(fleet), variations, seed, process, dict(data or {}), max_steps)
+    given = dict(data or {})
+    return Order(files, dump(fleet), variations, seed, process, given, max_steps, meant)
+
+
+def _is_of(name: str, requirement: str) -> bool:
+    """Whether a name means a requirement: its id, or that of one for each vehicle, `ID/VEHICLE`."""
+    return requirement == name or requirement.startswith(f"{name}/")
 
 
 @lru_cache(maxsize=2)
@@ -93,7 +116,7 @@ def rehearse_run(order: Order, run: int) -> Row:
         result = _rehearse(rehearser, order, drawn)
     except M2pemError as error:
         return {"run": run, "error": str(error)}
-    return row_of(run, rehearser.mission, result, drawn)
+    return row_of(run, rehearser.mission, result, drawn, order.required)
 
 
 def replayed(order: Order, run: int) -> tuple[DrawnRun, RehearsalResult]:
@@ -114,21 +137,44 @@ def _rehearse(rehearser: Rehearser, order: Order, drawn: DrawnRun) -> RehearsalR
     )
 
 
-def row_of(run: int, mission: Mission, result: RehearsalResult, drawn: DrawnRun) -> Row:
-    """Return the row of a run that was rehearsed."""
+def row_of(
+    run: int,
+    mission: Mission,
+    result: RehearsalResult,
+    drawn: DrawnRun,
+    required: Collection[str] = (),
+) -> Row:
+    """Return the row of a run that was rehearsed. `required`: see `Order`."""
     summary = result.summary
+    verdicts = verdicts_of(result.records)
     row: Row = {
         "run": run,
         "outcome": summary.status.value,
         "end": end_of(mission, summary.status, result.records),
+        "good": summary.status in _GOOD and all(verdicts[each] != _VIOLATED for each in required),
         "took_s": summary.took_s,
         "records": len(result.records),
         "error": "",
     }
     for vehicle, state in result.telemetry[-1].vehicles.items():
         row[f"battery.{vehicle}"] = state.battery_fraction
+    row.update({f"requirement.{key}": verdict for key, verdict in verdicts.items()})
     row.update({f"drawn.{key}": value for key, value in drawn.values.items()})
     return row
+
+
+def verdicts_of(records: Iterable[StampedRecord]) -> dict[str, str]:
+    """Return the verdict on each requirement that a run was monitored for."""
+    found: dict[str, str] = {}
+    for stamped in records:
+        match stamped.record:
+            case r.RequirementMonitored(requirement=name):
+                found.setdefault(name, "open")
+            case r.RequirementDecided(requirement=name, verdict=verdict):
+                found[name] = verdict.value
+            case _:
+                pass
+    return found
 
 
 def end_of(mission: Mission, status: RunStatus, records: Iterable[StampedRecord]) -> str:

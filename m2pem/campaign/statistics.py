@@ -6,11 +6,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from m2pem.api.runs import RunStatus
 from m2pem.campaign.runs import Row
 
 CONFIDENCE = 0.95
-GOOD = (RunStatus.COMPLETED.value, RunStatus.TERMINATED.value)
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,8 +40,8 @@ def estimated(count: int, runs: int) -> Estimate:
 
 
 def is_good(row: Row) -> bool:
-    """Whether the mission ended as it is drawn: completed, or terminated by an end event."""
-    return row.get("outcome") in GOOD
+    """Whether the mission ended as it is drawn, and violates nothing that is required."""
+    return row.get("good") is True
 
 
 @dataclass(frozen=True, slots=True)
@@ -234,6 +232,27 @@ def ends(rows: Sequence[Row]) -> Mapping[tuple[str, str], Estimate]:
     """Return the probability of each outcome and end, the most likely first."""
     counted: Counter[tuple[str, str]] = Counter((row["outcome"], row["end"]) for row in rows)
     return {end: estimated(count, len(rows)) for end, count in counted.most_common()}
+
+
+@dataclass(frozen=True, slots=True)
+class Kept:
+    """How likely a requirement is satisfied, and violated; in the other runs it is open."""
+
+    satisfied: Estimate
+    violated: Estimate
+
+
+def requirements(rows: Sequence[Row]) -> Mapping[str, Kept]:
+    """Return what is known of each requirement, by its id."""
+    names = dict.fromkeys(key for row in rows for key in row if key.startswith("requirement."))
+    found = {}
+    for key in names:
+        said = Counter(row[key] for row in rows if key in row)
+        runs = said.total()
+        found[key.removeprefix("requirement.")] = Kept(
+            estimated(said["satisfied"], runs), estimated(said["violated"], runs)
+        )
+    return found
 
 
 def rehearsed(rows: Iterable[Row]) -> list[Row]:

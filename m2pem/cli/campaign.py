@@ -65,6 +65,13 @@ def _read_test(_: click.Context, __: click.Parameter, text: str | None) -> "Sequ
     metavar="NAME=LOW..HIGH",
     help="Draw one more: wind=0..8, or a setting of a vehicle: uav1.battery=60%..100%. Repeatable.",
 )
+@click.option(
+    "--require",
+    "required",
+    multiple=True,
+    metavar="ID",
+    help="Count runs that violate this requirement of the mission's file as failures. Repeatable.",
+)
 @click.option("--workers", type=click.IntRange(min=1), help="Processes  [default: one a core]")
 @click.option("--cluster", metavar="URL", default="", help="Of a Dask scheduler, in their place.")
 @click.option(
@@ -103,6 +110,7 @@ def campaign(
     seed: int,
     faults: Path | None,
     varied: tuple[str, ...],
+    required: tuple[str, ...],
     workers: int | None,
     cluster: str,
     out: Path | None,
@@ -124,7 +132,12 @@ def campaign(
         raise UnusableError("--resume goes on in a folder: name it with --out")
     text = _variations(faults, varied)
     loaded = load_source(mission, search_path)
-    arguments: dict[str, Any] = {"seed": seed, "process": process, "data": data}
+    arguments: dict[str, Any] = {
+        "seed": seed,
+        "process": process,
+        "data": data,
+        "required": required,
+    }
     order = _order(loaded, fleet_file, text, arguments)
     options: dict[str, Any] = {"workers": workers, "cluster": cluster, "resume": resume}
     other_order = None

@@ -1,6 +1,6 @@
 """Missions of known probability, and campaigns of them."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from pathlib import Path
 
@@ -50,9 +50,15 @@ MakeOrder = Callable[..., Order]
 def order() -> MakeOrder:
     """Makes the order of a campaign of two tasks."""
 
-    def make(seed: int = 7, variations: str = TWO, mission: bytes | None = None) -> Order:
+    def make(
+        seed: int = 7,
+        variations: str = TWO,
+        mission: bytes | None = None,
+        required: Sequence[str] = (),
+    ) -> Order:
         loaded = load_source(mission or sequence("A", "B"))
-        return order_of(loaded, fleet_for(loaded), variations.encode(), seed)
+        fleet = fleet_for(loaded)
+        return order_of(loaded, fleet, variations.encode(), seed, required=required)
 
     return make
 

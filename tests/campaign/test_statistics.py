@@ -21,6 +21,7 @@ def row(run: int, good: bool, took_s: float = 10.0, **drawn: float | bool | str)
         "run": run,
         "outcome": "completed" if good else "failed",
         "end": "E" if good else "BLOCKED",
+        "good": good,
         "took_s": took_s,
         "error": "",
         **{f"drawn.{key}": value for key, value in drawn.items()},
