@@ -18,6 +18,7 @@ from typing import Self
 from m2pem.api.arbiter import ArbiterContext, BehaviorId, BehaviorReport
 from m2pem.api.clock import Clock, SystemClock
 from m2pem.api.runs import RunId
+from m2pem.engine.inputs import MonitoredRequirement
 from m2pem.errors import FleetServedError, JournalError, M2pemError
 from m2pem.executive.alert_conditions import AlertConditions
 from m2pem.executive.alert_list import AlertList
@@ -421,12 +422,16 @@ class Executive:
         by: str,
         *,
         step: bool = False,
+        requirements: tuple[MonitoredRequirement, ...] | None = None,
     ) -> RunId:
         """Begin a run of a mission that was admitted. Returns when its beginning is durable.
 
-        `step`: it is paused before its first step.
+        `step`: it is paused before its first step. `requirements`: what it is monitored for; None:
+        the requirements of the mission's file.
         """
-        return await self._starter.begin(loaded, process_id, data, by, step=step)
+        return await self._starter.begin(
+            loaded, process_id, data, by, step=step, requirements=requirements
+        )
 
     def expect_interrupted(self, runs: Sequence[RunId]) -> None:
         """Say, before it connects, which runs are taken up first: none begins before that."""

@@ -207,6 +207,11 @@ def requirement_findings(
     return found
 
 
+def has_requirements(mission: Mission) -> bool:
+    """Whether the mission's file may have requirements; what reads them takes time to load."""
+    return _ELEMENT in mission.source
+
+
 def monitored_requirements(
     mission: Mission,
     fleet: Fleet,
@@ -220,7 +225,7 @@ def monitored_requirements(
     Raises:
         RequirementsError: with every finding.
     """
-    if spec is None and _ELEMENT not in mission.source:
+    if spec is None and not has_requirements(mission):
         return ()
     from m2pem.monitors.selection import monitored  # noqa: PLC0415
     from m2pem.verify.requirements import Names, collect  # noqa: PLC0415

@@ -9,7 +9,7 @@ from m2pem.api.alerts import AlertSeverity
 from m2pem.api.allocation import RoleAssignment, StartPreview
 from m2pem.api.authoring import MissionSource, file_of
 from m2pem.api.runs import APPROVAL, Alert, RunId
-from m2pem.engine.inputs import StartRun
+from m2pem.engine.inputs import MonitoredRequirement, StartRun
 from m2pem.engine.run import MissionRun
 from m2pem.engine.state import RunStatus
 from m2pem.errors import BusyError, M2pemError, MissionError, NotApprovedError
@@ -17,6 +17,7 @@ from m2pem.executive.approvals import Approvals
 from m2pem.executive.handover import refuse_busy_resources
 from m2pem.executive.loading import (
     findings_for,
+    has_requirements,
     known_data,
     load_source,
     monitored_requirements,
@@ -239,6 +240,7 @@ class RunStarter:
         lent: Collection[ResourceId] = (),
         direct: bool = False,
         step: bool = False,
+        requirements: tuple[MonitoredRequirement, ...] | None = None,
     ) -> RunId:
         """Begin a run of a mission that was admitted. Returns when its beginning is durable.
 
@@ -246,6 +248,7 @@ class RunStarter:
         may begin, asked when the journal has created it. `lent`: what the operator who starts it
         has taken, and lets it command. `direct`: it is one behavior that is commanded from outside
         of a mission, which nobody approves. `step`: it is paused before its first step.
+        `requirements`: what it is monitored for; None: the requirements of the mission's file.
 
         Raises:
             NotApprovedError: persons must approve it before.
@@ -257,9 +260,14 @@ class RunStarter:
         supervisor.refuse_unconnected()
         supervisor.interrupted.refuse_start()
         files = loaded.file, loaded.source, loaded.library
-        requirements = await asyncio.to_thread(
-            monitored_requirements, loaded, supervisor.fleet, supervisor.plugins, known_data(data)
-        )
+        if requirements is None and has_requirements(loaded):
+            requirements = await asyncio.to_thread(
+                monitored_requirements,
+                loaded,
+                supervisor.fleet,
+                supervisor.plugins,
+                known_data(data),
+            )
         approved = "" if direct else await self.approvals.refuse_unapproved(*files)
         header = RunHeader(
             loaded.file,
@@ -295,7 +303,7 @@ class RunStarter:
                 by,
                 supervisor.handover.by_name(lent),
                 step,
-                requirements,
+                requirements or (),
             )
         )
         for geometry in supervisor.geometries_given(loaded):

@@ -6,20 +6,20 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, TypeAlias
 
 from m2pem.api.authoring import MissionSource
 from m2pem.api.clock import VirtualClock, run_virtual
 from m2pem.api.runs import RunStatus, RunSummary, SimulationResult, StampedRecord, TelemetrySample
 from m2pem.api.telemetry import PayloadState, VehicleState
 from m2pem.engine.incidents import incident_holding
-from m2pem.engine.inputs import GiveUp
+from m2pem.engine.inputs import GiveUp, MonitoredRequirement
 from m2pem.engine.run import MissionRun
 from m2pem.engine.state import BehaviorPhase
 from m2pem.engine.state import RunStatus as EngineStatus
 from m2pem.errors import AnswersError, MissionError
 from m2pem.executive.executive import Executive
-from m2pem.executive.loading import load_source
+from m2pem.executive.loading import known_data, load_source, monitored_requirements
 from m2pem.executive.runner import Runner
 from m2pem.findings import Finding, Severity, has_errors
 from m2pem.fleet.check import DETECTOR_SERVICE
@@ -149,6 +149,7 @@ EXIT_STATUS = {
     RunStatus.STOPPED: 130,
 }
 
+Admitted: TypeAlias = tuple[str, tuple[MonitoredRequirement, ...]]
 OnRecord = Callable[[StampedRecord], None]
 
 
@@ -228,7 +229,7 @@ class Rehearser:
         self.fleet = simulated_fleet(replace(fleet, operators={}), {**SETTINGS, **seen})
         self.plugins = plugins
         self._process = process
-        self._admitted: dict[frozenset[str], str] = {}
+        self._admitted: dict[frozenset[str], Admitted] = {}
 
     def rehearse(
         self,
@@ -263,15 +264,20 @@ class Rehearser:
             summary, tuple(collected), tuple(rehearsal.samples), tuple(self.mission.files())
         )
 
-    def admit(self, executive: Executive, data: Mapping[str, Value] | None) -> str:
-        """Return the process to begin with. Data of the same names are checked once.
+    def admit(self, executive: Executive, data: Mapping[str, Value] | None) -> Admitted:
+        """Return the process to begin with, and what runs are monitored for. Data of the same names
+        are checked once.
 
         Raises:
             MissionError: with every finding.
         """
         names = frozenset(data or ())
         if names not in self._admitted:
-            self._admitted[names], _ = executive.admit(self.mission, self._process, data)
+            process, _ = executive.admit(self.mission, self._process, data)
+            required = monitored_requirements(
+                self.mission, self.fleet, self.plugins, known_data(data)
+            )
+            self._admitted[names] = process, required
         return self._admitted[names]
 
 
@@ -340,10 +346,12 @@ class Rehearsal:
             limit=self._limit,
             on_records=self._answers.seen,
         )
-        process_id = self._rehearser.admit(executive, data)
+        process_id, required = self._rehearser.admit(executive, data)
         async with executive:
             step = self._debugger is not None
-            run = await executive.begin(mission, process_id, data, "", step=step)
+            run = await executive.begin(
+                mission, process_id, data, "", step=step, requirements=required
+            )
             runner = executive.runner(run)
             if self._debugger is not None:
                 state = runner.run.state
