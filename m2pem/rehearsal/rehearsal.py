@@ -22,12 +22,13 @@ from m2pem.executive.executive import Executive
 from m2pem.executive.loading import known_data, load_source, monitored_requirements
 from m2pem.executive.runner import Runner
 from m2pem.findings import Finding, Severity, has_errors
+from m2pem.fleet.allocation import roles_of_mission
 from m2pem.fleet.check import DETECTOR_SERVICE
 from m2pem.fleet.fleet import Fleet, simulated_fleet
 from m2pem.fleet.space import waits_for_space
 from m2pem.journal.base import Entry
 from m2pem.journal.memory import MemoryJournal
-from m2pem.mission.behavior import Behavior, ServiceCall
+from m2pem.mission.behavior import Behavior, OnLoss, RoleKind, ServiceCall
 from m2pem.mission.elements import (
     Activity,
     ScriptTask,
@@ -204,6 +205,15 @@ def rehearse(
     )
 
 
+def uses_left(mission: Mission) -> bool:
+    """Whether a run of a mission may depend on what vehicles have reported as left: others may do
+    the rest of what a lost one did, or of a team's behavior."""
+    roles = list(roles_of_mission(mission))
+    return any(role.on_loss is not OnLoss.FAIL for role in roles) or any(
+        role.kind is RoleKind.TEAM for role in roles
+    )
+
+
 class Rehearser:
     """Rehearses one mission with one fleet, as often as wanted: both are checked once.
 
@@ -218,7 +228,11 @@ class Rehearser:
         fleet: Fleet | None,
         plugins: PluginManager,
         process: str | None = None,
+        *,
+        reports_left: bool = True,
     ) -> None:
+        """`reports_left`: vehicles report what is left of a behavior while it goes on. What becomes
+        of a run does not depend on that, unless others may do what is left (`uses_left`)."""
         if fleet is None:
             refuse_commands(mission)
             fleet = NO_FLEET
@@ -226,7 +240,8 @@ class Rehearser:
         looks = waits_for_space(fleet) or _TELEMETRY.search(mission.source)
         seen = {"telemetry_hz": SPACE_HZ} if looks else {}
         # A script answers: it may answer what any operator may.
-        self.fleet = simulated_fleet(replace(fleet, operators={}), {**SETTINGS, **seen})
+        silent = {} if reports_left else {"reports_left": False}
+        self.fleet = simulated_fleet(replace(fleet, operators={}), {**SETTINGS, **seen, **silent})
         self.plugins = plugins
         self._process = process
         self._admitted: dict[frozenset[str], Admitted] = {}

@@ -152,6 +152,7 @@ class SimArbiter:
             logger=context.logger,
             changed=self._moved,
             lose_link=self._lose_link,
+            silent={name for name, each in self._settings.items() if not each.reports_left},
         )
         self._reach = RadioRange(
             self._links, self._event_queue, self._memory, self._simulation, self._lost_after_s

@@ -74,6 +74,7 @@ class Settings:
     faults: tuple[Fault, ...] = ()
     link_lost: tuple[LinkLoss, ...] = ()
     telemetry_hz: float | None = None
+    reports_left: bool = True
     state: str = ""
 
 
@@ -108,7 +109,7 @@ SETTING_KEYS = (
     *_KINEMATICS,
     *_GIMBAL,
     *("home", "heading", "battery", "kind", "range", "detections", "targets", "faults"),
-    *("link_lost", "wind", "wind_from", "telemetry_hz", "state"),
+    *("link_lost", "wind", "wind_from", "telemetry_hz", "reports_left", "state"),
 )
 """Every setting of a simulated vehicle or payload."""
 
@@ -138,6 +139,7 @@ def read_settings(connection: Connection, origin: Origin) -> Settings:
         faults=tuple(chain(*reader.items("faults", read_faults, (str, Mapping)))),
         link_lost=reader.items("link_lost", _link_loss),
         telemetry_hz=reader.rate("telemetry_hz"),
+        reports_left=reader.truth("reports_left", default=True),
         state=reader.text("state"),
     )
     reader.finish()
@@ -236,6 +238,13 @@ class _Reader:
         if not isinstance(value, str):
             self.wrong(key, f"{value!r} is not a text")
             return ""
+        return value
+
+    def truth(self, key: str, *, default: bool) -> bool:
+        value = self._settings.get(key, default)
+        if not isinstance(value, bool):
+            self.wrong(key, f"{value!r} is neither true nor false")
+            return default
         return value
 
     def choice(self, key: str, choices: Sequence[str]) -> str:

@@ -2,7 +2,7 @@
 
 import logging
 import math
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Container, Mapping
 
 from msgspec.structs import replace
 
@@ -136,7 +136,8 @@ class Simulation:
     """Knows every behavior, running or remembered. All calls are made at their time `now_us`.
 
     `changed` is called with every body whose motion changes. `lose_link` is called with the vehicle
-    by the fault of that name.
+    by the fault of that name. `silent`: resources that do not report what is left of a behavior
+    while it goes on.
     """
 
     def __init__(
@@ -150,8 +151,10 @@ class Simulation:
         logger: logging.Logger,
         changed: Callable[[Body, int], None],
         lose_link: Callable[[ResourceId, int], None],
+        silent: Container[ResourceId] = frozenset(),
     ) -> None:
         self.memory = memory
+        self._silent = silent
         self._event_queue = event_queue
         self._bodies = bodies
         self._planner = planner
@@ -462,6 +465,8 @@ class Simulation:
             part.work_timer = None
         work, track = part.work, part.body.track
         if work is None or part.done or execution.cancelling or execution.deaf:
+            return
+        if part.body.id in self._silent:
             return
         due_m = max(work.next_report_m, part.planned_m + LEAST_PROGRESS_M)
         due = track.warp.when(track.plan.when_level_m_left(work.line.length_m - due_m))

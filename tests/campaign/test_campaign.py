@@ -10,16 +10,18 @@ from m2pem.campaign import campaign as campaigns
 from m2pem.campaign.campaign import run_campaign
 from m2pem.campaign.pool import rehearse_on_processes
 from m2pem.campaign.report import write_report
-from m2pem.campaign.runs import Order, Row, rehearse_runs, replayed
+from m2pem.campaign.runs import Order, Row, order_of, rehearse_runs, replayed, row_of
 from m2pem.campaign.statistics import SequentialTest, estimated, is_good
 from m2pem.errors import OperatorError
 from m2pem.executive.loading import load_source
 from m2pem.fleet.fleet import restore
+from m2pem.fleet.fleet_file import load_fleet
 from m2pem.plugins import PluginManager
-from m2pem.rehearsal.rehearsal import Rehearser, rehearse
+from m2pem.rehearsal.rehearsal import Rehearser, rehearse, uses_left
 from tests.campaign.conftest import MakeOrder
 
 KILLED = "M2PEM_TEST_KILLED"
+REPOSITORY = Path(__file__).parents[2]
 
 
 def test_rows_are_the_same_in_one_process_in_chunks_and_after_a_resume(
@@ -140,3 +142,23 @@ def test_a_run_that_cannot_be_rehearsed_is_a_row_with_its_error(
     monkeypatch.setattr(Rehearser, "rehearse", broken)
     result = run_campaign(order(), 3)
     assert [row["error"] for row in result.rows] == ["broken"] * 3
+
+
+def test_a_row_does_not_depend_on_reports_of_what_is_left() -> None:
+    """They cost half the time of a run, and are left out where nothing reads them."""
+    mission = load_source(REPOSITORY / "missions/vignette1.bpmn")
+    fleet = load_fleet(REPOSITORY / "fleet_configs/vignette1.yaml")
+    text = b"""
+behaviors:
+  DriveRoute: {fails: {probability: 0.3, after: 5..60 s, error: ROUTE_BLOCKED}}
+services:
+  Detector: {after: {exponential: 40 s}, write: [{data: {detection.type: camera}}]}
+links: [{vehicle: evsg1, at: 0..100 s, for: {exponential: 5 s}, probability: 0.3}]
+vehicles: {evsg1: {battery: 2 %..100 %}}
+"""
+    order = order_of(mission, fleet, text, 7)
+    assert not uses_left(mission)
+    for run in range(12):
+        drawn, result = replayed(order, run)
+        assert rehearse_runs(order, [run]) == [row_of(run, mission, result, drawn)]
+    assert uses_left(load_source(REPOSITORY / "missions/team_column.bpmn"))
