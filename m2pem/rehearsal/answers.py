@@ -33,6 +33,7 @@ from m2pem.fleet.fleet import Fleet
 from m2pem.fleet.yaml_source import YamlSource
 from m2pem.mission.mission import Mission
 from m2pem.rehearsal.answers_file import (
+    AnswerEntry,
     AnswersModel,
     BehaviorEntry,
     IncidentEntry,
@@ -122,8 +123,8 @@ class Answers:
                 return element, entries[place]
         return None
 
-    def answer(self, run: str, element: str, prompt: str) -> str | None:
-        """The decision for a prompt of an element; None: nothing is scripted (any more)."""
+    def answer(self, run: str, element: str, prompt: str) -> AnswerEntry | None:
+        """The answer to a prompt of an element; None: nothing is scripted (any more)."""
         place = self._visit(run, "answers", element, prompt)
         return None if place is None else self.model.answers[element][place]
 
@@ -156,7 +157,7 @@ class Answers:
 
     @property
     def resolving(self) -> int:
-        """The number of incidents that will be resolved by script after a while."""
+        """The number of incidents and prompts that will be answered by script after a while."""
         return self._resolving
 
     async def act(
@@ -188,6 +189,7 @@ class Answers:
         default_first_decision: bool,
     ) -> None:
         asked: set[str] = set()
+        late: dict[str, asyncio.Task[None]] = {}
 
         def take(incident: str, element: str) -> None:
             if incident not in asked:
@@ -210,23 +212,45 @@ class Answers:
                         continue
                     if isinstance(notice, OpenPrompt) and notice.prompt not in asked:
                         asked.add(notice.prompt)
-                        await self._answer(control, notice, default_first_decision)
+                        entry = self.answer(notice.run, notice.element, notice.prompt)
+                        if entry is None or not entry.after:
+                            await self._answer(control, notice, entry, default_first_decision)
+                            continue
+                        answering = self._answer_later(control, clock, notice, entry)
+                        late[notice.prompt] = group.create_task(answering, name="scripted answer")
                     elif isinstance(notice, PromptClosed):
                         asked.discard(notice.prompt)
+                        if notice.prompt in late:  # what closes it may be this answer itself
+                            late.pop(notice.prompt).cancel()
             except OperatorError:  # we were too slow; standing prompts come first in the next one
                 continue
             return
 
+    async def _answer_later(
+        self, control: MissionControl, clock: Clock, prompt: OpenPrompt, entry: AnswerEntry
+    ) -> None:
+        self._resolving += 1
+        try:
+            await clock.sleep(entry.after)
+        finally:
+            self._resolving -= 1
+        await self._answer(control, prompt, entry, default_first_decision=False)
+
     async def _answer(
-        self, control: MissionControl, prompt: OpenPrompt, default_first_decision: bool
+        self,
+        control: MissionControl,
+        prompt: OpenPrompt,
+        entry: AnswerEntry | None,
+        default_first_decision: bool,
     ) -> None:
         by = BY_SCRIPT
-        decision = self.answer(prompt.run, prompt.element, prompt.prompt)
-        if decision is None:
-            if not default_first_decision:
-                return
+        if entry is not None:
+            decision = entry.decision
+        elif default_first_decision:
             by = BY_DEFAULT
             decision = prompt.decisions[0].value
+        else:
+            return
         # First, tasks that began with the prompt get the vehicles that they need.
         await asyncio.sleep(0)
         try:

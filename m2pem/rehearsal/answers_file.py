@@ -57,6 +57,21 @@ class _Model(BaseModel):
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
 
 
+def _answer(said: object) -> object:
+    if isinstance(said, str):
+        return {"decision": said}
+    if isinstance(said, Mapping | AnswerEntry):
+        return said
+    raise ValueError(f"{said!r} is no decision: write a text, or {{decision: ..., after: ...}}")
+
+
+class AnswerEntry(_Model):
+    """The answer to one prompt, and how long the operator takes for it."""
+
+    decision: Text
+    after: Seconds = 0.0
+
+
 class ServiceEntry(_Model):
     """The result of one visit to a service task: values that it writes, or an error code."""
 
@@ -124,7 +139,9 @@ class AnswersModel(_Model):
     """A whole file. Lists are used visit by visit. `vehicles`: settings of simulated vehicles and
     payloads, in place of those of the fleet."""
 
-    answers: dict[Text, list[Text]] = Field(default_factory=dict)
+    answers: dict[Text, list[Annotated[AnswerEntry, BeforeValidator(_answer)]]] = Field(
+        default_factory=dict
+    )
     signals: list[TimedEntry] = Field(default_factory=list)
     messages: list[TimedEntry] = Field(default_factory=list)
     services: dict[Text, list[ServiceEntry]] = Field(default_factory=dict)
@@ -232,7 +249,7 @@ class _Check:
         elif isinstance(task, ServiceTask) and task.call is not None:
             self._calls[task.id] = task.call.service
 
-    def answers(self, answers: Mapping[str, list[str]]) -> None:
+    def answers(self, answers: Mapping[str, list[AnswerEntry]]) -> None:
         for element, decisions in answers.items():
             # After a restart an operator may be asked about a behavior, too.
             known = self._decisions.get(element)
@@ -241,7 +258,8 @@ class _Check:
             if known is None:
                 self._unknown(("answers", element), element, "user task", self._decisions)
                 continue
-            for place, decision in enumerate(decisions):
+            for place, entry in enumerate(decisions):
+                decision = entry.decision
                 if decision not in known:
                     message = f"the prompt of {element} has no decision '{decision}'"
                     remedy = suggest(decision, known, "decisions")

@@ -41,7 +41,9 @@ from m2pem.mission.mission import Mission
 from m2pem.plugins import PluginManager
 from m2pem.rehearsal.answers import BY_DEFAULT, BY_SCRIPT, Answers, check_answers, load_answers
 from m2pem.rehearsal.answers_file import BehaviorEntry, ServiceEntry
+from m2pem.rehearsal.rehearsal import rehearse
 from m2pem.rehearsal.scripted import ScriptedPlugins
+from m2pem.testing import scenarios
 
 START_US = 1_767_225_600_000_000
 MISSIONS = Path(__file__).parents[2] / "missions"
@@ -207,6 +209,11 @@ def requested(element: str, behavior: str) -> BehaviorRequested:
     return BehaviorRequested(1, "P", element, 1, behavior, "goto", "vehicle", ("a",), {}, {})
 
 
+def decision(script: Answers, run: str, prompt: str) -> str | None:
+    entry = script.answer(run, "Ask", prompt)
+    return None if entry is None else entry.decision
+
+
 def test_a_list_is_used_visit_by_visit_and_then_used_up(
     answers: Callable[[str], Answers],
 ) -> None:
@@ -215,7 +222,7 @@ def test_a_list_is_used_visit_by_visit_and_then_used_up(
         "services: {Look: [{after: 2 min, write: {a.b: 1}}, {error: BROKEN}]}\n"
         "behaviors: {Drive: [{after: 1.5 s, end: lost}, {after: 0 s, end: failed, error: E}]}\n"
     )
-    assert [script.answer("r1", "Ask", f"p{n}") for n in range(3)] == ["one", "two", None]
+    assert [decision(script, "r1", f"p{n}") for n in range(3)] == ["one", "two", None]
     assert [script.service("r1", "Look", "Camera", f"s{n}") for n in range(3)] == [
         ServiceEntry(after=120.0, write={"a.b": 1}),
         ServiceEntry(error="BROKEN"),
@@ -243,8 +250,8 @@ def test_the_same_visit_gets_the_same_entry_again(answers: Callable[[str], Answe
 
 def test_each_run_counts_its_own_visits(answers: Callable[[str], Answers]) -> None:
     script = answers("answers: {Ask: [one, two]}")
-    assert [script.answer(run, "Ask", "p1") for run in ("r1", "r2")] == ["one", "one"]
-    assert [script.answer(run, "Ask", "p2") for run in ("r1", "r2")] == ["two", "two"]
+    assert [decision(script, run, "p1") for run in ("r1", "r2")] == ["one", "one"]
+    assert [decision(script, run, "p2") for run in ("r1", "r2")] == ["two", "two"]
 
 
 def test_a_service_is_scripted_by_its_element_else_by_its_class(
@@ -267,7 +274,7 @@ def opened(prompt: str) -> PromptOpened:
 def test_visits_are_counted_in_the_order_of_the_journal(answers: Callable[[str], Answers]) -> None:
     script = answers("answers: {Ask: [one, two]}")
     script.seen("r1", [opened("p1"), opened("p2")])
-    assert (script.answer("r1", "Ask", "p2"), script.answer("r1", "Ask", "p1")) == ("two", "one")
+    assert (decision(script, "r1", "p2"), decision(script, "r1", "p1")) == ("two", "one")
 
 
 def test_after_a_restart_the_count_goes_on_and_open_visits_keep_their_entry(
@@ -288,8 +295,8 @@ def test_after_a_restart_the_count_goes_on_and_open_visits_keep_their_entry(
             requested("Ask", "r1.b1"),
         ],
     )
-    assert script.answer("r1", "Ask", "p3") == "three"
-    assert script.answer("r1", "Ask", "p2") == "two"
+    assert decision(script, "r1", "p3") == "three"
+    assert decision(script, "r1", "p2") == "two"
     assert script.service("r1", "Ask", "Detector", "s2") == ServiceEntry(after=2.0)
     script.seen("r1", [requested("Ask", "r1.b2")])
     assert script.behavior("r1", "r1.b2") == ("Ask", BehaviorEntry(after=2.0, end="lost"))
@@ -382,6 +389,36 @@ def test_a_prompt_without_a_script_may_be_left_to_operators(
     script = answers("answers: {Ask: [two]}")
     said = act(script, prompt(1), prompt(2), default_first_decision=False)
     assert said == [(0.0, ("answer", "p1", "two", BY_SCRIPT))]
+
+
+def test_an_operator_may_take_a_while(answers: Callable[[str], Answers]) -> None:
+    script = answers("answers: {Ask: [{decision: two, after: 30 s}, one]}")
+    assert act(script, prompt(1), prompt(2)) == [
+        (0.0, ("answer", "p2", "one", BY_SCRIPT)),
+        (30.0, ("answer", "p1", "two", BY_SCRIPT)),
+    ]
+    assert script.resolving == 0
+
+
+def test_a_prompt_that_is_closed_before_its_answer_gets_none(
+    answers: Callable[[str], Answers],
+) -> None:
+    script = answers("answers: {Ask: [{decision: two, after: 30 s}]}")
+    closed = PromptClosed("r1", "p1")
+    assert act(script, prompt(1), closed) == []
+    assert script.resolving == 0
+
+
+def test_a_rehearsal_waits_for_an_answer_that_takes_a_while(
+    answers: Callable[[str], Answers],
+) -> None:
+    script = answers("answers: {Question: [{decision: abort, after: 90 s}]}")
+    result = rehearse(scenarios.question(), None, plugins=PluginManager(), answers=script)
+    answered = [
+        (s.t_s, s.record.decision) for s in result.records if isinstance(s.record, PromptAnswered)
+    ]
+    assert answered == [(90.0, "abort")]
+    assert result.summary.status is RunStatus.COMPLETED
 
 
 def test_a_prompt_that_is_seen_twice_is_answered_once(answers: Callable[[str], Answers]) -> None:
