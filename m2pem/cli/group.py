@@ -37,6 +37,7 @@ COMMANDS = {
     "check": "Check a mission file, alone or against a fleet.",
     "verify": "Prove properties and requirements of a mission, or show a run that violates them.",
     "simulate": "Rehearse a mission on a virtual clock.",
+    "test": "Rehearse the scenarios of missions, and say what they never see.",
     "debug": "Rehearse a mission step by step: stop, look, change, go back.",
     "campaign": "Rehearse a mission many times, with faults and times that are drawn.",
     "runs": "List the runs of a journal.",
