@@ -41,10 +41,9 @@ def add_scenarios(path: Path, fleet: str, suggestions: Iterable[Suggestion]) -> 
 
 
 def _scenario(suggestion: Suggestion, titles: set[str]) -> CommentedMap:
-    first = suggestion.reaches[0]
-    what = f"error {first.id}" if first.kind is Kind.ERROR else first.id
+    what = suggestion.reaches[0].label
     title, number = f"reaches {what}", 2
-    while title in titles:
+    while title in titles:  # it does so no more, and the scenario has failed
         title, number = f"reaches {what}, {number}", number + 1
     titles.add(title)
     scenario = CommentedMap(scenario=title)
@@ -98,7 +97,7 @@ def yaml_of(answers: Content) -> str:
 
 def _yaml() -> YAML:
     yaml = YAML()
-    yaml.width = 120
+    yaml.width = 4096  # lines of others are not broken
     yaml.indent(mapping=2, sequence=4, offset=2)
     yaml.brace_single_entry_mapping_in_flow_sequence = True
     return yaml

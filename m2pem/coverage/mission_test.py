@@ -52,7 +52,8 @@ class MissionReport:
     """All that was found about one mission.
 
     `items`: every item, by its key. `stale`: what the file of scenarios calls unreached, and a
-    scenario sees. `states`: how many were searched. `searched`: why not all states were; "".
+    scenario sees. `called`: the other files that the mission uses. `states`: how many were
+    searched. `searched`: why not all states were; "".
     """
 
     mission: Path
@@ -62,6 +63,7 @@ class MissionReport:
     never: tuple[NeverSeen, ...]
     stale: tuple[str, ...]
     complete: bool
+    called: tuple[str, ...] = ()
     suggestions: tuple[Suggestion, ...] = ()
     states: int = 0
     searched: str = ""
@@ -181,6 +183,7 @@ class MissionTest:
             tuple(_never(item, model.unreached, reach, unscripted) for item in never),
             tuple(key for key in model.unreached if key in seen),
             complete or model.complete,
+            tuple(each.name for each in self.mission.library),
             found,
             reach.states if reach is not None else 0,
             reach.problem if reach is not None else "",

@@ -30,7 +30,7 @@ def text_of(report: Report) -> Iterator[str]:
         verdict = "FAILED" if outcome.differences else "passed"
         yield f"  {verdict}  {outcome.title} ({outcome.status.value}, {outcome.took_s:.0f} s)"
         yield from (f"          {each}" for each in outcome.differences)
-    if not count and not report.suggestions:
+    if not count and not report.suggestions and report.unnamed:
         failed = "FAILED  " if report.complete else ""
         yield f"  {failed}none of its {len(report.items)} elements and flows is seen"
         return

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from m2pem.coverage.mission_test import MissionReport, MissionTest
@@ -21,10 +21,11 @@ _NOT_SEARCHED = frozenset({"node_modules", "__pycache__"})
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """A mission, and the file of its scenarios; None: it has none."""
+    """A mission, and the file of its scenarios; None: it has none. `named`: not only its folder."""
 
     mission: Path
     scenarios: Path | None
+    named: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,10 +47,10 @@ def find_targets(paths: Iterable[Path]) -> list[Target]:
     """
     found: dict[Path, Target] = {}
     for path in paths:
-        named = _in_folder(path) if path.is_dir() else [path]
-        for each in named:
-            target = target_of(each)
-            found[target.mission] = target
+        for each in _in_folder(path) if path.is_dir() else [path]:
+            target = replace(target_of(each), named=not path.is_dir())
+            if target.named or target.mission not in found:
+                found[target.mission] = target
     return [found[mission] for mission in sorted(found)]
 
 
@@ -103,12 +104,22 @@ def reports_on(
     plugins: PluginManager,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Iterator[MissionReport | Unusable]:
-    """Test missions one after the other, and yield what was found as soon as it is known."""
-    for target in targets:
+    """Test missions one after the other, and yield what was found as soon as it is known.
+
+    A file of a folder that has no scenarios is left out if a mission with scenarios calls it: it is
+    tested there. So missions with scenarios come first.
+    """
+    called: set[Path] = set()
+    for target in sorted(targets, key=lambda each: (each.scenarios is None, each.mission)):
+        if not target.named and target.scenarios is None and target.mission.resolve() in called:
+            continue
         try:
-            yield report_on(target, wanted, plugins, progress)
+            report = report_on(target, wanted, plugins, progress)
         except FindingsError as error:
             yield Unusable(target.mission, target.scenarios, str(error))
+            continue
+        called |= {Path(name).resolve() for name in report.called}
+        yield report
 
 
 def report_on(

@@ -6,7 +6,7 @@ from m2pem.bpmn import parse_mission
 from m2pem.coverage.adding import add_scenarios, yaml_of
 from m2pem.coverage.items import Kind, items_of, seen_in
 from m2pem.coverage.mission_test import MissionReport
-from m2pem.coverage.suite import Target, Wanted, report_on
+from m2pem.coverage.suite import Target, Wanted, find_targets, report_on, reports_on
 from m2pem.fleet.default_fleet import fleet_for
 from m2pem.plugins import PluginManager
 from m2pem.rehearsal.rehearsal import rehearse
@@ -123,3 +123,22 @@ def test_an_item_that_only_unknown_data_reaches_says_so(mission: Path) -> None:
     found = report(mission, GOOD, suggest=True)
     assert "nothing in the mission writes" in never(found)["NoAnswer"]
     assert {"NoAnswer", "TooLate", "ToNoAnswer"} <= {each.item.key for each in found.unnamed}
+
+
+def test_of_a_folder_all_missions_are_tested_but_files_that_they_call(mission: Path) -> None:
+    inner = b'<definitions xmlns="http://www.omg.org/spec/BPMN/20100524/MODEL"><process id="INNER">'
+    inner += b'<startEvent id="S"/><endEvent id="E"/><sequenceFlow id="F" sourceRef="S"'
+    inner += b' targetRef="E"/></process></definitions>'
+    mission.with_name("inner.bpmn").write_bytes(inner)
+    mission.with_name("alone.bpmn").write_bytes(inner.replace(b"INNER", b"ALONE"))
+    text = mission.read_text(encoding="utf-8")
+    text = text.replace(
+        '<endEvent id="Stayed"/>', '<callActivity id="Stayed" calledElement="INNER"/>'
+    )
+    mission.write_text(text, encoding="utf-8")
+    write_scenarios(mission, "scenarios: [{scenario: a, then: completed}]")
+    reports = list(reports_on(find_targets([mission.parent]), Wanted(), PluginManager()))
+    assert [each.mission.name for each in reports] == ["drive.bpmn", "alone.bpmn"]
+    named = find_targets([mission.parent, mission.with_name("inner.bpmn")])
+    names = [each.mission.name for each in reports_on(named, Wanted(), PluginManager())]
+    assert names == ["drive.bpmn", "alone.bpmn", "inner.bpmn"]
