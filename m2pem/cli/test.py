@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     type=click.FloatRange(min=0, min_open=True),
     default=60.0,
     show_default=True,
-    help="Time for the search of each mission's states.",
+    help="Time for the search of each mission's states, and for answers that are suggested.",
 )
 @click.option(
     "--junit",

@@ -174,7 +174,9 @@ class MissionTest:
         unscripted: Mapping[str, str] = {}
         if reach is not None and suggest:
             progress(f"{self.path}: looking for answers")
-            found, unscripted = suggest_answers(reach, self.rehearser(None), model.data, wanted)
+            found, unscripted = suggest_answers(
+                reach, self.rehearser(None), model.data, wanted, limits.seconds
+            )
         return MissionReport(
             self.path,
             self.file.path,

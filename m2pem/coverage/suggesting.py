@@ -1,5 +1,6 @@
 """Suggests answers files that reach what no scenario sees; each was rehearsed, and does."""
 
+import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -14,7 +15,7 @@ from m2pem.rehearsal.answers_file import AnswersModel
 from m2pem.rehearsal.rehearsal import RehearsalResult, Rehearser
 from m2pem.verify.conformance_run import ConformanceRun
 
-MAX_STEPS = 100_000
+MAX_STEPS = 20_000
 """Engine steps after which a rehearsal of a suggestion is given up."""
 
 _FIRST = (Kind.END, Kind.ERROR, Kind.EVENT, Kind.FLOW, Kind.ELEMENT)
@@ -40,14 +41,22 @@ def suggest_answers(
     rehearser: Rehearser,
     data: Mapping[str, Value],
     wanted: Sequence[Item],
+    seconds: float,
 ) -> tuple[tuple[Suggestion, ...], dict[str, str]]:
     """Return suggestions that reach as much of `wanted` as can be, and why the rest is out of
-    reach, by key."""
+    reach, by key.
+
+    After `seconds` no more is looked for.
+    """
+    until = time.monotonic() + seconds
     found: list[Suggestion] = []
     unscripted: dict[str, str] = {}
     missing = {item.key: item for item in sorted(wanted, key=lambda item: _FIRST.index(item.kind))}
     for item in list(missing.values()):
         if item.key not in missing or not reach.reaches(item):
+            continue
+        if time.monotonic() > until:
+            unscripted[item.key] = f"a run reaches it; answers were looked for for {seconds:g} s"
             continue
         reason = "a run reaches it"
         for content, result in _tries(reach, rehearser, data, item):

@@ -5,8 +5,11 @@ from pathlib import Path
 from m2pem.bpmn import parse_mission
 from m2pem.coverage.adding import add_scenarios, yaml_of
 from m2pem.coverage.items import Kind, items_of, seen_in
-from m2pem.coverage.mission_test import MissionReport
-from m2pem.coverage.suite import Target, Wanted, find_targets, report_on, reports_on
+from m2pem.coverage.mission_test import MissionReport, MissionTest
+from m2pem.coverage.reach import Reach
+from m2pem.coverage.scenario_file import read_scenarios
+from m2pem.coverage.suggesting import suggest_answers
+from m2pem.coverage.suite import LIMITS, Target, Wanted, find_targets, report_on, reports_on
 from m2pem.fleet.default_fleet import fleet_for
 from m2pem.plugins import PluginManager
 from m2pem.rehearsal.rehearsal import rehearse
@@ -110,6 +113,16 @@ def test_adding_keeps_what_is_there(mission: Path) -> None:
     text = file.read_text(encoding="utf-8")
     assert text.startswith(f"# by hand\n{GOOD}")
     assert report_on(Target(mission, file), Wanted(complete=True), PluginManager()).passed
+
+
+def test_what_was_not_looked_for_in_time_says_so(mission: Path) -> None:
+    target = Target(mission, write_scenarios(mission, GOOD))
+    test = MissionTest(target.mission, read_scenarios(target.scenarios or mission), PluginManager())
+    reach = Reach(test.mission, test.rehearser(None).fleet, "MAIN", {}, {}, LIMITS)
+    items = items_of(test.mission)
+    found, unscripted = suggest_answers(reach, test.rehearser(None), {}, items, -1.0)
+    assert found == ()
+    assert set(unscripted) == {item.key for item in items}
 
 
 def test_an_item_that_only_unknown_data_reaches_says_so(mission: Path) -> None:
