@@ -50,7 +50,9 @@ def _read_test(_: click.Context, __: click.Parameter, text: str | None) -> "Sequ
 @process_option
 @path_option
 @data_option
-@click.option("--runs", type=click.IntRange(min=1), default=1000, show_default=True)
+@click.option(
+    "--runs", type=click.IntRange(min=1), default=1000, show_default=True, help="How many."
+)
 @click.option("--seed", type=int, default=0, show_default=True, help="Of all that is drawn.")
 @click.option(
     "--faults",
