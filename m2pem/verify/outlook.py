@@ -95,6 +95,7 @@ class _Explorer:
             _receive(run, choice, now_us)
             if version_of(run.state.mission) != choice.version:
                 raise _NotKnownError("the run has gone on since the plan of the revision was made")
+        _receive(run, i.SetBreakpoints(), now_us)  # an author lets it go on from there
         if run.state.status is RunStatus.PAUSED:
             _receive(run, i.ResumeRun(), now_us)
         if isinstance(choice, i.ResolveIncident):

@@ -14,7 +14,7 @@ PAIR = (
 )
 ATOMS = (
     "a formula can ask for active(E), completed(E), commanded(RESOURCE, BEHAVIOR), ended, "
-    "count(...) >= N and comparisons of data"
+    "count(...) >= N, distance(A, B) < 5 m and comparisons of data"
 )
 
 

@@ -158,3 +158,10 @@ def test_what_is_foreseen_of_random_revisions_comes() -> None:
 def test_what_is_foreseen_of_many_random_revisions_comes() -> None:
     found: Counter[Verdict | None] = Counter()
     run_seeds(lambda dice: found.update([one_of_both(dice)]), seeds_for(LONG_S))
+
+
+def test_a_breakpoint_on_the_way_is_no_end() -> None:
+    play = Play(FORK).start()
+    play.give(i.SetBreakpoints(tuple(node.id for node in play.mission.nodes)))
+    same = mission(FORK.replace('id="a"', 'id="a" name="A"'))
+    assert foreseen(play, item_of(play, same)) == Outlook(Verdict.COMPLETES)
