@@ -70,7 +70,8 @@ def debug(
 ) -> None:
     """Rehearse a mission step by step: stop, look, change, go back.
 
-    Commands are read from standard input; `help` lists them. Time stands while it is stopped.
+    Commands are read from standard input; `help` lists them. While it is stopped, time does not
+    advance.
     """
     from m2pem.cli.arguments import get_answers
     from m2pem.executive.loading import load_source

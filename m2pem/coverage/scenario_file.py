@@ -192,7 +192,7 @@ def read_scenarios(path: Path) -> ScenarioFile:
             source.error((*where, "scenario"), "duplicate", "another scenario has this title, too")
         titles.add(each.scenario)
         if each.when.file is not None and len(each.when.model_fields_set) > 1:
-            message = "it has an answers file ('file') and answers of its own"
+            message = "it has an answers file ('file') and other answers"
             source.error((*where, "when"), "bad-value", message, "remove one")
     if source.findings:
         raise ScenarioError(f"{path} is no file of scenarios that can be used", source.findings)

@@ -2,7 +2,7 @@
 
 They are the moments of the checker (docs/verification-internals.md): a step of a token, with all
 that happens in it, is one; what completes is true in that moment alone, and a quiet one follows.
-The state of a moment is that after the step. Steps are told apart by the order of records.
+The state of a moment is that after the step. The order of records tells the steps apart.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -159,7 +159,7 @@ class Moments:
             self._flush()
 
     def set_state(self, bits: int, value: int) -> None:
-        """Set propositions that no record tells of; it is a moment of its own."""
+        """Set propositions that are in no record; that is a moment, too."""
         state = (self.state & ~bits) | value
         if state != self.state:
             self.state = state

@@ -129,7 +129,7 @@ def test_titles_are_unique_and_answers_come_from_one_place(mission: Path) -> Non
         )
     assert [each.message for each in caught.value.findings] == [
         "another scenario has this title, too",
-        "it has an answers file ('file') and answers of its own",
+        "it has an answers file ('file') and other answers",
     ]
 
 

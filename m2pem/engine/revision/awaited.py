@@ -1,6 +1,6 @@
 """What a revision does to the events that tokens and scopes of a run await.
 
-An event whose definitions are the same is awaited as before. Others are awaited anew: a duration
+An event whose definitions are the same is awaited as before. Others are armed again: a duration
 counts from when it was first armed, a cycle from now. What has occurred already does not occur
 again, and so is not armed.
 """
