@@ -69,7 +69,7 @@ class CampaignFolder:
 
     def rows(self) -> list[Row]:
         """Return the rows that are there, by their runs."""
-        from pyarrow import parquet  # noqa: PLC0415
+        from pyarrow import parquet  # noqa: PLC0415  # an extra
 
         rows: dict[int, Row] = {}
         for part in sorted(self.folder.glob("part-*.parquet")):
@@ -85,8 +85,8 @@ class CampaignFolder:
 
 def write_parquet(file: Path, rows: Iterable[Row]) -> None:
     """Write rows as a Parquet file. Columns that a row lacks are null."""
-    import pyarrow as pa  # noqa: PLC0415
-    from pyarrow import parquet  # noqa: PLC0415
+    import pyarrow as pa  # noqa: PLC0415  # an extra
+    from pyarrow import parquet  # noqa: PLC0415  # an extra
 
     listed = list(rows)
     columns = dict.fromkeys(key for row in listed for key in row)

@@ -4,7 +4,6 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from m2pem.campaign.runs import Row
 
@@ -105,7 +104,7 @@ def _effects_of(name: str, rows: Sequence[Row]) -> Iterable[Effect]:
     if len(set(values)) < 2:
         return
     if isinstance(values[0], float):
-        from scipy.stats import spearmanr  # noqa: PLC0415
+        from scipy.stats import spearmanr  # noqa: PLC0415  # an extra
 
         median = quantiles(values).median
         failures = [not is_good(row) for row in known]
@@ -146,7 +145,7 @@ def _share(counted: tuple[int, int]) -> float:
 
 def _newcombe(first: tuple[int, int], second: tuple[int, int]) -> tuple[float, float]:
     """Return the interval of the difference of two probabilities, by those of Wilson (1927)."""
-    from scipy.stats import binomtest  # noqa: PLC0415
+    from scipy.stats import binomtest  # noqa: PLC0415  # an extra
 
     if not first[1] or not second[1]:
         return -1.0, 1.0
@@ -183,7 +182,7 @@ def compared(first: Sequence[Row], second: Sequence[Row]) -> Difference:
 
 def _mean(values: Sequence[float]) -> tuple[float, float, float]:
     """Return the mean of paired differences and its interval (Student's t)."""
-    from scipy.stats import t  # noqa: PLC0415
+    from scipy.stats import t  # noqa: PLC0415  # an extra
 
     count = len(values)
     if not count:
@@ -262,5 +261,8 @@ def rehearsed(rows: Iterable[Row]) -> list[Row]:
 
 def worst(rows: Sequence[Row], count: int) -> list[Row]:
     """Return the worst runs: those that failed, then the longest."""
-    order: Any = lambda row: (is_good(row), -(row["took_s"] or 0.0), row["run"])  # noqa: E731
+
+    def order(row: Row) -> tuple[bool, float, int]:
+        return is_good(row), -(row["took_s"] or 0.0), row["run"]
+
     return sorted(rows, key=order)[:count]

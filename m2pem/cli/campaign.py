@@ -42,7 +42,7 @@ def _read_test(_: click.Context, __: click.Parameter, text: str | None) -> "Sequ
 @click.command(
     epilog=example(
         "m2pem campaign missions/survey_pair.bpmn --fleet fleet_configs/survey_pair.yaml "
-        "--runs 200 --vary wind=0..8 --seed 7"
+        "--runs 200 --vary wind=0..14 --seed 7"
     )
 )
 @mission_argument

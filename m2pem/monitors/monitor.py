@@ -5,6 +5,7 @@ from functools import lru_cache
 
 from m2pem.mission.mission import Mission
 from m2pem.monitors.anticipation import Verdict, anticipation
+from m2pem.monitors.product import own_letter
 from m2pem.monitors.timed import TimedEvaluation, TimedPlan, base_propositions
 from m2pem.verify.ltl import negated, parse
 from m2pem.verify.ltl.formula import Formula, Proposition, Timed, propositions
@@ -39,8 +40,7 @@ class MonitorPlan:
         masked = letter & self.mask
         own = self._letters.get(masked)
         if own is None:
-            own = sum(mine for theirs, mine in self.bits if masked & theirs)
-            self._letters[masked] = own
+            own = self._letters[masked] = own_letter(self.bits, masked)
         return own
 
     def changes(self, before: int, letter: int, english: English) -> str:

@@ -53,7 +53,7 @@ class Product:
             if part.verdicts[before].is_certain:
                 after.append(before)
                 continue
-            now = part.step(before, _own(bits, letter), _own(bits, unknown))
+            now = part.step(before, own_letter(bits, letter), own_letter(bits, unknown))
             after.append(now)
             if part.verdicts[now].is_certain:
                 certain.append((place, part.verdicts[now]))
@@ -65,13 +65,13 @@ class Product:
         for place, (part, bits) in enumerate(self._parts):
             if part.verdicts[state[place]].is_certain:
                 continue
-            verdict = part.at_end(state[place], _own(bits, letter), _own(bits, unknown))
+            verdict = part.at_end(state[place], own_letter(bits, letter), own_letter(bits, unknown))
             if verdict.is_certain:
                 found.append((place, verdict))
         return tuple(found)
 
 
-def _own(bits: Bits, letter: int) -> int:
+def own_letter(bits: Bits, letter: int) -> int:
     """The letter of a formula, given that of the run."""
     return sum(mine for theirs, mine in bits if letter & theirs)
 

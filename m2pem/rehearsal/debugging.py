@@ -331,7 +331,7 @@ class _Rehearsed:
             summary = run_virtual(
                 lambda clock: rehearsal.run(clock, session._data), session._start_us
             )
-        except BaseException as error:  # whoever waits for the next stop gets it
+        except BaseException as error:  # the caller who waits for the next stop gets it
             self._answered.put(error)
         else:
             self._answered.put(Stop(self.moment, self.view.t_s, None, summary, {}))

@@ -19,7 +19,12 @@ from m2pem.engine.state import BehaviorPhase
 from m2pem.engine.state import RunStatus as EngineStatus
 from m2pem.errors import AnswersError, MissionError
 from m2pem.executive.executive import Executive
-from m2pem.executive.loading import known_data, load_source, monitored_requirements
+from m2pem.executive.loading import (
+    has_requirements,
+    known_data,
+    load_source,
+    monitored_requirements,
+)
 from m2pem.executive.runner import Runner
 from m2pem.findings import Finding, Severity, has_errors
 from m2pem.fleet.allocation import roles_of_mission
@@ -140,7 +145,7 @@ SPACE_HZ = 1.0
 """Telemetry of a fleet whose tasks wait for space, and of a mission whose requirements are about
 telemetry: each second is looked at it."""
 
-_TELEMETRY = re.compile(rb"requirement\b[^>]*\b(?:distance|altitude|speed|battery|link)\s*\(")
+_TELEMETRY = re.compile(rb"\b(?:distance|altitude|speed|battery|link)\s*\(")
 """What the file of a mission with a requirement about telemetry contains."""
 
 EXIT_STATUS = {
@@ -237,7 +242,9 @@ class Rehearser:
             refuse_commands(mission)
             fleet = NO_FLEET
         self.mission = mission
-        looks = waits_for_space(fleet) or _TELEMETRY.search(mission.source)
+        # A mission that has such words elsewhere is rehearsed a little slower, and the same.
+        asks = has_requirements(mission) and _TELEMETRY.search(mission.source)
+        looks = waits_for_space(fleet) or asks
         seen = {"telemetry_hz": SPACE_HZ} if looks else {}
         # A script answers: it may answer what any operator may.
         silent = {} if reports_left else {"reports_left": False}

@@ -1,4 +1,4 @@
-"""Campaigns: the same table whoever rehearses, and whatever happens meanwhile."""
+"""Campaigns: the same table in one process, a pool and a cluster, and after interruptions."""
 
 import os
 import signal
