@@ -63,3 +63,14 @@ def test_another_requirement_is_another_campaign(order: MakeOrder, folder: Path)
 def test_a_requirement_that_is_not_there_is_refused(order: MakeOrder) -> None:
     with pytest.raises(OperatorError, match="no requirement 'quik' to monitor; did you mean"):
         quick(order, "quik")
+
+
+def test_telemetry_in_the_argument_of_a_pattern_is_looked_at(order: MakeOrder) -> None:
+    asked = (
+        '<m2pem:requirement id="flat" pattern="absence">'
+        '<m2pem:arg name="what" value="battery(uav1) &gt; 1 %"/></m2pem:requirement>'
+    )
+    inside = f"<extensionElements>{asked}</extensionElements><startEvent"
+    source = sequence("A", "B").replace(b"<startEvent", inside.encode(), 1)
+    rows = run_campaign(order(mission=source), 3).rows
+    assert [row["requirement.flat"] for row in rows] == ["violated"] * 3
