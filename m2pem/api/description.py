@@ -248,7 +248,9 @@ def _mission_revised(view: RunView, record: r.MissionRevised) -> _Sentence:
         f"; {view.label(element)}: its token {f'goes to {view.label(to)}' if to else 'ends'}"
         for element, to in record.moves.items()
     )
-    text = f"goes on with version {record.version[:12]} of its mission{_by(record)}{moved}"
+    text = (
+        f"{view.run} goes on with version {record.version[:12]} of its mission{_by(record)}{moved}"
+    )
     return text, Importance.WARNING
 
 

@@ -20,6 +20,9 @@ SHOWN = frozenset(
         r.RunPaused,
         r.RunResumed,
         r.RunEnded,
+        r.MissionRevised,
+        r.BreakpointReached,
+        r.OperatorSetData,
         r.TokenEntered,
         r.TokenLeft,
         r.AllocationDelayed,
@@ -134,6 +137,8 @@ class LineFormatter:
         if not self._is_shown(view, record):
             return None
         description = describe(stamped, view)
+        if isinstance(record, r.MissionRevised):
+            view.mission = self._mission(stamped.run)
         run = "" if stamped.run == self._main else f"{stamped.run:<4} "
         line = f"{stamped.t_s:9.1f} s  {run}{description.text}"
         colour = _colour(description) if self._colour else None

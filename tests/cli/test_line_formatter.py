@@ -143,6 +143,19 @@ def test_a_run_whose_diagram_is_not_known_is_described_with_ids() -> None:
     assert lines.format(StampedRecord("r1", 1, 0.0, entered)) == "      0.0 s  Unknown"
 
 
+def test_after_a_revision_elements_have_the_names_of_the_new_version() -> None:
+    missions = {"r1": VIGNETTE}
+    lines = LineFormatter(missions.get)
+    entered = r.TokenEntered(*ON_ROUTE)
+    assert lines.format(StampedRecord("r1", 1, 0.0, entered)) == "      0.0 s  DRIVE ROUTE"
+    source = VIGNETTE.source.decode().replace("DRIVE ROUTE", "DRIVE THE LANE")
+    missions["r1"] = parse_mission(source.encode(), "vignette1.bpmn")
+    revised = r.MissionRevised("0123456789abcdef", "0", "anna")
+    line = lines.format(StampedRecord("r1", 2, 4.0, revised))
+    assert line == "      4.0 s  r1 goes on with version 0123456789ab of its mission by anna"
+    assert lines.format(StampedRecord("r1", 3, 4.0, entered)) == "      4.0 s  DRIVE THE LANE"
+
+
 def test_an_instance_says_which_it_is() -> None:
     lines = LineFormatter(lambda _: None)
     entered = r.TokenEntered(2, "P", "Survey", 2, instance=0)

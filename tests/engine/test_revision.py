@@ -85,6 +85,12 @@ def test_a_move_that_makes_no_sense_is_refused() -> None:
     assert "no element 'nd'" in play.plan(TWO_TASKS, go="nd").refusals[0].text
 
 
+def test_the_version_that_a_run_has_is_refused() -> None:
+    play = Play(THREE_TASKS).start()
+    (refusal,) = play.plan(THREE_TASKS).refusals
+    assert refusal.text == "the run has this version already, and no token is moved"
+
+
 def test_a_plan_of_an_earlier_state_is_not_carried_out() -> None:
     play = Play(THREE_TASKS).start()
     new = THREE_TASKS.replace("do land uav1", "do hold uav1")

@@ -59,6 +59,12 @@ class PlanDraft:
         """Have an ad-hoc subprocess choose, or ask, again."""
         self._rechecked.append(scope.id)
 
+    @property
+    def is_unchanged(self) -> bool:
+        """Whether the run has this version already."""
+        version, previous = self._versions
+        return version == previous
+
     def finish(self) -> RevisionPlan:
         """Return the plan."""
         version, previous = self._versions

@@ -61,6 +61,9 @@ class _Planning:
         if state.status in (RunStatus.NEW, RunStatus.ENDED):
             draft.refuse("", 0, f"the run is {state.status.value}: only one under way is revised")
             return draft.finish()
+        if draft.is_unchanged and not self._moves:
+            draft.refuse("", 0, "the run has this version already, and no token is moved")
+            return draft.finish()
         for scope in state.scopes.values():
             if scope.owner is None:
                 self._instance(scope)
