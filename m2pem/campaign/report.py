@@ -48,14 +48,18 @@ def report_lines(result: CampaignResult, other: CampaignResult | None = None) ->
     bad = estimated(sum(not is_good(row) for row in rows), len(rows))
     lines.append(_row("any failure", "", f"{bad.count:,}", *_probability(bad)))
     lines += _requirement_lines(rows, result.order.required)
-    lines += ["", "## Times and batteries", "", "| | 5 % | median | 95 % | mean |"]
+    lines += ["", "## Times, distances and batteries", "", "| | 5 % | median | 95 % | mean |"]
     lines.append("|---|---|---|---|---|")
     lines.append(_quantiles("time, s", [row["took_s"] for row in rows]))
-    vehicles = [key for key in dict.fromkeys(k for row in rows for k in row) if "battery." in key]
-    for key in vehicles:
-        if key.startswith("battery."):
-            name = f"battery of {key.removeprefix('battery.')} at the end, %"
-            lines.append(_quantiles(name, [100 * row[key] for row in rows if key in row]))
+    keys = dict.fromkeys(key for row in rows for key in row)
+    for start, name, factor in (
+        ("distance.", "distance of {}, m", 1),
+        ("battery.", "battery of {} at the end, %", 100),
+    ):
+        for key in keys:
+            if key.startswith(start):
+                shown = name.format(key.removeprefix(start))
+                lines.append(_quantiles(shown, [factor * row[key] for row in rows if key in row]))
     lines += _effect_lines(rows)
     if other is not None:
         lines += _difference_lines(result, other)

@@ -27,15 +27,13 @@ if TYPE_CHECKING:
 
 Row = dict[str, Any]
 """One run: `run`, `outcome`, `end`, `good`, `took_s`, `records` (but those of progress), `error`;
-`battery.VEHICLE` at its end, a fraction; `requirement.ID`: "satisfied", "violated", or "open" if
-its end has not decided it; `drawn.NAME`. `good`: it has completed or was terminated, and violates
-nothing that is required. `error`: why it could not be rehearsed; such a run has nothing else."""
+`battery.VEHICLE` at its end, a fraction; `distance.VEHICLE`: the way it has gone, in m;
+`requirement.ID`: "satisfied", "violated", or "open" if its end has not decided it; `drawn.NAME`.
+`good`: it has completed or was terminated, and violates nothing that is required. `error`: why it
+could not be rehearsed; such a run has nothing else."""
 
 _GOOD = (RunStatus.COMPLETED, RunStatus.TERMINATED)
 _VIOLATED = r.RequirementVerdict.VIOLATED.value
-
-ONLY_AT_THE_END_S = 1e9
-"""The period of samples: one at the beginning, and one at the end."""
 
 MAX_STEPS = 100_000
 """Engine steps after which a run is given up."""
@@ -142,7 +140,6 @@ def _rehearse(rehearser: Rehearser, order: Order, drawn: DrawnRun) -> RehearsalR
         answers=Answers(AnswersModel.model_validate(drawn.answers)),
         max_steps=order.max_steps,
         observed=False,
-        telemetry_every_s=ONLY_AT_THE_END_S,
         fits=True,
     )
 
@@ -166,8 +163,9 @@ def row_of(
         "records": sum(type(each.record) is not r.BehaviorProgressed for each in result.records),
         "error": "",
     }
-    for vehicle, state in result.telemetry[-1].vehicles.items():
-        row[f"battery.{vehicle}"] = state.battery_fraction
+    for vehicle, at_end in result.vehicles.items():
+        row[f"battery.{vehicle}"] = at_end.battery
+        row[f"distance.{vehicle}"] = at_end.distance_m
     row.update({f"requirement.{key}": verdict for key, verdict in verdicts.items()})
     row.update({f"drawn.{key}": value for key, value in drawn.values.items()})
     return row

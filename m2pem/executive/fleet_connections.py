@@ -219,6 +219,8 @@ class FleetArbiters:
         offers, and what teams can make of that."""
         own = tuple(self._of[resource].catalogue(resource))
         made = self._capabilities.together(resource)
+        if not made:
+            return own
         return (*own, *(spec for spec in made if not _has(own, spec.name)))
 
     @property

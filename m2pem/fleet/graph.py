@@ -2,7 +2,9 @@
 
 Nodes are vehicles, payloads, teams and capabilities; a capability is one behavior that a resource
 offers. Edges: a payload is MOUNTED_ON a vehicle, a vehicle is a MEMBER_OF a team, a vehicle or
-payload OFFERS a capability. The graph never changes; `allocation` says which resources are free.
+payload offers a capability: that edge has the resource's own spec of the behavior, as two arbiters
+may take different parameters for one. The graph never changes; `allocation` says which resources
+are free.
 """
 
 from collections.abc import Callable, Sequence
@@ -26,7 +28,6 @@ class Relation(StrEnum):
 
     MOUNTED_ON = "mounted on"
     MEMBER_OF = "member of"
-    OFFERS = "offers"
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,13 +43,6 @@ class Capability(NamedTuple):
 
     name: str
     type: BehaviorType
-
-
-@dataclass(frozen=True, slots=True)
-class _Offer:
-    """Data of an OFFERS edge: two arbiters may take different parameters for one behavior."""
-
-    spec: BehaviorSpec
 
 
 class ResourceGraph:
@@ -88,11 +82,14 @@ class ResourceGraph:
         if same not in self._sorted:
             self._sorted[same] = tuple(sorted(offered, key=lambda spec: (spec.name, spec.type)))
         self._offers[resource.id] = self._sorted[same]
+        here, edges = self._index[resource.id], []
         for spec in offered:
             capability = Capability(spec.name, spec.type)
-            if capability not in self._index:
-                self._index[capability] = self._graph.add_node(capability)
-            self._graph.add_edge(self._index[resource.id], self._index[capability], _Offer(spec))
+            there = self._index.get(capability)
+            if there is None:
+                there = self._index[capability] = self._graph.add_node(capability)
+            edges.append((here, there, spec))
+        self._graph.add_edges_from(edges)
 
     def kind(self, resource: str) -> BehaviorType | None:
         """Whether a name is a vehicle, payload or team; None when the fleet lacks it."""
@@ -126,8 +123,8 @@ class ResourceGraph:
         here, there = self._index.get(resource), self._index.get(Capability(name, type_))
         if here is None or there is None or not self._graph.has_edge(here, there):
             return None
-        offer: _Offer = self._graph.get_edge_data(here, there)
-        return offer.spec
+        spec: BehaviorSpec = self._graph.get_edge_data(here, there)
+        return spec
 
     def offers(self, resource: str) -> tuple[BehaviorSpec, ...]:
         """Everything that a vehicle, payload or team takes, by name.

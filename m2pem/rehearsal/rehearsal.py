@@ -3,7 +3,7 @@
 import asyncio
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import chain
 from pathlib import Path
 from typing import Protocol, TypeAlias
@@ -34,6 +34,7 @@ from m2pem.fleet.space import waits_for_space
 from m2pem.journal.base import Entry
 from m2pem.journal.memory import MemoryJournal
 from m2pem.mission.behavior import Behavior, OnLoss, RoleKind, ServiceCall
+from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.elements import (
     Activity,
     ScriptTask,
@@ -138,8 +139,9 @@ MAX_STEPS = 10_000_000
 SEARCH_US = 3600 * US_PER_S
 """How long a vehicle whose motion has no end may go on searching for targets."""
 
-SETTINGS = {"telemetry_hz": 0, "state": ""}
-"""Settings of every simulated resource: telemetry has changes only, and no state file."""
+SETTINGS = {"telemetry_hz": 0, "footprints": False, "state": ""}
+"""Settings of every simulated resource: telemetry has changes only, without what payloads see, as
+nothing in a rehearsal reads that; and no state file."""
 
 SPACE_HZ = 1.0
 """Telemetry of a fleet whose tasks wait for space, and of a mission whose requirements are about
@@ -160,8 +162,20 @@ OnRecord = Callable[[StampedRecord], None]
 
 
 @dataclass(frozen=True, slots=True)
+class VehicleAtEnd:
+    """A simulated vehicle at the end of a rehearsal. `battery`: a fraction; `distance_m`: the
+    length of the way that it has gone, in space."""
+
+    battery: float
+    distance_m: float
+
+
+@dataclass(frozen=True, slots=True)
 class RehearsalResult(SimulationResult):
-    """`records` is empty when they were given to `on_record` instead."""
+    """`records` is empty when they were given to `on_record` instead. `vehicles`: the simulated
+    ones, at the end."""
+
+    vehicles: Mapping[ResourceId, VehicleAtEnd] = field(default_factory=dict)
 
     @property
     def exit_status(self) -> int:
@@ -283,7 +297,11 @@ class Rehearser:
         )
         summary = run_virtual(lambda clock: rehearsal.run(clock, data), start_us)
         return RehearsalResult(
-            summary, tuple(collected), tuple(rehearsal.samples), tuple(self.mission.files())
+            summary,
+            tuple(collected),
+            tuple(rehearsal.samples),
+            tuple(self.mission.files()),
+            rehearsal.vehicles,
         )
 
     def admit(self, executive: Executive, data: Mapping[str, Value] | None) -> Admitted:
@@ -344,6 +362,7 @@ class Rehearsal:
         debugger: "Debugger | None" = None,
     ) -> None:
         self.samples: Sequence[TelemetrySample] = ()
+        self.vehicles: Mapping[ResourceId, VehicleAtEnd] = {}
         self._debugger = debugger
         self._holding: list[asyncio.Future[None]] = []
         self._every_s = telemetry_every_s
@@ -403,6 +422,12 @@ class Rehearsal:
                 if sampler is not None:
                     sampler.at(clock.now_us())
                     self.samples = sampler.samples
+                now_us = clock.now_us()
+                self.vehicles = {
+                    each.id: VehicleAtEnd(each.battery_at(now_us), each.driven_m(now_us))
+                    for arbiter in self._scripted.simulated
+                    for each in arbiter.vehicles
+                }
                 return summary
             finally:
                 acting.cancel()

@@ -101,8 +101,8 @@ class SimArbiter:
     `telemetry_hz`: of every resource that does not say its own; 0 reports changes alone, so that
     nothing happens while nothing moves, and then links can't be watched by silence.
 
-    Beside the protocol, tests and rehearsals look at `effects`, `expects`, `searching` and
-    `broadcast`, and use `script`, `inject`, `lose_link` and `restore_link`.
+    Beside the protocol, tests and rehearsals look at `effects`, `expects`, `searching`, `vehicles`
+    and `broadcast`, and use `script`, `inject`, `lose_link` and `restore_link`.
     """
 
     capabilities = ArbiterCapabilities(adjusts=True, sights=True, addresses=True, fences=True)
@@ -334,6 +334,11 @@ class SimArbiter:
     def searching(self) -> bool:
         """Whether a vehicle at work may yet come near something that its detector finds."""
         return self._detectors.searching
+
+    @property
+    def vehicles(self) -> Sequence[SimVehicle]:
+        """The vehicles that are simulated."""
+        return [body for body in self._bodies.values() if isinstance(body, SimVehicle)]
 
     def doing(self, resource: ResourceId) -> BehaviorId:
         """Return the behavior that a resource does now, whatever was reported; "": none."""

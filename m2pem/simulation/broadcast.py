@@ -59,7 +59,8 @@ class Broadcast:
             return
         if self._audible(body.id):
             if isinstance(body, SimPayload):
-                self.states.put(body.state(now_us, detections, self._footprint(body, now_us)))
+                seen = self._footprint(body, now_us) if body.settings.footprints else ()
+                self.states.put(body.state(now_us, detections, seen))
             else:
                 self.states.put(body.state(now_us, self._frame))
         entry = self._next.pop(body.id, None)

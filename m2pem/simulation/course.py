@@ -112,10 +112,11 @@ def rounded(points: list[Vector], radius_m: float) -> list[list[Piece]]:
         if math.dist(a, b) > _NOTHING_M
     ]
     runs: list[list[Piece]] = [[]]
+    bend: Bend | None = None
+    cut_m = 0.0
     for index, leg in enumerate(legs):
         start = leg.start
         if index:
-            bend, cut_m = _bend(legs[index - 1], leg, radius_m)
             if bend is not None:
                 runs[-1].append(bend)
                 start = leg.point(cut_m)
@@ -133,19 +134,21 @@ def rounded(points: list[Vector], radius_m: float) -> list[list[Piece]]:
 
 def _bend(before: Line, after: Line, radius_m: float) -> tuple[Bend | None, float]:
     """The bend between two legs and how much it cuts off each; no bend and -1: stop and turn."""
-    if before.level_m < _NOTHING_M or after.level_m < _NOTHING_M:
+    before_m, after_m = before.level_m, after.level_m
+    if before_m < _NOTHING_M or after_m < _NOTHING_M:
         return None, -1.0
-    sweep = turned(before.yaw_rad, after.yaw_rad)
+    before_rad = before.yaw_rad
+    sweep = turned(before_rad, after.yaw_rad)
     if abs(sweep) < 1e-6:
         return None, 0.0
     tangent = math.tan(abs(sweep) / 2)
     radius_m = min(radius_m, FARTHEST_MISS_M / (1 / math.cos(sweep / 2) - 1 + 1e-9))
-    cut_m = min(radius_m * tangent, before.level_m / 2, after.level_m / 2)
+    cut_m = min(radius_m * tangent, before_m / 2, after_m / 2)
     radius_m = cut_m / tangent
     if abs(sweep) > SHARPEST_BEND_RAD or radius_m < SMALLEST_RADIUS_M:
         return None, -1.0
-    start, end = before.point(before.level_m - cut_m), after.point(cut_m)
-    aside = before.yaw_rad + math.copysign(math.pi / 2, sweep)
+    start, end = before.point(before_m - cut_m), after.point(cut_m)
+    aside = before_rad + math.copysign(math.pi / 2, sweep)
     centre = (start[0] + radius_m * math.cos(aside), start[1] + radius_m * math.sin(aside))
     climb_m = end[2] - start[2]
     bend = Bend(centre, radius_m, aside + math.pi, sweep, start[2], climb_m, after.leg)

@@ -75,6 +75,7 @@ class Settings:
     link_lost: tuple[LinkLoss, ...] = ()
     telemetry_hz: float | None = None
     reports_left: bool = True
+    footprints: bool = True
     state: str = ""
 
 
@@ -109,7 +110,7 @@ SETTING_KEYS = (
     *_KINEMATICS,
     *_GIMBAL,
     *("home", "heading", "battery", "kind", "range", "detections", "targets", "faults"),
-    *("link_lost", "wind", "wind_from", "telemetry_hz", "reports_left", "state"),
+    *("link_lost", "wind", "wind_from", "telemetry_hz", "reports_left", "footprints", "state"),
 )
 """Every setting of a simulated vehicle or payload."""
 
@@ -123,12 +124,11 @@ def read_settings(connection: Connection, origin: Origin) -> Settings:
     reader = _Reader(connection, origin)
     default = DEFAULTS.get(connection.domain, DEFAULTS["ground"])
     said = {"cruise_speed_m_s": connection.cruise_speed_m_s, "endurance_s": connection.endurance_s}
-    given: dict[str, Any] = {key: value for key, value in said.items() if value is not None}
-    default = dataclasses.replace(default, **given)
-    moves: dict[str, Any] = {**reader.numbers(_KINEMATICS)}
+    moves: dict[str, Any] = {key: value for key, value in said.items() if value is not None}
+    moves |= {**reader.numbers(_KINEMATICS), "wind_m_s": reader.wind(connection.domain)}
     settings = Settings(
-        kinematics=dataclasses.replace(default, **moves, wind_m_s=reader.wind(connection.domain)),
-        gimbal=dataclasses.replace(Gimbal(), **reader.numbers(_GIMBAL)),
+        kinematics=dataclasses.replace(default, **moves),
+        gimbal=Gimbal(**reader.numbers(_GIMBAL)),
         home=reader.position("home"),
         heading_rad=reader.number("heading", Dimension.ANGLE, 0.0),
         battery=reader.fraction("battery", 1.0),
@@ -140,6 +140,7 @@ def read_settings(connection: Connection, origin: Origin) -> Settings:
         link_lost=reader.items("link_lost", _link_loss),
         telemetry_hz=reader.rate("telemetry_hz"),
         reports_left=reader.truth("reports_left", default=True),
+        footprints=reader.truth("footprints", default=True),
         state=reader.text("state"),
     )
     reader.finish()
@@ -185,8 +186,9 @@ class _Reader:
 
     def numbers(self, keys: Mapping[str, tuple[str, Dimension | None]]) -> dict[str, float]:
         found = {}
-        for key, (name, dimension) in keys.items():
-            if key in self._settings:
+        for key in self._settings:
+            if key in keys:
+                name, dimension = keys[key]
                 value = self.number(key, dimension, 1.0)
                 if value <= 0 and not (key in _MAY_BE_ZERO and (value == 0 or "tilt" in key)):
                     self.wrong(key, f"{self._settings[key]!r} is not above 0")

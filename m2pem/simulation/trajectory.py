@@ -9,7 +9,17 @@ from typing import Generic, Protocol, Self, TypeVar
 import msgspec
 
 from m2pem.simulation.kinematics import Kinematics
-from m2pem.simulation.segments import Curve, Pivot, Pose, Profile, Stand, Travel, along, chain
+from m2pem.simulation.segments import (
+    Curve,
+    Pivot,
+    Pose,
+    Profile,
+    Stand,
+    Steer,
+    Travel,
+    along,
+    chain,
+)
 from m2pem.units import US_PER_S
 
 _NOTHING_S = 1e-9
@@ -91,6 +101,19 @@ class Plan(Generic[S]):
         load_s = min(inside, self._durations_s[index]) * self.phases[index].load
         return laps_work + before + load_s
 
+    def driven_m(self, t: float) -> float:
+        """Return the length in space of the way until plan time `t`."""
+        index, inside, _ = self._find(t)
+        driven_m = sum(map(_length_m, self.phases[:index], self._durations_s))
+        if self.cycle_from is not None and t > self._ends[-1]:
+            lap_s = self._ends[-1] - (self._ends[self.cycle_from - 1] if self.cycle_from else 0.0)
+            lap = slice(self.cycle_from, None)
+            lap_m = sum(map(_length_m, self.phases[lap], self._durations_s[lap]))
+            # Whole laps: `inside` is within the phase of the last one.
+            done_s = self._ends[index - 1] + inside if index else inside
+            driven_m += round((t - done_s) / lap_s) * lap_m
+        return driven_m + _length_m(self.phases[index], inside)
+
     def level_m_left(self, t: float) -> float:
         """Return the length on the map from plan time `t` to the plan's end."""
         after_m = self._level_m_after_each()
@@ -142,6 +165,19 @@ class Plan(Generic[S]):
             laps_work = laps * (self._work[-1] - work)
         index = min(bisect.bisect_right(self._ends, t), len(self._ends) - 1)
         return index, max(0.0, t - (self._ends[index - 1] if index else 0.0)), laps_work
+
+
+def _length_m(phase: object, until_s: float) -> float:
+    """Return the length in space of a phase until a time after its start."""
+    match phase:
+        case Travel() | Curve():
+            return phase.profile.at(until_s)[0]
+        case Steer():
+            until_s = min(until_s, phase.duration_s)
+            first, middle, last = (phase.at(until_s * part).speed for part in (0.0, 0.5, 1.0))
+            return until_s * (first + 4 * middle + last) / 6  # by Simpson's rule
+        case _:
+            return 0.0
 
 
 def _level_m(phase: object, from_s: float) -> float:
@@ -249,6 +285,10 @@ class Track(Generic[S]):
         standing_s = max(0.0, (now_us - self.counted_us) / US_PER_S - moving_s)
         work = self.plan.work(tau) - self._counted_work
         return work + standing_s * standing_load
+
+    def driven_m(self, now_us: int) -> float:
+        """Return the length in space of the way since the plan began."""
+        return self.plan.driven_m(self._tau(now_us))
 
     def count_from(self, now_us: int) -> None:
         """Count battery load from now on."""

@@ -39,6 +39,7 @@ class SimVehicle:
         self.home = self._home(frame, place)
         self.battery = settings.battery
         yaw = yaw_of(settings.heading_rad)
+        self._driven_m = 0.0
         self.track: Track[Pose] = Track(Plan([Stand(self.home, yaw, 0.0, 0.0)]), now_us)
 
     def _home(self, frame: FlatFrame, place: int) -> Vector:
@@ -61,7 +62,13 @@ class SimVehicle:
     def take(self, plan: Plan[Pose], now_us: int) -> None:
         """Follow another plan, which must begin where it is."""
         self.battery = self.battery_at(now_us)
+        self._driven_m = self.driven_m(now_us)
         self.track = Track(plan, now_us)
+
+    def driven_m(self, now_us: int) -> float:
+        """Return the length of its way in space since it was made, and before that of the plan that
+        it was taken up with."""
+        return self._driven_m + self.track.driven_m(now_us)
 
     def stop(self, now_us: int) -> None:
         """Brake straight on."""

@@ -144,6 +144,17 @@ def test_a_run_that_cannot_be_rehearsed_is_a_row_with_its_error(
     assert [row["error"] for row in result.rows] == ["broken"] * 3
 
 
+def test_a_row_has_the_way_of_each_vehicle_and_its_battery_at_the_end() -> None:
+    mission = load_source(REPOSITORY / "missions/vignette1.bpmn")
+    fleet = load_fleet(REPOSITORY / "fleet_configs/vignette1.yaml")
+    blocked = b"behaviors: {DriveRoute: {fails: {probability: 1, after: 10 s}}}"
+    orders = order_of(mission, fleet, b"", 7), order_of(mission, fleet, blocked, 7)
+    whole, part = (rehearse_runs(order, [0])[0] for order in orders)
+    # 5 m/s at most, for 10 s; the whole way is no longer than its time allows.
+    assert 0 < part["distance.evsg1"] <= 50 < whole["distance.evsg1"] < 15 * whole["took_s"]
+    assert whole["battery.evsg1"] < part["battery.evsg1"] < 1
+
+
 def test_a_row_does_not_depend_on_reports_of_what_is_left() -> None:
     """They cost half the time of a run, and are left out where nothing reads them."""
     mission = load_source(REPOSITORY / "missions/vignette1.bpmn")

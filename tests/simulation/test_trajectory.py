@@ -13,7 +13,7 @@ from m2pem.mission.geometry import Point
 from m2pem.simulation.arbiters import SimArbiter
 from m2pem.simulation.course import Course, Craft
 from m2pem.simulation.kinematics import DEFAULTS
-from m2pem.simulation.segments import Pose, Stand, Travel, fit
+from m2pem.simulation.segments import Curve, Pose, Stand, Steer, Travel, fit
 from m2pem.simulation.trajectory import Plan, Track, Warp, retimed
 from m2pem.testing.contracts.arbiter_harness import ArbiterHarness
 from tests.seeds import examples
@@ -41,6 +41,19 @@ def test_a_plan_that_repeats_comes_back_to_the_same_place() -> None:
     assert plan.duration_s == math.inf
     assert plan.at(17.0 + 3 * lap_s).place == pytest.approx(plan.at(17.0).place)
     assert plan.work(17.0 + 3 * lap_s) == pytest.approx(plan.work(17.0) + 3 * STRAIGHT.duration_s)
+
+
+@pytest.mark.parametrize("cycle_from", [None, 0, 1])
+@pytest.mark.parametrize("t_s", [0.0, 3.0, 12.0, 31.5, 60.0, 200.0])
+def test_the_way_driven_is_the_integral_of_the_speed(cycle_from: int | None, t_s: float) -> None:
+    pause = Stand((0.0, 0.0, 0.0), 0.0, 7.0, 0.0)
+    climbing = fit(math.hypot(20.0, 4.0), 5.0, v_in=0.0, v_out=0.0, accel=1.0, decel=1.0)
+    arc = Curve((0.0, 0.0), 20.0, 0.0, 1.0, 0.0, 4.0, climbing)
+    steer = Steer((0.0, 0.0, 0.0), (3.0, 0.0, 0.0), (-1.0, 2.0, 0.0), 0.0, 0.0, 0.3)
+    plan: Plan[Pose] = Plan([pause, STRAIGHT, arc, steer, pause], cycle_from)
+    steps = 20_000
+    speeds = [plan.at(t_s * (step + 0.5) / steps).speed for step in range(steps)]
+    assert plan.driven_m(t_s) == pytest.approx(sum(speeds) * t_s / steps, abs=0.01)
 
 
 def test_held_plan_time_stops_after_the_braking_and_never_ends() -> None:
