@@ -140,6 +140,7 @@ class VariationsModel(_Model):
     behaviors: dict[Text, VariedBehavior] = Field(default_factory=dict)
     services: dict[Text, VariedService] = Field(default_factory=dict)
     answers: dict[Text, dict[Text, Weight]] = Field(default_factory=dict)
+    answer_times: dict[Text, Seconds] = Field(default_factory=dict)
     signals: list[Arrival] = Field(default_factory=list)
     messages: list[Arrival] = Field(default_factory=list)
     links: list[VariedLink] = Field(default_factory=list)
@@ -206,6 +207,10 @@ def read_variations(said: Path | bytes) -> Variations:
                 _setting(key, said_so)
             except ValueError as error:
                 source.error(("vehicles", vehicle, key), "bad-value", str(error))
+    for element in model.answer_times:
+        if element not in model.answers:
+            what = f"`answers` does not say what is decided at {element}"
+            source.error(("answer_times", element), "bad-value", what)
     if source.findings:
         what = f"{source.file} is no variations file that can be used"
         raise AnswersError(what, source.findings)
@@ -246,7 +251,7 @@ class _Drawing:
         model, visits = self._model, range(self._model.visits)
         answers: dict[str, Any] = {
             "answers": {
-                element: [self._decision(element, weights, visit) for visit in visits]
+                element: [self._answer(element, weights, visit) for visit in visits]
                 for element, weights in model.answers.items()
             },
             "services": {
@@ -278,6 +283,18 @@ class _Drawing:
         if visit == 0:
             self._values[key] = happens
         return happens or self._everything
+
+    def _answer(
+        self, element: str, weights: Mapping[str, float], visit: int
+    ) -> str | dict[str, Any]:
+        decision = self._decision(element, weights, visit)
+        if element not in self._model.answer_times:
+            return decision
+        time = self._model.answer_times[element]
+        return {
+            "decision": decision,
+            "after": self._number(f"answers.{element}.after", time, visit),
+        }
 
     def _decision(self, element: str, weights: Mapping[str, float], visit: int) -> str:
         if self._everything:

@@ -52,6 +52,8 @@ wind: {speed: 0..8 m/s}
         ("vehicles:\n  uav1: {batery: 5 %}", "batery of a vehicle cannot be drawn"),
         ("vehicles:\n  uav1: {battery: 5 kg..8}", "variations.yaml:2"),
         ("links: [{vehicle: uav1}]", "'at' is missing"),
+        ("answer_times:\n  Ask: 5 s", "variations.yaml:2.*what is decided at Ask"),
+        ("answers: {Ask: {yes: 1}}\nanswer_times:\n  Ask: -5 s", "variations.yaml:3"),
         ("visits: 0", "variations.yaml:1"),
     ],
 )
