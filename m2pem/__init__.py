@@ -22,6 +22,7 @@ from m2pem.hookspecs import hookimpl
 if TYPE_CHECKING:
     from m2pem.errors import AnswersError, FleetError, M2pemError, MissionError, OperatorError
     from m2pem.fleet.fleet_file import load_fleet
+    from m2pem.scripting.campaign import Campaign, campaign
     from m2pem.scripting.checking import CheckResult, check
     from m2pem.scripting.diagram import draw
     from m2pem.scripting.executive import Executive, Prompt, Run
@@ -34,6 +35,7 @@ __version__ = "0.2.0"
 
 __all__ = [
     "AnswersError",
+    "Campaign",
     "CheckResult",
     "Executive",
     "FleetError",
@@ -45,6 +47,7 @@ __all__ = [
     "RunResult",
     "VerificationResult",
     "__version__",
+    "campaign",
     "check",
     "draw",
     "hookimpl",
@@ -59,6 +62,7 @@ __all__ = [
 _MODULES = {
     "m2pem.errors": "AnswersError FleetError M2pemError MissionError OperatorError",
     "m2pem.fleet.fleet_file": "load_fleet",
+    "m2pem.scripting.campaign": "Campaign campaign",
     "m2pem.scripting.checking": "CheckResult check",
     "m2pem.scripting.diagram": "draw",
     "m2pem.scripting.executive": "Executive Prompt Run",
@@ -83,7 +87,7 @@ def __dir__() -> list[str]:
 
 
 class _Package(ModuleType):
-    """This package, whose attribute `verify` is the function.
+    """This package, whose attributes `campaign` and `verify` are the functions.
 
     The import of a module of the package `m2pem.verify` would set the attribute to that package.
     """

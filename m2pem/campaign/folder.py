@@ -7,10 +7,10 @@ missing.
 import hashlib
 import json
 from collections.abc import Iterable, Sequence
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-import m2pem
 from m2pem.campaign.runs import Order, Row
 from m2pem.errors import OperatorError
 
@@ -24,7 +24,7 @@ def manifest_of(order: Order) -> dict[str, Any]:
     for source in order.mission.library:
         digest.update(repr(source).encode())
     return {
-        "m2pem": m2pem.__version__,
+        "m2pem": version("m2pem"),
         "mission": order.mission.file,
         "mission_sha256": digest.hexdigest(),
         "fleet_sha256": hashlib.sha256(order.fleet).hexdigest(),

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from m2pem.campaign import campaign as campaigns
+from m2pem.campaign import pool
 from m2pem.campaign.campaign import run_campaign
 from m2pem.campaign.pool import rehearse_on_processes
 from m2pem.campaign.report import write_report
@@ -71,7 +72,7 @@ def test_a_process_that_is_killed_loses_nothing_and_the_run_that_kills_is_named(
     order: MakeOrder, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv(KILLED, str(tmp_path / "killed"))
-    monkeypatch.setattr("m2pem.campaign.pool.rehearse_runs", killing)
+    monkeypatch.setattr(pool, "rehearse_runs", killing)
     chunks = [(0, 1, 2), (3, 4, 5), (6, 7, 8), (9, 10), (11, 12)]
     rows = [row for part in rehearse_on_processes(order(), chunks, 2) for row in part]
     alone = rehearse_runs(order(), range(13))

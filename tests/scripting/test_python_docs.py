@@ -1,4 +1,4 @@
-"""The code of docs/python.md runs, and prints what its comments say."""
+"""The Python code of some pages runs, and prints what its comments say."""
 
 import re
 from pathlib import Path
@@ -7,11 +7,12 @@ import pytest
 
 from tests.console import REPOSITORY, environment, first_unprinted, make_workspace, run_preloaded
 
-PAGE = REPOSITORY / "docs" / "python.md"
-TEXT = PAGE.read_text(encoding="utf-8")
+PAGES = ("python.md", "campaigns.md")
+TEXTS = {page: (REPOSITORY / "docs" / page).read_text(encoding="utf-8") for page in PAGES}
 BLOCKS = {
-    TEXT.count("\n", 0, found.start()) + 1: found[1]
-    for found in re.finditer(r"^```python\n(.*?)^```$", TEXT, re.M | re.S)
+    f"{page}:{text.count(chr(10), 0, found.start()) + 1}": found[1]
+    for page, text in TEXTS.items()
+    for found in re.finditer(r"^```python\n(.*?)^```$", text, re.M | re.S)
 }
 
 
@@ -27,12 +28,12 @@ def test_comments_are_read_as_output() -> None:
     assert sum(bool(output(code)) for code in BLOCKS.values()) >= 5
 
 
-@pytest.mark.parametrize("line", BLOCKS)
-def test_a_block_does_what_it_says(line: int, tmp_path: Path) -> None:
+@pytest.mark.parametrize("place", BLOCKS)
+def test_a_block_does_what_it_says(place: str, tmp_path: Path) -> None:
     workspace = make_workspace(tmp_path / "workspace")
-    done = run_preloaded(["-c", BLOCKS[line]], workspace, environment(tmp_path / "home"))
+    done = run_preloaded(["-c", BLOCKS[place]], workspace, environment(tmp_path / "home"))
     assert done.returncode == 0, done.stdout
-    expected = output(BLOCKS[line])
+    expected = output(BLOCKS[place])
     if expected:
         missing = first_unprinted(expected, done.stdout)
         assert missing is None, f"{done.stdout}\nnot as shown: {missing}"
