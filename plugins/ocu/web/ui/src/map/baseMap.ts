@@ -15,6 +15,17 @@ export interface Tiles {
 const FENCE = "#c2262e";
 const FOR_FINGERS = 1.35;
 
+/**
+ * Leaflet keeps a request to draw that it has drawn for already: after the map is removed, it would
+ * draw on a canvas that is gone.
+ */
+const LinesCanvas: new () => L.Canvas = L.Canvas.extend({
+  _redraw(this: { _map: L.Map | null }): void {
+    if (this._map) ORIGINAL._redraw.call(this);
+  },
+});
+const ORIGINAL = L.Canvas.prototype as unknown as { _redraw(this: object): void };
+
 export function baseMap(
   host: HTMLElement,
   fleet: Fleet,
@@ -26,7 +37,7 @@ export function baseMap(
     center: [lat, lon],
     zoom: 17,
     maxZoom: 22,
-    preferCanvas: true,
+    renderer: new LinesCanvas(),
     attributionControl: tiles !== null,
     zoomSnap: 0.5,
     tapHold: true, // a long press is a right click, also where the browser makes none of it
