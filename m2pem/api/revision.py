@@ -10,23 +10,27 @@ from m2pem.findings import Finding, Severity
 class RevisionEffect:
     """One thing that a revision does. `kind`: moves, ends, restarts, goes on, arms, rearms, disarms
     or changes. `element`: its id. `token`: the id of a token; 0: it is no token's. `text`: a
-    sentence for people."""
+    sentence for people. `resources`: the vehicles and payloads that the token commands now."""
 
     kind: str
     element: str
     token: int
     text: str
+    resources: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class RevisionRefusal:
     """Why a revision cannot be. `candidates`: where the token can go instead, by the ids of
-    elements and sequence flows of the new version; the nearest first."""
+    elements and sequence flows of the new version; the nearest first. `labels`: what operators
+    call each of them. `resources`: the vehicles and payloads that the token commands now."""
 
     element: str
     token: int
     text: str
     candidates: tuple[str, ...] = ()
+    labels: tuple[str, ...] = ()
+    resources: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,6 +11,7 @@ from m2pem.api.runs import IncidentPreview, RunId
 from m2pem.bpmn.one_task import is_one_task
 from m2pem.engine.inputs import MonitoredRequirement, Revise
 from m2pem.engine.revision import RevisionPlan, plan_revision
+from m2pem.engine.revision.plan import called
 from m2pem.engine.state import RunState
 from m2pem.errors import MissionError, OperatorError
 from m2pem.executive.incidents import IncidentChoices
@@ -115,6 +116,7 @@ class RunRevisions:
         plan, loaded = prepared.plan, prepared.mission
         approval = await self._starter.approvals.state(loaded.file, loaded.source, loaded.library)
         possible = not (plan.refusals or has_errors(prepared.findings))
+        state = self._runner(run).run.state
         return RevisionPreview(
             run,
             loaded.file,
@@ -123,14 +125,27 @@ class RunRevisions:
             plan.previous,
             (
                 *described(plan.difference),
-                *_monitored(self._runner(run).run.state, prepared.item.requirements),
+                *_monitored(state, prepared.item.requirements),
             ),
             tuple(
-                RevisionEffect(each.kind.value, each.element, each.token, each.text)
+                RevisionEffect(
+                    each.kind.value,
+                    each.element,
+                    each.token,
+                    each.text,
+                    _commanded(state, each.token),
+                )
                 for each in plan.effects
             ),
             tuple(
-                RevisionRefusal(each.element, each.token, each.text, each.candidates)
+                RevisionRefusal(
+                    each.element,
+                    each.token,
+                    each.text,
+                    each.candidates,
+                    tuple(called(loaded.elements[id_]) for id_ in each.candidates),
+                    _commanded(state, each.token),
+                )
                 for each in plan.refusals
             ),
             prepared.findings,
@@ -170,6 +185,20 @@ class RunRevisions:
         for geometry in self._supervisor.geometries_given(prepared.mission):
             if geometry.name not in runner.run.state.geometries:
                 runner.post(geometry)
+
+
+def _commanded(state: RunState, number: int) -> tuple[str, ...]:
+    """Return the vehicles and payloads of a token and of all tokens within its activity."""
+    token = state.tokens.get(number)  # the run may have gone on since the plan was made
+    found: dict[str, None] = {}
+    waiting = [token] if token is not None else []
+    while waiting:
+        each = waiting.pop()
+        if each.behavior:
+            found.update(dict.fromkeys(state.behaviors[each.behavior].resources))
+        if each.inner is not None:
+            waiting.extend(each.inner.tokens.values())
+    return tuple(sorted(found))
 
 
 def described(difference: Difference) -> Sequence[str]:

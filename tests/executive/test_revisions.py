@@ -62,6 +62,8 @@ def test_a_removed_task_is_refused_and_its_token_moved(play):
         plan = await control.plan_revision(run, ASK)
         assert not plan.is_possible
         assert plan.refusals[0].element == "Stop"
+        assert plan.refusals[0].resources == ("ugv1",)
+        assert plan.refusals[0].labels == ("end event E", "user task Ask")
         assert "refused: a token is on script task Stop" in str(plan)
         with pytest.raises(OperatorError, match="it can go to E, Ask, or end"):
             await control.revise(run, ASK, plan.plan)

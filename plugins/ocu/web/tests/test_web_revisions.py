@@ -47,6 +47,8 @@ async def test_what_is_refused_says_where_the_token_can_go(world: MakeWorld) -> 
         assert plan["possible"] is False
         (refusal,) = plan["refusals"]
         assert (refusal["element"], refusal["candidates"]) == ("Question", ["End", "Another"])
+        assert refusal["labels"] == ["end event End", "user task Another"]
+        assert refusal["resources"] == []
         refused = await browser.http.post(path, json={"mission": "gone", "plan": plan["plan"]})
         assert refused.status_code == 409
         assert "a token is on user task Question" in refused.text
@@ -54,6 +56,21 @@ async def test_what_is_refused_says_where_the_token_can_go(world: MakeWorld) -> 
         plan = (await browser.http.post(f"{path}/plan", json=wanted)).json()
         done = await browser.http.post(path, json={**wanted, "plan": plan["plan"]})
         assert done.status_code == 204
+
+
+async def test_a_file_that_is_not_in_the_folder_is_a_new_version(world: MakeWorld) -> None:
+    async with world() as here:
+        asked = await here.asked()
+        path = f"/api/runs/{asked.run}/revision"
+        browser = await here.browser()
+        wanted = {"mission": "other", "xml": OTHER.decode()}
+        plan = (await browser.http.post(f"{path}/plan", json=wanted)).json()
+        assert plan["possible"] is True
+        done = await browser.http.post(path, json={**wanted, "plan": plan["plan"]})
+        assert done.status_code == 204
+        assert not (here.missions / "other.bpmn").exists()
+        both = {**wanted, "version": "1"}
+        assert (await browser.http.post(f"{path}/plan", json=both)).status_code == 422
 
 
 async def test_a_file_that_is_wrong_and_a_run_that_is_none(world: MakeWorld) -> None:

@@ -3,13 +3,13 @@
 from typing import Annotated
 
 from fastapi import APIRouter
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, Field, model_validator
 
 from m2pem.api import Draft, MissionControl, RevisionPreview
 from m2pem_plugin_web.access.permissions import Commander, Operator
 from m2pem_plugin_web.missions.folder import MissionFolder
 from m2pem_plugin_web.problems import RESPONSES
-from m2pem_plugin_web.rest.drafts import WrittenName, of_folder
+from m2pem_plugin_web.rest.drafts import WrittenName, of_folder, source_of
 from m2pem_plugin_web.rest.incidents import OutlookModel
 from m2pem_plugin_web.rest.models import Body, FindingModel, Name, finding_models, known_run
 
@@ -19,12 +19,22 @@ MOST_MOVES = 1000
 class NewVersionModel(Body):
     """A new version: a mission of the folder. `version`: of that mission, None for its newest.
 
+    `xml`: the new version itself, which is not saved; it is called as `mission`, and may use the
+    other files of the folder.
+
     `moves`: by element, the element or sequence flow that its token goes to first; "": it ends.
     """
 
     mission: WrittenName
     version: str | None = None
+    xml: str | None = None
     moves: Annotated[dict[Name, str], Field(max_length=MOST_MOVES)] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _one_of_both(self) -> "NewVersionModel":
+        if self.xml is not None and self.version is not None:
+            raise ValueError("send xml, or a version of a mission of the folder, not both")
+        return self
 
 
 class RevisionModel(NewVersionModel):
@@ -36,21 +46,26 @@ class RevisionModel(NewVersionModel):
 
 
 class EffectModel(BaseModel):
-    """What a revision does to a token, or to an event that is awaited."""
+    """What a revision does to a token, or to an event that is awaited. `resources`: what the
+    token commands now."""
 
     kind: str
     element: str
     token: int
     text: str
+    resources: list[str]
 
 
 class RefusalModel(BaseModel):
-    """Why it cannot be. `candidates`: where the token can go instead."""
+    """Why it cannot be. `candidates`: where the token can go instead, `labels`: what each of them
+    is called. `resources`: what the token commands now."""
 
     element: str
     token: int
     text: str
     candidates: list[str]
+    labels: list[str]
+    resources: list[str]
 
 
 class PlanModel(BaseModel):
@@ -79,7 +94,13 @@ def plan_model(preview: RevisionPreview) -> PlanModel:
         possible=preview.is_possible,
         changes=list(preview.changes),
         effects=[
-            EffectModel(kind=each.kind, element=each.element, token=each.token, text=each.text)
+            EffectModel(
+                kind=each.kind,
+                element=each.element,
+                token=each.token,
+                text=each.text,
+                resources=list(each.resources),
+            )
             for each in preview.effects
         ],
         refusals=[
@@ -88,6 +109,8 @@ def plan_model(preview: RevisionPreview) -> PlanModel:
                 token=each.token,
                 text=each.text,
                 candidates=list(each.candidates),
+                labels=list(each.labels),
+                resources=list(each.resources),
             )
             for each in preview.refusals
         ],
@@ -104,7 +127,10 @@ def router(control: MissionControl, folder: MissionFolder) -> APIRouter:
     routes = APIRouter(prefix="/api/runs", tags=["runs"], responses=RESPONSES)
 
     async def draft(wanted: NewVersionModel) -> Draft:
-        source = await of_folder(folder.source, wanted.mission, wanted.version)
+        if wanted.xml is not None:
+            source = source_of(wanted.xml)
+        else:
+            source = await of_folder(folder.source, wanted.mission, wanted.version)
         return Draft(folder.file(wanted.mission), source)
 
     @routes.post("/{run}/revision/plan")
