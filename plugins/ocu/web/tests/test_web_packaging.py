@@ -28,6 +28,7 @@ ON_DEMAND = (
     "hls.light-*.js",
     "de-*.js",
     "CompareDialog-*.*",
+    "ReviseDialog-*.*",
     "RouteMap-*.*",
     "MapPanel-*.*",
     "VersionsPanel-*.*",

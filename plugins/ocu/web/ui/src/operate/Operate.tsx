@@ -2,8 +2,10 @@
 import { useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { ConfirmOrder } from "../fleet/ConfirmOrder";
+import { revising } from "../revise/revising";
 import { ApiError, get } from "../shared/api";
 import { connection, isOver, listen } from "../shared/executive";
+import { loaded } from "../shared/loaded";
 import { fill, strings } from "../strings";
 import type { RunSummary, ServerMessage } from "../shared/types";
 import { operateContext, OperatingProvider, type OperateContext } from "./context";
@@ -24,7 +26,22 @@ import { grouped } from "../shared/format";
 
 const text = strings.operate;
 
+const ReviseDialog = loaded(() => import("../revise/ReviseDialog"));
+
 export default function Operate({ source }: { source: Source }) {
+  useEffect(() => () => void (revising.value = ""), []);
+  return (
+    <>
+      <Shown source={source} />
+      {revising.value && (
+        <ReviseDialog run={revising.value} onClose={() => (revising.value = "")} />
+      )}
+    </>
+  );
+}
+
+/** The run or rehearsal itself. It is drawn again when the run gets a new version. */
+function Shown({ source }: { source: Source }) {
   const context = useSignal<OperateContext | null>(null);
   const problem = useSignal("");
   const opened = useSignal<Opened | null>(null);

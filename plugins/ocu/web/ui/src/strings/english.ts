@@ -15,6 +15,7 @@ import { people } from "./people";
 import { plan } from "./plan";
 import { plots } from "./plots";
 import { begin, run } from "./run";
+import { revise } from "./revise";
 import { runs } from "./runs";
 import { settings } from "./settings";
 import { shell, signIn } from "./shell";
@@ -41,6 +42,7 @@ export const english = {
   verify,
   requirements,
   run,
+  revise,
   runs,
   begin,
   operate,

@@ -3,6 +3,7 @@ import { useSignal } from "@preact/signals";
 import { command } from "../../shared/command";
 import { activeRuns } from "../../shared/executive";
 import { clock, dateTime, grouped } from "../../shared/format";
+import { revising } from "../../revise/revising";
 import { go } from "../../shared/router";
 import { titleOf } from "../../shared/runs";
 import { may } from "../../shared/session";
@@ -160,6 +161,14 @@ function Controls({ status }: { status: string }) {
         onClick={() => (sending.value = "message")}
       >
         {text.message}
+      </button>
+      <button
+        type="button"
+        class="secondary"
+        disabled={!goesOn}
+        onClick={() => (revising.value = scene.run)}
+      >
+        {strings.revise.open}
       </button>
       <StopButton
         class="stop-run"

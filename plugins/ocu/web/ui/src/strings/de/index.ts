@@ -31,6 +31,7 @@ import { people } from "./people";
 import { plan } from "./plan";
 import { plots } from "./plots";
 import { begin, run } from "./run";
+import { revise } from "./revise";
 import { runs } from "./runs";
 import { settings } from "./settings";
 import { shell, signIn } from "./shell";
@@ -57,6 +58,7 @@ export const german: Translation<English> = {
   verify,
   requirements,
   run,
+  revise,
   runs,
   begin,
   operate,

@@ -1,0 +1,69 @@
+// The plan of a revision as the server gives it, and what the dialog makes of it.
+import type { Finding } from "../shared/types";
+
+export interface Effect {
+  kind: string;
+  element: string;
+  token: number;
+  text: string;
+  resources: string[];
+}
+
+export interface Refusal {
+  element: string;
+  token: number;
+  text: string;
+  candidates: string[];
+  labels: string[];
+  resources: string[];
+}
+
+export interface Plan {
+  plan: string;
+  version: string;
+  previous: string;
+  possible: boolean;
+  changes: string[];
+  effects: Effect[];
+  refusals: Refusal[];
+  findings: Finding[];
+  outlook: { verdict: string; reason: string; text: string } | null;
+  approval: string;
+}
+
+/** A mission of the folder (`version` "": its newest one), or a file that is not saved there. */
+export type NewVersion =
+  | { kind: "mission"; mission: string; version: string }
+  | { kind: "file"; mission: string; file: string; xml: string };
+
+/** Where the token on an element goes: by its id, a target of the new version; "": it ends. */
+export type Moves = Readonly<Record<string, string>>;
+
+/** The tokens of an element that need an operator's choice, as the first refusal has said. */
+export interface Choice {
+  element: string;
+  targets: readonly { id: string; label: string }[];
+}
+
+/** What concerns vehicles comes first; otherwise in the order of the plan. */
+export function vehiclesFirst<T extends { resources: readonly string[] }>(all: readonly T[]): T[] {
+  return [
+    ...all.filter(({ resources }) => resources.length > 0),
+    ...all.filter(({ resources }) => resources.length === 0),
+  ];
+}
+
+/** The choices that were known, and those of the tokens that a plan refuses to leave where they are. */
+export function choicesWith(known: readonly Choice[], plan: Plan): Choice[] {
+  const found = new Map(known.map((each) => [each.element, each]));
+  for (const { element, token, candidates, labels } of plan.refusals) {
+    if (token === 0 || (candidates.length === 0 && !found.has(element))) continue;
+    if (found.has(element)) continue;
+    const targets = candidates.map((id, at) => ({ id, label: labels[at] ?? id }));
+    found.set(element, { element, targets });
+  }
+  return [...found.values()];
+}
+
+export const needsConfirmation = (plan: Plan): boolean =>
+  plan.outlook?.verdict === "cannot complete";
