@@ -46,18 +46,20 @@ export function PlanView({ plan, choices, moves, move }: PlanViewProps) {
               ))}
             </section>
           )}
-          <section aria-label={words.becomes}>
-            <h3>{words.becomes}</h3>
-            {plan.effects.length === 0 && plan.refusals.length === 0 && <p>{words.stays}</p>}
-            <ul>
-              {vehiclesFirst(plan.effects).map((each) => (
-                <li key={`${each.kind} ${each.element} ${each.token} ${each.text}`}>
-                  <Vehicles names={each.resources} />
-                  <span class="rev-kind">{words.kinds[each.kind] ?? each.kind}</span>: {each.text}
-                </li>
-              ))}
-            </ul>
-          </section>
+          {(plan.effects.length > 0 || plan.refusals.length === 0) && (
+            <section aria-label={words.becomes}>
+              <h3>{words.becomes}</h3>
+              {plan.effects.length === 0 && <p>{words.stays}</p>}
+              <ul>
+                {vehiclesFirst(plan.effects).map((each) => (
+                  <li key={`${each.kind} ${each.element} ${each.token} ${each.text}`}>
+                    <Vehicles names={each.resources} />
+                    <span class="rev-kind">{words.kinds[each.kind] ?? each.kind}</span>: {each.text}
+                  </li>
+                ))}
+              </ul>
+            </section>
+          )}
           {plan.outlook && (
             <section aria-label={words.follows}>
               <h3>{words.follows}</h3>
