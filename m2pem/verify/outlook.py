@@ -85,6 +85,7 @@ class _Explorer:
     def __init__(self, run: MissionRun, limits: OutlookLimits, writers: frozenset[str]) -> None:
         self._first = run
         self._limits = limits
+        self._until = time.monotonic() + limits.seconds
         self._writers = writers
         self._open_before = frozenset(run.state.incidents)
 
@@ -92,19 +93,18 @@ class _Explorer:
         """Explore all states, breadth first, and judge them."""
         run = self._first
         if isinstance(choice, i.Revise):  # its plan is that of the run as it is
-            _receive(run, choice, now_us)
+            self._receive(run, choice, now_us)
             if version_of(run.state.mission) != choice.version:
                 raise _NotKnownError("the run has gone on since the plan of the revision was made")
-        _receive(run, i.SetBreakpoints(), now_us)  # an author lets it go on from there
+        self._receive(run, i.SetBreakpoints(), now_us)  # an author lets it go on from there
         if run.state.status is RunStatus.PAUSED:
-            _receive(run, i.ResumeRun(), now_us)
+            self._receive(run, i.ResumeRun(), now_us)
         if isinstance(choice, i.ResolveIncident):
-            _receive(run, choice, now_us)
+            self._receive(run, choice, now_us)
         mission = run.state.mission
         shared = [mission, *mission.elements.values()]
         self._shared = {id(each): each for each in shared}
         self._codes = list(dict.fromkeys(["FAILED", *(e.code for e in mission.errors.values())]))
-        until = time.monotonic() + self._limits.seconds
         numbers: dict[Key, int] = {_key(run.state, now_us): 0}
         before: list[list[int]] = [[]]
         good: list[int] = []
@@ -112,8 +112,7 @@ class _Explorer:
         waiting = deque([(0, run, now_us)])
         while waiting:
             number, run, now_us = waiting.popleft()
-            if time.monotonic() > until:
-                raise _NotKnownError(f"more than {self._limits.seconds:g} s are needed")
+            self._check_time()
             if run.state.status is RunStatus.ENDED:
                 if run.state.outcome in (RunOutcome.COMPLETED, RunOutcome.TERMINATED):
                     good.append(number)
@@ -125,7 +124,7 @@ class _Explorer:
                 bad[number] = _where_it_stops(run.state)
             for item, at_us in steps:
                 following = copy.deepcopy(run, dict(self._shared)) if len(steps) > 1 else run
-                _receive(following, item, at_us)
+                self._receive(following, item, at_us)
                 key = _key(following.state, at_us)
                 known = numbers.setdefault(key, len(before))
                 if known == len(before):
@@ -178,14 +177,19 @@ class _Explorer:
     def _caught_at(self, token: Token) -> list[str]:
         return [code for code in self._codes if catcher_of_error(token, code) is not None]
 
+    def _receive(self, run: MissionRun, item: i.Input, at_us: int) -> None:
+        """Give a run an input, and all steps that follow at once."""
+        run.receive(item, at_us)
+        for _ in range(MAX_CONTINUES):
+            if not run.wants_continue:
+                return
+            self._check_time()
+            run.receive(i.Continue(), at_us)
+        raise _NotKnownError("a loop of the mission does not wait")
 
-def _receive(run: MissionRun, item: i.Input, at_us: int) -> None:
-    run.receive(item, at_us)
-    for _ in range(MAX_CONTINUES):
-        if not run.wants_continue:
-            return
-        run.receive(i.Continue(), at_us)
-    raise _NotKnownError("a loop of the mission does not wait")
+    def _check_time(self) -> None:
+        if time.monotonic() > self._until:
+            raise _NotKnownError(f"more than {self._limits.seconds:g} s are needed")
 
 
 def _where_it_stops(state: RunState) -> str:

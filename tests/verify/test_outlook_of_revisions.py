@@ -24,7 +24,7 @@ FEW = 250
 LONG_S = 300.0
 PLAYS = 3
 MOST_INPUTS = 80
-FEW_STATES = OutlookLimits(states=300, seconds=60.0)
+FEW_STATES = OutlookLimits(states=300, seconds=5.0)
 
 
 def foreseen(play: Play, item: i.Revise) -> Outlook:

@@ -23,7 +23,7 @@ ENDED = (GoalStatus.STATUS_CANCELED, GoalStatus.STATUS_ABORTED)
 
 
 def drives(element: str, vehicle: str, route: str = "") -> str:
-    """A task: the vehicle drives a route, that of its own to the north if none is named."""
+    """A task: the vehicle drives the named route, or else its own route to the north."""
     return _task(
         element,
         vehicle,
