@@ -51,7 +51,9 @@ class ElementState(msgspec.Struct):
 class RequirementState(msgspec.Struct):
     """A requirement that a run is monitored for. `verdict`: "open": it holds so far, or has not
     come yet; "satisfied" or "violated": whatever follows, since mission time `since_s`. `because`:
-    what made it certain. `elements`: those that it is about."""
+    what made it certain. `elements`: those that it is about. `formula`: see docs/requirements.md.
+    `on_violation`: what a violation does to the mission, "" for nothing. `recorded_s`: mission time
+    of the record of the verdict, which may come after `since_s`."""
 
     id: str
     english: str
@@ -59,6 +61,9 @@ class RequirementState(msgspec.Struct):
     verdict: str = "open"
     since_s: float | None = None
     because: str = ""
+    formula: str = ""
+    on_violation: str = ""
+    recorded_s: float | None = None
 
 
 @dataclass(slots=True)
@@ -431,10 +436,15 @@ class RunView:
         known = self.requirements.get(record.requirement)
         if known is None:
             self.requirements[record.requirement] = RequirementState(
-                record.requirement, record.english, record.elements
+                record.requirement,
+                record.english,
+                record.elements,
+                formula=record.formula,
+                on_violation=record.on_violation,
             )
         else:  # in the words of a new version of the mission
             known.english, known.elements = record.english, record.elements
+            known.on_violation = record.on_violation
         if self.changes is not None:
             self.changes.requirements.add(record.requirement)
 
@@ -449,6 +459,7 @@ class RunView:
             state.verdict = record.verdict.value
             state.since_s = record.decided_us / US_PER_S
             state.because = record.because
+            state.recorded_s = self.t_s
         if self.changes is not None:
             self.changes.requirements.add(record.requirement)
 

@@ -41,7 +41,7 @@ from m2pem_plugin_web.access.requests import now_s
 from m2pem_plugin_web.access.roles import Role
 from m2pem_plugin_web.live import messages
 from m2pem_plugin_web.live.latest_states import FleetStates, LatestStates
-from m2pem_plugin_web.live.live_run import LiveRun, command
+from m2pem_plugin_web.live.live_run import LiveRun, command, requirement
 from m2pem_plugin_web.live.messages import Message
 from m2pem_plugin_web.live.standbys import Standbys
 from m2pem_plugin_web.live.viewer import Unsent, Viewer
@@ -295,7 +295,9 @@ class Hub(Listener):
         for run, live in self._watched().items():
             if (changes := live.view.changes) is not None:
                 elements, behaviors = frozenset(changes.elements), frozenset(changes.behaviors)
-                of_runs[run] = Unsent(elements, behaviors, *names)
+                requirements = frozenset(changes.requirements)
+                unsent = Unsent(elements, behaviors, *names)
+                of_runs[run] = unsent._replace(requirements=requirements)
                 for behavior in behaviors - live.view.behaviors.keys():
                     self.fleet.teams.forget(behavior)
                 live.clear_changes()
@@ -346,6 +348,7 @@ class Hub(Listener):
         prompts = self.follower.prompts.values()
         places = live.view.elements if live is not None else ()
         behaviors = live.view.behaviors if live is not None else {}
+        requirements = live.view.requirements if live is not None else {}
         return messages.message(
             "snapshot",
             **self._head(live),
@@ -359,6 +362,7 @@ class Hub(Listener):
             teams=_encoded(self.fleet.teams, self.fleet.teams.states),
             holders=self._holders,
             commands={key: command(each) for key, each in behaviors.items()},
+            requirements={key: requirement(each) for key, each in requirements.items()},
         )
 
     def _frame(self, live: LiveRun | None, changed: Unsent) -> Message:
@@ -370,6 +374,12 @@ class Hub(Listener):
             frame["commands"] = {
                 key: command(behaviors[key]) if key in behaviors else None
                 for key in changed.commands
+            }
+        if live is not None and changed.requirements:
+            known = live.view.requirements
+            frame["requirements"] = {
+                key: requirement(known[key]) if key in known else None
+                for key in changed.requirements
             }
         for name, latest, names in (
             ("vehicles", self.fleet.vehicles, changed.vehicles),

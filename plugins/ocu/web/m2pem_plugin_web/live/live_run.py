@@ -5,7 +5,7 @@ from typing import Any
 import msgspec
 
 from m2pem.api import RunView
-from m2pem.api.run_view import NEWEST, Behavior, Changes, Place
+from m2pem.api.run_view import NEWEST, Behavior, Changes, Place, RequirementState
 from m2pem_plugin_web.live.messages import record_of
 
 _encode = msgspec.json.Encoder().encode
@@ -63,4 +63,18 @@ def command(behavior: Behavior) -> dict[str, Any]:
         "process": behavior.process,
         "element": behavior.element,
         "since": behavior.since_s,
+    }
+
+
+def requirement(state: RequirementState) -> dict[str, Any]:
+    """Return a requirement that the run is monitored for, for JSON."""
+    return {
+        "english": state.english,
+        "formula": state.formula,
+        "elements": state.elements,
+        "on_violation": state.on_violation,
+        "verdict": state.verdict,
+        "since": state.since_s,
+        "recorded": state.recorded_s,
+        "because": state.because,
     }

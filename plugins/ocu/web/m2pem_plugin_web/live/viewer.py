@@ -41,6 +41,7 @@ class Unsent(NamedTuple):
     payloads: frozenset[str] = _NOTHING
     teams: frozenset[str] = _NOTHING
     holders: frozenset[str] = _NOTHING
+    requirements: frozenset[str] = _NOTHING
 
     def __bool__(self) -> bool:
         return any(self)
@@ -56,6 +57,7 @@ class Unsent(NamedTuple):
             self.payloads | later.payloads,
             self.teams | later.teams,
             self.holders | later.holders,
+            self.requirements | later.requirements,
         )
 
 

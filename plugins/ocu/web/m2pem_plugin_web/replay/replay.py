@@ -10,7 +10,7 @@ from typing import Any
 import msgspec
 
 from m2pem.api import Mission, RunView, StampedRecord
-from m2pem_plugin_web.live.live_run import command
+from m2pem_plugin_web.live.live_run import command, requirement
 from m2pem_plugin_web.live.messages import nested, prompt_record_of
 from m2pem_plugin_web.replay.index import Index, IndexBuilder, bars, with_overview
 from m2pem_plugin_web.replay.source import RecordSource
@@ -140,4 +140,5 @@ def state_of(view: RunView) -> dict[str, Any]:
         "commands": {key: command(each) for key, each in view.behaviors.items()},
         "prompts": {key: prompt_record_of(view.run, each) for key, each in view.prompts.items()},
         "holders": view.holders,
+        "requirements": {key: requirement(each) for key, each in view.requirements.items()},
     }

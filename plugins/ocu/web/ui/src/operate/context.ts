@@ -20,6 +20,8 @@ export interface OperateContext {
   geometries: Signal<Geometry[]>;
   /** The element that everybody looks at; `show`: bring it into view. */
   selected: Signal<(Place & { show: boolean }) | null>;
+  /** Elements that something is about, which the diagram surrounds. */
+  surrounded: Signal<readonly Place[]>;
   /** A vehicle that the map follows; "": none. */
   followed: Signal<string>;
   /** A vehicle that the map shows, once; a new object each time. */
@@ -56,6 +58,7 @@ export function operateContext(
     ...parts,
     middle: { current: () => ({ latitude, longitude, altitude: null }) },
     selected: signal(null),
+    surrounded: signal([]),
     followed: signal(""),
     centred: signal(null),
     detection: signal(null),

@@ -9,12 +9,13 @@ const PAGE = 100;
 function pageView(records: readonly RunRecord[]): PageView {
   const view = emptyView();
   for (const record of records) apply(view, record);
-  const { prompts, commands, holders, ...fields } = view;
+  const { prompts, commands, holders, requirements, ...fields } = view;
   return structuredClone({
     ...fields,
     prompts: Object.fromEntries(prompts),
     commands: Object.fromEntries(commands),
     holders: Object.fromEntries(holders),
+    requirements: Object.fromEntries(requirements),
   });
 }
 

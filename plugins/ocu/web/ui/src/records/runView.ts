@@ -5,6 +5,7 @@ import type {
   Elements,
   ElementState,
   Prompt,
+  Requirement,
   RunRecord,
   RunStatus,
 } from "../shared/types";
@@ -19,6 +20,7 @@ export interface RunView {
   prompts: Map<string, Prompt>;
   commands: Map<string, Command>;
   holders: Map<string, string>;
+  requirements: Map<string, Requirement>;
 }
 
 /** A view as the server sends it. */
@@ -31,13 +33,21 @@ export interface PageView {
   prompts: Record<string, Prompt>;
   commands: Record<string, Command>;
   holders: Record<string, string>;
+  requirements: Record<string, Requirement>;
 }
 
-export const viewOf = ({ prompts, commands, holders, ...view }: PageView): RunView => ({
+export const viewOf = ({
+  prompts,
+  commands,
+  holders,
+  requirements,
+  ...view
+}: PageView): RunView => ({
   ...view,
   prompts: new Map(Object.entries(prompts)),
   commands: new Map(Object.entries(commands)),
   holders: new Map(Object.entries(holders)),
+  requirements: new Map(Object.entries(requirements)),
 });
 
 export function emptyView(): RunView {
@@ -50,6 +60,7 @@ export function emptyView(): RunView {
     prompts: new Map(),
     commands: new Map(),
     holders: new Map(),
+    requirements: new Map(),
   };
 }
 
@@ -66,6 +77,7 @@ export function copy(view: RunView): RunView {
     prompts: new Map(view.prompts),
     commands: new Map(view.commands),
     holders: new Map(view.holders),
+    requirements: new Map(view.requirements),
   };
 }
 
@@ -82,6 +94,7 @@ export function apply(view: RunView, record: RunRecord): void {
   merge(view.commands, changes.commands);
   merge(view.prompts, changes.prompts);
   merge(view.holders, changes.holders);
+  merge(view.requirements, changes.requirements);
   view.status = changes.status ?? view.status;
   view.detail = changes.detail ?? view.detail;
 }

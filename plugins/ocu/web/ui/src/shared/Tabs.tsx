@@ -1,6 +1,6 @@
 // Panes of which one is seen at a time. Arrow keys go from tab to tab.
 import type { ComponentChildren } from "preact";
-import { useState } from "preact/hooks";
+import { useSignal, type Signal } from "@preact/signals";
 import { useUniqueId } from "./uniqueId";
 import "./tabs.css";
 
@@ -10,10 +10,18 @@ export interface Tab {
   render: () => ComponentChildren;
 }
 
-export function Tabs({ label, tabs }: { label: string; tabs: Tab[] }) {
-  const [chosen, choose] = useState(tabs[0]!.id);
+export interface TabsProps {
+  label: string;
+  tabs: Tab[];
+  /** The id of the one that is seen, where others choose it, too. */
+  chosen?: Signal<string>;
+}
+
+export function Tabs({ label, tabs, chosen }: TabsProps) {
+  const own = useSignal(tabs[0]!.id);
+  const shown = chosen ?? own;
   const prefix = useUniqueId();
-  const current = tabs.find(({ id }) => id === chosen) ?? tabs[0]!;
+  const current = tabs.find(({ id }) => id === shown.value) ?? tabs[0]!;
   return (
     <div class="tabs">
       <TabList
@@ -21,7 +29,7 @@ export function Tabs({ label, tabs }: { label: string; tabs: Tab[] }) {
         tabs={tabs}
         chosen={current.id}
         panel={`${prefix}-panel`}
-        onChoose={choose}
+        onChoose={(id) => (shown.value = id)}
       />
       <div id={`${prefix}-panel`} class="tab-panel" role="tabpanel" aria-label={current.id}>
         {current.render()}

@@ -249,6 +249,7 @@ export interface RecordChanges {
   commands?: Record<string, Command | null>;
   prompts?: Record<string, Prompt | null>;
   holders?: Record<string, string | null>;
+  requirements?: Record<string, Requirement | null>;
   status?: RunStatus;
   detail?: string;
 }
@@ -301,6 +302,22 @@ export interface Command {
   process: string;
   element: string;
   since: number;
+}
+
+/**
+ * What a run is monitored for. `since`, `because`: from when on it is certain, and by what; `recorded`:
+ * when the run had the record of it. `elements`: those that it is about. `on_violation`: what a
+ * violation throws in the mission; "": nothing.
+ */
+export interface Requirement {
+  english: string;
+  formula: string;
+  elements: string[];
+  on_violation: string;
+  verdict: "open" | "satisfied" | "violated";
+  since: number | null;
+  recorded: number | null;
+  because: string;
 }
 
 export interface GeoPosition {
@@ -380,6 +397,7 @@ export interface Live {
   payloads: Record<string, PayloadState>;
   teams: Record<string, TeamState>;
   commands: Record<string, Command | null>;
+  requirements: Record<string, Requirement | null>;
   holders: Record<string, string>;
   runs: RunSummary[];
 }

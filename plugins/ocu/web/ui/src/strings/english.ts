@@ -9,6 +9,7 @@ import { control } from "./control";
 import { editor } from "./editor";
 import { fleet } from "./fleet";
 import { home } from "./home";
+import { monitors } from "./monitors";
 import { offline } from "./offline";
 import { operate } from "./operate";
 import { people } from "./people";
@@ -46,6 +47,7 @@ export const english = {
   runs,
   begin,
   operate,
+  monitors,
   plots,
   fleet,
   cameras,

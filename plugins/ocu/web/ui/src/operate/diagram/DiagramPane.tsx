@@ -18,7 +18,7 @@ import "./diagram.css";
 const text = strings.operate.diagram;
 
 export function DiagramPane() {
-  const { scene, mission, selected } = useOperating();
+  const { scene, mission, selected, surrounded } = useOperating();
   const host = useRef<HTMLDivElement>(null);
   const drawings = useRef<Drawings>();
   const panel = useUniqueId();
@@ -51,6 +51,7 @@ export function DiagramPane() {
         }
         void made.select(place);
       }),
+      surrounded.subscribe((places) => made.surround(places)),
     ];
     return () => {
       for (const stop of stops) stop();

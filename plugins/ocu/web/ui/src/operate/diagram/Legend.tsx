@@ -1,10 +1,14 @@
 // What the colours mean.
 import { strings } from "../../strings";
+import { useOperating } from "../context";
+import { isViolated, VIOLATION } from "../requirements/violations";
 import { css, palette, SIGNS } from "./colours";
 
 const text = strings.operate.diagram;
 
 export function Legend() {
+  const { scene } = useOperating();
+  const violates = Object.values(scene.requirements.value).some(isViolated);
   const colours = palette.value;
   return (
     <ul class="legend" aria-label={text.legend}>
@@ -22,6 +26,14 @@ export function Legend() {
           </li>
         );
       })}
+      {violates && (
+        <li>
+          <i class="legend-requirement" aria-hidden="true">
+            {VIOLATION}
+          </i>
+          {strings.monitors.legend}
+        </li>
+      )}
     </ul>
   );
 }

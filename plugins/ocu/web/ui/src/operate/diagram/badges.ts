@@ -5,7 +5,8 @@ import { nameSymbol } from "../../shared/elementNames";
 import type { ElementState } from "../../shared/types";
 import { lookOf, SIGNS } from "./colours";
 import type { Outline } from "./painter";
-import { statesOf } from "./spoken";
+import { VIOLATION, type Violations } from "../requirements/violations";
+import { statesOf, violationOf } from "./spoken";
 
 const SVG = "http://www.w3.org/2000/svg";
 const RENEWED_MS = 250;
@@ -23,7 +24,7 @@ interface Badge {
   shown: string;
 }
 
-type Corner = "hits" | "tokens" | "sign";
+type Corner = "hits" | "tokens" | "sign" | "requirement";
 
 export interface Badged {
   key: string;
@@ -35,18 +36,36 @@ export interface Badged {
 
 interface Waiting {
   badged: Badged;
-  state: ElementState;
+  state: ElementState | undefined;
 }
 
 export class Badges {
   private readonly badges = new Map<string, Badge>();
   private readonly waiting = new Map<string, Waiting>();
+  private readonly states = new Map<string, ElementState>();
+  /** The violated requirements that elements are in. */
+  private violations: Violations = new Map();
   private wrote = 0;
   private size = "";
   private timer: ReturnType<typeof setTimeout> | undefined;
 
   set(badged: Badged, state: ElementState): void {
-    this.waiting.set(badged.key, { badged, state });
+    this.states.set(badged.key, state);
+    this.soon(badged);
+  }
+
+  /** `all`: what may have badges. */
+  violate(all: ReadonlyMap<string, Badged>, violations: Violations): void {
+    const changed = new Set([...this.violations.keys(), ...violations.keys()]);
+    this.violations = violations;
+    for (const key of changed) {
+      const badged = all.get(key);
+      if (badged) this.soon(badged);
+    }
+  }
+
+  private soon(badged: Badged): void {
+    this.waiting.set(badged.key, { badged, state: this.states.get(badged.key) });
     this.timer ??= setTimeout(() => this.renew(), Math.max(RENEWED_MS, this.wrote * EACH_MS));
   }
 
@@ -67,11 +86,15 @@ export class Badges {
     this.wrote = this.waiting.size;
     for (const { badged, state } of this.waiting.values()) {
       const { key, name, gfx, outline } = badged;
-      nameSymbol(gfx, [name, ...statesOf(state)].filter(Boolean).join(", "));
-      this.write(`${key}\nhits`, gfx, outline, "hits", state.hits > 1 ? short(state.hits) : "");
-      const tokens = state.active > 1 ? `● ${short(state.active)}` : "";
-      this.write(`${key}\ntokens`, gfx, outline, "tokens", tokens);
-      this.write(`${key}\nsign`, gfx, outline, "sign", SIGNS[lookOf(state)]);
+      const violated = this.violations.get(key) ?? [];
+      const said = [name, ...statesOf(state), violationOf(violated)];
+      nameSymbol(gfx, said.filter(Boolean).join(", "));
+      const { hits = 0, active = 0 } = state ?? {};
+      this.write(`${key}\nhits`, gfx, outline, "hits", hits > 1 ? short(hits) : "");
+      this.write(`${key}\ntokens`, gfx, outline, "tokens", active > 1 ? `● ${short(active)}` : "");
+      this.write(`${key}\nsign`, gfx, outline, "sign", state ? SIGNS[lookOf(state)] : "");
+      const sign = violated.length > 0 ? VIOLATION : "";
+      this.write(`${key}\nrequirement`, gfx, outline, "requirement", sign);
     }
     this.waiting.clear();
   }
@@ -91,8 +114,8 @@ export class Badges {
     badge.group.setAttribute("display", text === "" ? "none" : "inline");
     if (text === "") return;
     const width = Math.max(HEIGHT, text.length * DIGIT + 9);
-    const x = corner === "sign" ? 0 : outline.width;
-    const y = corner === "tokens" ? outline.height : 0;
+    const x = corner === "sign" || corner === "requirement" ? 0 : outline.width;
+    const y = corner === "tokens" || corner === "requirement" ? outline.height : 0;
     badge.group.setAttribute("transform", `translate(${x} ${y})`);
     badge.box.setAttribute("x", String(-width / 2));
     badge.box.setAttribute("width", String(width));

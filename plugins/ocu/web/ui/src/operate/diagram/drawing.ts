@@ -10,6 +10,7 @@ import type { ElementState } from "../../shared/types";
 import { strings } from "../../strings";
 import { processOf, type Element } from "../mission/moddle";
 import { keyIn, keyOf, qualified } from "../mission/names";
+import type { Violations } from "../requirements/violations";
 import { Badges, type Badged } from "./badges";
 import { lookOf, type Look, type Palette } from "./colours";
 import { Painter, type Outline, type Window } from "./painter";
@@ -43,6 +44,7 @@ export class Drawing {
   private fits = false;
   private fitting = false;
   private selected: Figure | undefined;
+  private surrounded: readonly Figure[] = [];
   private readonly badges = new Badges();
   private readonly observer: ResizeObserver;
 
@@ -156,6 +158,17 @@ export class Drawing {
     this.showSelected();
   }
 
+  /** Mark the elements of requirements that are violated. */
+  violate(violations: Violations): void {
+    this.badges.violate(this.figures, violations);
+  }
+
+  /** Draw a line around elements, beside that around the one that is selected. */
+  surround(keys: readonly string[]): void {
+    this.surrounded = keys.flatMap((key) => this.figures.get(key) ?? []);
+    this.showSelected();
+  }
+
   unselect(): void {
     this.selected = undefined;
     this.showSelected();
@@ -200,7 +213,11 @@ export class Drawing {
 
   private showSelected(): void {
     const isSeen = this.selected?.root === this.root;
-    this.painter.select(isSeen ? this.selected?.outline : undefined);
+    const others = this.surrounded.filter(({ root }) => root === this.root);
+    this.painter.select(
+      isSeen ? this.selected?.outline : undefined,
+      others.map(({ outline }) => outline),
+    );
   }
 
   private follow(): void {

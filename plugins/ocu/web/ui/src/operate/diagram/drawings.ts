@@ -2,6 +2,8 @@
 import type { MissionModel } from "../mission/missionModel";
 import type { View } from "../mission/views";
 import type { Place } from "../context";
+import { keyOf } from "../mission/names";
+import { violationsIn, type Violations } from "../requirements/violations";
 import type { ElementChange } from "../scene/elementBoard";
 import type { Scene } from "../scene/scene";
 import { fading_ms, palette } from "./colours";
@@ -16,6 +18,8 @@ export class Drawings {
   private readonly drawings = new Map<string, Promise<Drawing>>();
   private readonly made = new Map<string, Drawing>();
   private readonly stops: (() => void)[] = [];
+  private violations: Violations = new Map();
+  private surrounded: readonly string[] = [];
   private shown: View | undefined;
   private over = false;
 
@@ -32,6 +36,10 @@ export class Drawings {
       scene.elements.listen((changes) => this.apply(changes)),
       palette.subscribe(recolour),
       fading_ms.subscribe(recolour),
+      scene.requirements.subscribe((requirements) => {
+        this.violations = violationsIn(requirements, mission);
+        for (const drawing of this.made.values()) drawing.violate(this.violations);
+      }),
     );
   }
 
@@ -58,6 +66,11 @@ export class Drawings {
     if (!view) return;
     const drawing = await this.drawingOf(view);
     drawing.select(place.process, place.element, place.show);
+  }
+
+  surround(places: readonly Place[]): void {
+    this.surrounded = places.map(({ process, element }) => keyOf(process, element));
+    for (const drawing of this.made.values()) drawing.surround(this.surrounded);
   }
 
   fit(): void {
@@ -98,6 +111,8 @@ export class Drawings {
     for (const [process, element, state] of this.scene.elements.all()) {
       drawing.set(process, element, state, false, this.age_ms(state.last));
     }
+    drawing.violate(this.violations);
+    drawing.surround(this.surrounded);
     return drawing;
   }
 

@@ -36,6 +36,7 @@ export class Painter {
   private readonly painted = new Map<string, Painted>();
   private above: readonly Outline[] = [];
   private selected: Outline | undefined;
+  private surrounded: readonly Outline[] = [];
   private readonly pen: CanvasRenderingContext2D;
   private frame = 0;
   private step: ReturnType<typeof setTimeout> | undefined;
@@ -61,11 +62,14 @@ export class Painter {
     this.painted.clear();
     this.above = above;
     this.selected = undefined;
+    this.surrounded = [];
     this.soon();
   }
 
-  select(outline: Outline | undefined): void {
+  /** `others`: what is surrounded, too, by a broken line. */
+  select(outline: Outline | undefined, others: readonly Outline[] = []): void {
     this.selected = outline;
+    this.surrounded = others;
     this.soon();
   }
 
@@ -122,6 +126,9 @@ export class Painter {
     for (const painted of this.painted.values()) if (!painted.outline.above) this.fill(painted);
     for (const outline of this.above) this.punch(outline);
     for (const painted of this.painted.values()) if (painted.outline.above) this.fill(painted);
+    for (const outline of this.surrounded) {
+      if (outline !== this.selected) this.surround(outline, [7, 5]);
+    }
     if (this.selected) this.surround(this.selected);
   }
 
@@ -138,11 +145,11 @@ export class Painter {
   }
 
   /** Around what is selected. */
-  private surround({ x, y, width, height }: Outline): void {
+  private surround({ x, y, width, height }: Outline, dash: number[] = []): void {
     const { pen } = this;
     pen.strokeStyle = SELECTED;
     pen.lineWidth = 3;
-    pen.setLineDash([]);
+    pen.setLineDash(dash);
     pen.beginPath();
     pen.roundRect(x - 7, y - 7, width + 14, height + 14, CORNER);
     pen.stroke();

@@ -5,6 +5,10 @@ import { lookOf } from "./colours";
 
 const { outline: text, diagram } = strings.operate;
 
+/** Which requirements an element violates; "": none. */
+export const violationOf = (names: readonly string[]): string =>
+  names.length > 0 ? fill(strings.monitors.element, { names: names.join(", ") }) : "";
+
 export const statesOf = (state: ElementState | undefined): string[] => [
   diagram.states[state ? lookOf(state) : "idle"],
   ...visitsOf(state),

@@ -13,6 +13,8 @@ import { DrawForm } from "../map/DrawForm";
 import { MapPane } from "../map/MapPane";
 import { OutlinePane } from "../outline/OutlinePane";
 import { plotsShown } from "../plots/shown";
+import { RequirementsTitle } from "../requirements/RequirementsTitle";
+import { lowerTab, narrowTab, REQUIREMENTS } from "./chosenTabs";
 import { Pane } from "./Pane";
 import { TimelinePane } from "../timeline/TimelinePane";
 import { VehiclesPane } from "../vehicles/VehiclesPane";
@@ -23,6 +25,7 @@ const kinds = strings.operate.map.kinds;
 /** With what draws and plays them: only those who look at them load that. */
 const Cameras = loaded(() => import("../cameras/CamerasPane"));
 const Detections = loaded(() => import("../detections/DetectionsPane"));
+const Requirements = loaded(() => import("../requirements/RequirementsPane"));
 const Plots = loaded(() => import("../plots/PlotsPane"));
 
 const WIDE = "(width >= 1180px)";
@@ -68,10 +71,27 @@ function Wide({ onSeek }: Parts) {
       </Split>
       <Split name="log" direction="row" initial={58} label={`${text.resize}: ${text.log}`}>
         <TimesPane onSeek={onSeek} />
-        <LogPane />
+        <LogPanes />
       </Split>
     </Split>
   );
+}
+
+/** The log; beside it what the run is monitored for, if there is anything. */
+function LogPanes() {
+  const requirements = useRequirements();
+  if (!requirements) return <LogPane />;
+  return <Tabs label={text.log} tabs={[LOG, requirements]} chosen={lowerTab} />;
+}
+
+const LOG: Tab = { id: "log", title: text.log, render: () => <LogPane /> };
+
+/** The tab of what the run is monitored for; undefined: it is not monitored. */
+function useRequirements(): Tab | undefined {
+  const { scene } = useOperating();
+  const all = Object.values(scene.requirements.value);
+  if (all.length === 0) return undefined;
+  return { id: REQUIREMENTS, title: <RequirementsTitle />, render: () => <Requirements /> };
 }
 
 /** The list of detections is beside the time line, which has the button that shows it. */
@@ -119,6 +139,7 @@ function useDetectionCount(): number {
 function Narrow({ onSeek }: Parts) {
   const cameras = useCameras();
   const count = useDetectionCount();
+  const requirements = useRequirements();
   const detections: Tab = {
     id: "detections",
     title: fill(strings.operate.detections.title, { count }),
@@ -135,6 +156,7 @@ function Narrow({ onSeek }: Parts) {
       />
       <Tabs
         label={text.right}
+        chosen={narrowTab}
         tabs={[
           { id: "map", title: text.map, render: () => <MapPane formInside /> },
           { id: "vehicles", title: text.vehicles, render: () => <VehiclesPane /> },
@@ -142,7 +164,8 @@ function Narrow({ onSeek }: Parts) {
           { id: "timeline", title: text.timeline, render: () => <TimelinePane onSeek={onSeek} /> },
           ...(count > 0 ? [detections] : []),
           { id: "plots", title: text.plots, render: () => <Plots onSeek={onSeek} /> },
-          { id: "log", title: text.log, render: () => <LogPane /> },
+          ...(requirements ? [requirements] : []),
+          LOG,
         ]}
       />
     </Split>

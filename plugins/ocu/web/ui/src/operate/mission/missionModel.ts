@@ -31,6 +31,8 @@ export interface MissionModel {
   signals: Definition[];
   messages: Definition[];
   node(process: string, element: string): MissionNode | undefined;
+  /** All elements and processes of an id: records about requirements name no process. */
+  nodesOf(id: string): readonly MissionNode[];
   /** The view in which an element is drawn. */
   viewOf(process: string, element: string): View | undefined;
   label(process: string, element: string): string;
@@ -51,6 +53,11 @@ export function missionModel(sources: readonly MissionSource[], first: string): 
     .sort((one, other) => Number(other.id === first) - Number(one.id === first));
   const nodes = new Map<string, MissionNode>();
   for (const tree of trees) index(tree, nodes);
+  const byId = new Map<string, MissionNode[]>();
+  for (const node of nodes.values()) {
+    const id = drawnAs(node.id);
+    byId.set(id, [...(byId.get(id) ?? []), node]);
+  }
   const views = sources.flatMap((source, file) => viewsOf(source, file, sources.length > 1));
   const viewByElement = new Map<string, View>();
   for (const view of views) {
@@ -65,6 +72,7 @@ export function missionModel(sources: readonly MissionSource[], first: string): 
     signals: definitionsOf(roots, "bpmn:Signal"),
     messages: definitionsOf(roots, "bpmn:Message"),
     node: (process, element) => nodes.get(keyOf(process, element)),
+    nodesOf: (id) => byId.get(drawnAs(id)) ?? [],
     viewOf: (process, element) => viewByElement.get(keyOf(process, element)),
     label: (process, element) => nodes.get(keyOf(process, element))?.label ?? element,
     definition: (id) => definitions.get(id) ?? definitions.get(drawnAs(id)) ?? id,

@@ -5,11 +5,12 @@ import { useEffect, useRef } from "preact/hooks";
 import { fill, strings } from "../../strings";
 import type { ElementState } from "../../shared/types";
 import { lookOf, SIGNS, type Look } from "../diagram/colours";
-import { statesOf, visitsOf } from "../diagram/spoken";
+import { statesOf, violationOf, visitsOf } from "../diagram/spoken";
 import { useOperating } from "../context";
 import { Pane } from "../layout/Pane";
 import type { MissionNode } from "../mission/missionModel";
 import { keyOf } from "../mission/names";
+import { VIOLATION, violationsIn } from "../requirements/violations";
 import { moved, rowsOf, type Row } from "./rows";
 import "./outline.css";
 
@@ -26,6 +27,7 @@ export function OutlinePane() {
   const tree = useRef<HTMLUListElement>(null);
   scene.elements.slow.value;
 
+  const violations = violationsIn(scene.requirements.value, mission);
   const rows = rowsOf(mission.trees, folded.value, wanted.value);
   const chosen = selected.value ? keyOf(selected.value.process, selected.value.element) : "";
   const reached = rows.some(({ key }) => key === current.value) ? current.value : rows[0]?.key;
@@ -83,6 +85,7 @@ export function OutlinePane() {
             key={row.key}
             row={row}
             state={scene.elements.get(row.node.process, row.node.id)}
+            violated={violations.get(keyOf(row.node.process, row.node.id)) ?? []}
             selected={row.key === chosen}
             reached={row.key === reached}
             onKeyDown={(event) => press(event, row)}
@@ -101,6 +104,8 @@ export function OutlinePane() {
 interface ItemProps {
   row: Row;
   state: ElementState | undefined;
+  /** The requirements that are violated, and about it. */
+  violated: readonly string[];
   selected: boolean;
   reached: boolean;
   onKeyDown: (event: KeyboardEvent) => void;
@@ -108,7 +113,7 @@ interface ItemProps {
   onTurn: () => void;
 }
 
-function Item({ row, state, selected, reached, onKeyDown, onClick, onTurn }: ItemProps) {
+function Item({ row, state, violated, selected, reached, onKeyDown, onClick, onTurn }: ItemProps) {
   const { node, level, open } = row;
   const look: Look = state ? lookOf(state) : "idle";
   const isProcess = node.type === "Process";
@@ -117,6 +122,7 @@ function Item({ row, state, selected, reached, onKeyDown, onClick, onTurn }: Ite
     node.kind,
     node.calls && fill(text.calls, { process: node.calls }),
     ...(isProcess ? visitsOf(state) : statesOf(state)),
+    violationOf(violated),
   ];
   return (
     <li
@@ -148,6 +154,11 @@ function Item({ row, state, selected, reached, onKeyDown, onClick, onTurn }: Ite
         </i>
       )}
       <span class="name">{node.label}</span>
+      {violated.length > 0 && (
+        <i class="violates" aria-hidden="true" title={violationOf(violated)}>
+          {VIOLATION}
+        </i>
+      )}
       {state && state.hits > 0 && <span class="hits" data-hits={state.hits} />}
     </li>
   );

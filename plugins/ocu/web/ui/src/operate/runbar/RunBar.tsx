@@ -9,10 +9,12 @@ import { titleOf } from "../../shared/runs";
 import { may } from "../../shared/session";
 import { StopButton } from "../../shared/StopButton";
 import { stop } from "../../shared/stopping";
-import { fill, strings } from "../../strings";
+import { counted, fill, strings } from "../../strings";
 import { useOperating } from "../context";
 import { Icon } from "../layout/icons";
 import { usePaced } from "../layout/pace";
+import { showRequirements } from "../layout/chosenTabs";
+import { isViolated, VIOLATION } from "../requirements/violations";
 import { SendDialog } from "./SendDialog";
 import "./runbar.css";
 
@@ -38,6 +40,7 @@ export function RunBar() {
         </span>
       )}
       <Clock />
+      <Violations />
       {status === "interrupted" && <em>{fill(text.interrupted, { run: scene.run })}</em>}
       <span class="space" />
       {scene.mode === "replay" && <Asked />}
@@ -90,6 +93,26 @@ function Asked() {
     >
       ? {question}
     </button>
+  );
+}
+
+/** Which requirements are violated: seen whatever else is open. */
+function Violations() {
+  const { scene } = useOperating();
+  const count = Object.values(scene.requirements.value).filter(isViolated).length;
+  return (
+    <span role="status">
+      {count > 0 && (
+        <button
+          type="button"
+          class="violations"
+          title={strings.monitors.open}
+          onClick={showRequirements}
+        >
+          {VIOLATION} {counted(strings.monitors.violated, count)}
+        </button>
+      )}
+    </span>
   );
 }
 

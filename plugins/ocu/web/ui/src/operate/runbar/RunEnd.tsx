@@ -5,6 +5,7 @@ import { clock, grouped } from "../../shared/format";
 import { Dialog } from "../../shared/Dialog";
 import { strings } from "../../strings";
 import { useOperating } from "../context";
+import { isViolated, VIOLATION } from "../requirements/violations";
 
 const text = strings.operate.end;
 
@@ -23,6 +24,7 @@ export function RunEnd({ onClose }: { onClose: () => void }) {
       .filter(wanted)
       .slice(-MOST)
       .map(lineOf);
+  const violated = Object.entries(scene.requirements.value).filter(([, each]) => isViolated(each));
   const decisions = lines(({ record }) => record === "PromptAnswered");
   const faults = lines((record) => isFault(record));
   return (
@@ -53,6 +55,18 @@ export function RunEnd({ onClose }: { onClose: () => void }) {
         <dd>{clock(logged.at(-1)?.t ?? scene.now())}</dd>
         <dt>{text.records}</dt>
         <dd>{grouped(scene.events.value)}</dd>
+        {violated.length > 0 && (
+          <>
+            <dt>{strings.monitors.title}</dt>
+            <dd>
+              {violated.map(([id, { english }]) => (
+                <div key={id}>
+                  {VIOLATION} {strings.monitors.states.violated}: <strong>{id}</strong> {english}
+                </div>
+              ))}
+            </dd>
+          </>
+        )}
         <dt>{text.decisions}</dt>
         <dd>{decisions.length === 0 ? text.none : decisions.map(said)}</dd>
         <dt>{text.faults}</dt>

@@ -16,7 +16,7 @@ import { followResources } from "../vehicles/resources";
 import { detectionsOf, NO_DETECTIONS, withDetections, type Detections } from "./detections";
 import { ElementBoard } from "./elementBoard";
 import { RecordFeed, type Page } from "./recordFeed";
-import { TRAIL_POINTS, type Scene } from "./scene";
+import { TRAIL_POINTS, type Requirements, type Scene } from "./scene";
 import { loadTrack } from "./telemetryPages";
 import { NO_TELEMETRY, TelemetryTrack } from "./telemetryTrack";
 
@@ -43,6 +43,7 @@ export class LiveScene implements Scene {
   readonly pace = signal(1);
   readonly events = signal(0);
   readonly commands = signal<Record<string, Command>>({});
+  readonly requirements = signal<Requirements>({});
   readonly prompts = executive.prompts;
   readonly holders = executive.holders;
   readonly vehicles = executive.vehicles;
@@ -180,6 +181,7 @@ export class LiveScene implements Scene {
       this.clock(snapshot.t, snapshot.events);
       this.pace.value = snapshot.speed || 1;
       this.commands.value = present(snapshot.commands);
+      this.requirements.value = present(snapshot.requirements);
       this.elements.replace(snapshot.elements);
     });
     // After a break, what was missed comes with the next records that are pushed.
@@ -190,6 +192,9 @@ export class LiveScene implements Scene {
   private takeFrame(frame: Frame): void {
     this.clock(frame.t, frame.events);
     if (frame.elements) this.elements.merge(frame.elements);
+    if (frame.requirements) {
+      this.requirements.value = present({ ...this.requirements.value, ...frame.requirements });
+    }
     if (!frame.commands) return;
     this.commands.value = present({ ...this.commands.value, ...frame.commands });
     this.feed.settle(this.commands.value, frame.t);
@@ -202,8 +207,8 @@ export class LiveScene implements Scene {
   }
 }
 
-function present(commands: Record<string, Command | null>): Record<string, Command> {
+function present<T>(values: Record<string, T | null>): Record<string, T> {
   return Object.fromEntries(
-    Object.entries(commands).filter((entry): entry is [string, Command] => entry[1] !== null),
+    Object.entries(values).filter((entry): entry is [string, T] => entry[1] !== null),
   );
 }

@@ -11,9 +11,9 @@ const RECORDS = loop(5000);
 function pageOf(number: number): ReelPage {
   const view = emptyView();
   for (const record of RECORDS.slice(0, number * PAGE)) apply(view, record);
-  const { prompts, commands, holders, ...fields } = structuredClone(view);
+  const { prompts, commands, holders, requirements, ...fields } = structuredClone(view);
   return {
-    view: { ...fields, prompts: {}, commands: {}, holders: {} },
+    view: { ...fields, prompts: {}, commands: {}, holders: {}, requirements: {} },
     records: RECORDS.slice(number * PAGE, (number + 1) * PAGE),
   };
 }

@@ -19,7 +19,7 @@ import { historyOf, type TelemetryHistory } from "../plots/history";
 import type { Range } from "../plots/series";
 import { detectionsOf, NO_DETECTIONS, type Detections } from "./detections";
 import { ElementBoard } from "./elementBoard";
-import { TRAIL_POINTS, type LogPage, type Scene } from "./scene";
+import { TRAIL_POINTS, type LogPage, type Requirements, type Scene } from "./scene";
 import { NO_TELEMETRY, TelemetryTrack, type Telemetry } from "./telemetryTrack";
 
 export const SLOWEST = 0.25;
@@ -65,6 +65,7 @@ export class ReplayScene implements Scene {
   readonly commands = signal<Record<string, Command>>({});
   readonly prompts = signal<Prompt[]>([]);
   readonly holders = signal<Record<string, string>>({});
+  readonly requirements = signal<Requirements>({});
   readonly vehicles = signal<Record<string, VehicleState>>({});
   readonly payloads = signal<Record<string, PayloadState>>({});
   readonly teams = signal<Record<string, TeamState>>({});
@@ -313,6 +314,12 @@ export class ReplayScene implements Scene {
       this.commands.value = Object.fromEntries(view.commands);
       this.prompts.value = [...view.prompts.values()];
       this.holders.value = Object.fromEntries(view.holders);
+      // Each requirement is replaced when it changes, so equal ones need not be drawn again.
+      const before = Object.entries(this.requirements.peek());
+      const same =
+        before.length === view.requirements.size &&
+        before.every(([id, each]) => view.requirements.get(id) === each);
+      if (!same) this.requirements.value = Object.fromEntries(view.requirements);
       this.status.value = view.status;
     });
   }

@@ -9,6 +9,7 @@ import type {
   GeoPosition,
   PayloadState,
   Prompt,
+  Requirement,
   RunRecord,
   RunStatus,
   RunSummary,
@@ -20,6 +21,8 @@ import type { ElementBoard } from "./elementBoard";
 
 /** Places of a trail. */
 export const TRAIL_POINTS = 2000;
+
+export type Requirements = Readonly<Record<string, Requirement>>;
 
 export interface LogPage {
   records: readonly RunRecord[];
@@ -48,6 +51,8 @@ export interface Scene {
   readonly commands: ReadonlySignal<Record<string, Command>>;
   readonly prompts: ReadonlySignal<Prompt[]>;
   readonly holders: ReadonlySignal<Record<string, string>>;
+  /** What the run is monitored for, as it is known now, by id. */
+  readonly requirements: ReadonlySignal<Requirements>;
   readonly vehicles: ReadonlySignal<Record<string, VehicleState>>;
   readonly payloads: ReadonlySignal<Record<string, PayloadState>>;
   readonly teams: ReadonlySignal<Record<string, TeamState>>;

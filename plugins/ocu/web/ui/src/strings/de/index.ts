@@ -25,6 +25,7 @@ import { control } from "./control";
 import { editor } from "./editor";
 import { fleet } from "./fleet";
 import { home } from "./home";
+import { monitors } from "./monitors";
 import { offline } from "./offline";
 import { operate } from "./operate";
 import { people } from "./people";
@@ -62,6 +63,7 @@ export const german: Translation<English> = {
   runs,
   begin,
   operate,
+  monitors,
   plots,
   fleet,
   cameras,
