@@ -1,14 +1,22 @@
 """What is made once of a formula that runs are monitored for, and what each run has of it."""
 
 from collections.abc import Sequence
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 from m2pem.mission.mission import Mission
 from m2pem.monitors.anticipation import Verdict, anticipation
-from m2pem.monitors.product import own_letter
+from m2pem.monitors.moments import MomentTables
+from m2pem.monitors.product import Product, own_letter
 from m2pem.monitors.timed import TimedEvaluation, TimedPlan, base_propositions
 from m2pem.verify.ltl import negated, parse
-from m2pem.verify.ltl.formula import Formula, Proposition, Timed, propositions
+from m2pem.verify.ltl.formula import (
+    Formula,
+    Measured,
+    Proposition,
+    Timed,
+    propositions,
+    show_measured,
+)
 from m2pem.verify.requirements.english import English
 
 
@@ -52,18 +60,41 @@ class MonitorPlan:
         )
 
 
-@lru_cache(maxsize=100)
-def plans(
-    formulas: tuple[str, ...], before: tuple[Proposition, ...] = ()
-) -> tuple[tuple[Proposition, ...], tuple[MonitorPlan, ...]]:
-    """The propositions that formulas are about, each once, and the plans of their monitors.
+class Plans:
+    """What the monitors of several formulas have in common, whatever the run. `known`: the
+    propositions that they are about, each once, in the order of the bits of the run's letters.
 
-    `before`: those of other formulas, which keep their bits.
+    `before`: propositions of other formulas, which keep their bits.
     """
-    parsed = [parse(each) for each in formulas]
-    theirs = (each for part in parsed for each in base_propositions(part))
-    known = tuple(dict.fromkeys((*before, *theirs)))
-    return known, tuple(MonitorPlan(each, known) for each in parsed)
+
+    def __init__(self, formulas: Sequence[str], before: Sequence[Proposition] = ()) -> None:
+        parsed = [parse(each) for each in formulas]
+        theirs = (each for part in parsed for each in base_propositions(part))
+        self.known = tuple(dict.fromkeys((*before, *theirs)))
+        self.each = tuple(MonitorPlan(formula, self.known) for formula in parsed)
+        self.measured = tuple(
+            (1 << number, show_measured(named), named)
+            for number, named in enumerate(self.known)
+            if isinstance(named, Measured)
+        )
+        """Bits, texts and conditions on telemetry."""
+
+    @cached_property
+    def product(self) -> Product:
+        """That of the formulas without bounds, in their order."""
+        return Product([plan.untimed for plan in self.each if plan.untimed is not None])
+
+
+@lru_cache(maxsize=100)
+def plans(formulas: tuple[str, ...]) -> Plans:
+    """The plans of the formulas that runs are monitored for from their beginning, made once."""
+    return Plans(formulas)
+
+
+@lru_cache(maxsize=100)
+def tables(made: Plans, mission: Mission) -> MomentTables:
+    """What the records of a mission's runs say of the propositions, made once."""
+    return MomentTables(made.known, mission)
 
 
 class TimedMonitor:

@@ -6,19 +6,28 @@ once, and serve all runs with the same formulas.
 """
 
 from collections.abc import Sequence
-from functools import lru_cache
 
 from m2pem.monitors.anticipation import Anticipation, Verdict
 
 MOST_TRANSITIONS = 20_000
 """Transitions that are remembered, at most; beyond, they are found again."""
 
-State = tuple[int, ...]
-"""The state of each formula's monitor."""
 Certain = tuple[tuple[int, Verdict], ...]
-"""Which formulas have become satisfied or violated, by their place."""
+"""Which formulas are satisfied or violated, by their place."""
 Bits = tuple[tuple[int, int], ...]
 """Bits of the run's letter, and of the formula's."""
+
+
+class State:
+    """A state of a product. `parts`: the state of each formula's monitor; `certain`: what is."""
+
+    __slots__ = ("after", "certain", "parts")
+
+    def __init__(self, parts: tuple[int, ...], certain: Certain) -> None:
+        self.parts = parts
+        self.certain = certain
+        self.after: dict[int, State] = {}
+        """By letter of the run, all of which is known."""
 
 
 class Product:
@@ -31,41 +40,56 @@ class Product:
         for _, bits in self._parts:
             for theirs, _ in bits:
                 self.mask |= theirs
-        self.start: State = tuple(part.start for part, _ in self._parts)
-        self._after: dict[tuple[State, int, int], tuple[State, Certain]] = {}
+        self._states: dict[tuple[int, ...], State] = {}
+        self._transitions = 0
+        self.start = self.state_of(tuple(part.start for part, _ in self._parts))
 
-    def step(self, state: State, letter: int, unknown: int) -> tuple[State, Certain]:
-        """The state after a moment, and what has become certain in it. `letter`, `unknown`: of the
-        run."""
-        key = (state, letter & self.mask, unknown & self.mask)
-        found = self._after.get(key)
-        if found is None:
-            if len(self._after) >= MOST_TRANSITIONS:
-                self._after.clear()
-            found = self._after[key] = self._step(*key)
-        return found
+    def state_of(self, parts: tuple[int, ...]) -> State:
+        """The state with these states of the formulas' monitors."""
+        state = self._states.get(parts)
+        if state is None:
+            verdicts = (part.verdicts[at] for (part, _), at in zip(self._parts, parts, strict=True))
+            certain = tuple(pair for pair in enumerate(verdicts) if pair[1].is_certain)
+            state = self._states[parts] = State(parts, certain)
+        return state
 
-    def _step(self, state: State, letter: int, unknown: int) -> tuple[State, Certain]:
-        after = []
-        certain = []
+    def step(self, state: State, letter: int, unknown: int) -> State:
+        """The state after a moment. `letter`, `unknown`: of the run."""
+        letter, unknown = letter & self.mask, unknown & self.mask
+        if unknown:
+            return self._step(state, letter, unknown)
+        after = state.after.get(letter)
+        if after is None:
+            self._transitions += 1
+            if self._transitions > MOST_TRANSITIONS:
+                self._forget()
+            after = state.after[letter] = self._step(state, letter, 0)
+        return after
+
+    def _forget(self) -> None:
+        for each in self._states.values():
+            each.after.clear()
+        self._states.clear()
+        self._transitions = 0
+
+    def _step(self, state: State, letter: int, unknown: int) -> State:
+        after = list(state.parts)
         for place, (part, bits) in enumerate(self._parts):
-            before = state[place]
-            if part.verdicts[before].is_certain:
-                after.append(before)
-                continue
-            now = part.step(before, own_letter(bits, letter), own_letter(bits, unknown))
-            after.append(now)
-            if part.verdicts[now].is_certain:
-                certain.append((place, part.verdicts[now]))
-        return tuple(after), tuple(certain)
+            before = state.parts[place]
+            if not part.verdicts[before].is_certain:
+                own, own_unknown = own_letter(bits, letter), own_letter(bits, unknown)
+                after[place] = part.step(before, own, own_unknown)
+        return self.state_of(tuple(after))
 
     def at_end(self, state: State, letter: int, unknown: int) -> Certain:
         """What is certain of those that were open, if each moment from now on is as this one."""
         found = []
         for place, (part, bits) in enumerate(self._parts):
-            if part.verdicts[state[place]].is_certain:
+            if part.verdicts[state.parts[place]].is_certain:
                 continue
-            verdict = part.at_end(state[place], own_letter(bits, letter), own_letter(bits, unknown))
+            verdict = part.at_end(
+                state.parts[place], own_letter(bits, letter), own_letter(bits, unknown)
+            )
             if verdict.is_certain:
                 found.append((place, verdict))
         return tuple(found)
@@ -74,9 +98,3 @@ class Product:
 def own_letter(bits: Bits, letter: int) -> int:
     """The letter of a formula, given that of the run."""
     return sum(mine for theirs, mine in bits if letter & theirs)
-
-
-@lru_cache(maxsize=100)
-def product_of(parts: tuple[tuple[Anticipation, Bits], ...]) -> Product:
-    """The product of monitors, made once."""
-    return Product(parts)

@@ -16,16 +16,16 @@ from typing import TYPE_CHECKING
 
 from m2pem.engine import records as r
 from m2pem.engine.inputs import RequirementDecided, TelemetryConditionChanged
-from m2pem.engine.state import RunState
+from m2pem.engine.state import RunState, RunStatus
 from m2pem.fleet.fleet import Fleet
 
 if TYPE_CHECKING:
     from m2pem.monitors.anticipation import Verdict
     from m2pem.monitors.moments import Moments
-    from m2pem.monitors.monitor import MonitorPlan, TimedMonitor
+    from m2pem.monitors.monitor import MonitorPlan, Plans, TimedMonitor
     from m2pem.monitors.product import Product, State
     from m2pem.monitors.telemetry_conditions import Latest
-    from m2pem.verify.ltl.formula import Measured, Proposition
+    from m2pem.verify.ltl.formula import Measured
 
 ENDED = "the run has ended"
 BEGINNING = "from the beginning"
@@ -44,14 +44,15 @@ class RunMonitors:
         self._moments: Moments | None = None
         self._open: dict[str, MonitorPlan] = {}
         self._timed: dict[str, TimedMonitor] = {}
+        self._timed_mask = 0
         self._product: Product | None = None
-        self._product_state: State = ()
+        self._at: State | None = None
         self._names: tuple[str, ...] = ()
         self._recorded: set[str] = set()
         self._found: dict[str, RequirementDecided] = {}
         self._conditions: dict[str, tuple[int, Measured]] = {}
         self._measured: dict[str, bool | None] = {}
-        self._letter = _NO_LETTER
+        self._mission = state.mission
         self._unknown = 0
         self._t_us = 0
 
@@ -59,31 +60,37 @@ class RunMonitors:
 
     def observe(self, t_us: int, records: Sequence[r.Record]) -> None:
         """Read the records of one input. `t_us`: their mission time."""
+        state = self._state
         moments = self._moments
-        if moments is None:
-            if any(type(each) is r.MissionRevised for each in records):
-                self._t_us = t_us
-                self._revise(records)
-                return
-            if not records or type(records[0]) is not r.RunStarted:
-                return
+        if moments is None and self._begins(records):
             self._begin([each for each in records if type(each) is r.RequirementMonitored])
             moments = self._moments
-            if moments is None:
-                return
-        if self._conditions:
-            self._read_conditions(t_us, records)
-        if self._timed:
-            self.advance(t_us)
-        self._t_us = t_us
-        moments.read(records)
-        for record in records:
-            if type(record) is r.RunEnded:
-                self._end(record)
-            elif type(record) is r.RequirementDecided:
-                self._note(record.requirement)
-            elif type(record) is r.MissionRevised:
-                self._revise(records)
+        if moments is not None:
+            if self._conditions:
+                self._read_conditions(t_us, records)
+            if self._timed:
+                self.advance(t_us)
+            self._t_us = t_us
+            moments.read(records)
+        if len(self._recorded) != len(state.verdicts):
+            for record in records:
+                if type(record) is r.RequirementDecided:
+                    self._note(record.requirement)
+        if state.mission is not self._mission:
+            self._mission = state.mission
+            self._t_us = t_us
+            self._revise(records)
+        if self._open:
+            if state.status is RunStatus.ENDED:
+                for record in records:
+                    if type(record) is r.RunEnded:
+                        self._end(record)
+        elif moments is not None:
+            self._read_no_more()
+
+    @staticmethod
+    def _begins(records: Sequence[r.Record]) -> bool:
+        return bool(records) and type(records[0]) is r.RunStarted
 
     def advance(self, t_us: int) -> None:
         """Mission time has passed without a record."""
@@ -114,38 +121,40 @@ class RunMonitors:
             return
         # What reads formulas takes time to load, and most runs have none.
         from m2pem.monitors.moments import Moments  # noqa: PLC0415
-        from m2pem.monitors.monitor import plans  # noqa: PLC0415
+        from m2pem.monitors.monitor import plans, tables  # noqa: PLC0415
 
-        known, planned = plans(tuple(each.formula for each in monitored))
-        self._moments = Moments(known, self._state.mission, self._fleet, self._read)
-        self._add(monitored, planned, known)
+        made = plans(tuple(each.formula for each in monitored))
+        mission = self._state.mission
+        self._moments = Moments(made.known, mission, self._fleet, self._read, tables(made, mission))
+        self._add(monitored, made)
+        self._product, self._at = made.product, made.product.start
 
-    def _add(
-        self,
-        monitored: Sequence[r.RequirementMonitored],
-        planned: "Sequence[MonitorPlan]",
-        known: "Sequence[Proposition]",
-    ) -> None:
-        """Monitor requirements from now on. `known`: the propositions of the run's letters."""
+    def _add(self, monitored: Sequence[r.RequirementMonitored], made: "Plans") -> None:
+        """Monitor requirements from now on."""
         from m2pem.monitors.monitor import TimedMonitor  # noqa: PLC0415  # as in `_begin`
-        from m2pem.monitors.product import product_of  # noqa: PLC0415
-        from m2pem.verify.ltl.formula import Measured, show_measured  # noqa: PLC0415
 
-        states = dict(zip(self._names, self._product_state, strict=True))
-        for each, plan in zip(monitored, planned, strict=True):
+        for each, plan in zip(monitored, made.each, strict=True):
             self._open[each.requirement] = plan
-            states.pop(each.requirement, None)
             if plan.timed is not None:
                 self._timed[each.requirement] = TimedMonitor(plan, plan.timed)
-        parts = {name: plan.untimed for name, plan in self._open.items() if plan.untimed}
-        self._names = tuple(parts)
-        self._product = product_of(tuple(parts.values()))
-        begun = zip(self._names, self._product.start, strict=True)
-        self._product_state = tuple(states.get(name, start) for name, start in begun)
-        for bit, named in enumerate(known):
-            if isinstance(named, Measured) and show_measured(named) not in self._conditions:
-                self._conditions[show_measured(named)] = (1 << bit, named)
-                self._unknown |= 1 << bit
+                self._timed_mask |= plan.mask
+        self._names = tuple(name for name, plan in self._open.items() if plan.timed is None)
+        for bit, text, condition in made.measured:
+            if text not in self._conditions:
+                self._conditions[text] = (bit, condition)
+                self._measured[text] = now = self._state.telemetry_conditions.get(text)
+                if now is None:
+                    self._unknown |= bit
+                elif self._moments is not None:
+                    self._moments.set_bit(bit, now)
+
+    def _read_no_more(self) -> None:
+        """All is decided: records say nothing new, unless the mission is revised."""
+        self._moments = None
+        self._product = self._at = None
+        self._names = ()
+        self._conditions.clear()
+        self._unknown = 0
 
     def _revise(self, records: Iterable[r.Record]) -> None:
         """Follow the requirements of a new version of the mission."""
@@ -165,52 +174,66 @@ class RunMonitors:
                 self._moments.extend(self._moments.propositions, self._state)
             return
         from m2pem.monitors.moments import Moments  # noqa: PLC0415  # as in `_begin`
-        from m2pem.monitors.monitor import plans  # noqa: PLC0415
+        from m2pem.monitors.monitor import Plans  # noqa: PLC0415
+        from m2pem.monitors.product import Product  # noqa: PLC0415
 
         if self._moments is None:
             self._moments = Moments((), self._state.mission, self._fleet, self._read)
-            self._moments.take_data(self._state)
-        before = self._moments.propositions
-        known, planned = plans(tuple(each.formula for each in begun), before)
-        self._moments.extend(known, self._state)
-        self._letter = self._moments.state
-        self._add(begun, planned, known)
-        self._read_moment(~0, _NO_LETTER, FROM_THE_REVISION)
+        moments = self._moments
+        made = Plans(tuple(each.formula for each in begun), moments.propositions)
+        moments.extend(made.known, self._state)
+        moments.letter = moments.state
+        states = dict(zip(self._names, self._at.parts if self._at else (), strict=True))
+        self._add(begun, made)
+        for each in begun:
+            states.pop(each.requirement, None)
+        parts = [self._open[name].untimed for name in self._names]
+        self._product = product = Product([each for each in parts if each is not None])
+        begin = zip(self._names, product.start.parts, strict=True)
+        self._at = product.state_of(tuple(states.get(name, start) for name, start in begin))
+        self._read_moment(moments.letter, _NO_LETTER, ~0, FROM_THE_REVISION)
 
     def _goes_on(self, requirement: str) -> bool:
         return any(requirement in each for each in (self._open, self._recorded, self._found))
 
-    def _read(self, letter: int) -> None:
-        before = self._letter
-        if letter != before:
-            self._letter = letter
-            changed = ~0 if before == _NO_LETTER else letter ^ before
-            self._read_moment(changed, before, BEGINNING)
+    def _read(self, letter: int, before: int) -> None:
+        """Read a moment. `before`: the letter of the one before it."""
+        changed = letter ^ before if before != _NO_LETTER else ~0
+        self._read_moment(letter, before, changed, BEGINNING)
 
-    def _read_moment(self, changed: int, before: int, otherwise: str) -> None:
+    def _read_moment(self, letter: int, before: int, changed: int, otherwise: str) -> None:
         """Have monitors read a moment. `changed`: the bits that differ from the moment before;
         `otherwise`: what made a verdict certain if none does."""
-        letter, unknown = self._letter, self._unknown
+        product, at = self._product, self._at
         certain: list[tuple[str, Verdict]] = []
-        product = self._product
-        if product is not None and changed & product.mask:
-            self._product_state, found = product.step(self._product_state, letter, unknown)
-            for place, verdict in found:
-                certain.append((self._names[place], verdict))
-        for name, each in self._timed.items():
-            if changed & each.mask:
-                verdict = each.read(self._t_us, letter, unknown)
-                if verdict.is_certain:
-                    certain.append((name, verdict))
+        if at is not None and product is not None and changed & product.mask:
+            # Written out, as most moments of long runs end here.
+            after = None if self._unknown else at.after.get(letter & product.mask)
+            if after is None:
+                after = product.step(at, letter, self._unknown)
+            if after is not at:
+                self._at = after
+                if len(after.certain) != len(at.certain):
+                    certain = [
+                        (self._names[place], verdict)
+                        for place, verdict in after.certain
+                        if (place, verdict) not in at.certain
+                    ]
+        if changed & self._timed_mask:
+            for name, each in self._timed.items():
+                if changed & each.mask:
+                    verdict = each.read(self._t_us, letter, self._unknown)
+                    if verdict.is_certain:
+                        certain.append((name, verdict))
         for name, verdict in certain:
             if name in self._open:
-                because = self._because(name, 0 if before == _NO_LETTER else before)
+                because = self._because(name, letter, 0 if before == _NO_LETTER else before)
                 self._decide(name, verdict, self._t_us, because or otherwise)
 
-    def _because(self, name: str, before: int) -> str:
+    def _because(self, name: str, letter: int, before: int) -> str:
         from m2pem.monitors.monitor import english_of  # noqa: PLC0415  # as in `_begin`
 
-        return self._open[name].changes(before, self._letter, english_of(self._state.mission))
+        return self._open[name].changes(before, letter, english_of(self._state.mission))
 
     # --- telemetry ------------------------------------------------------------------------------
 
@@ -254,15 +277,14 @@ class RunMonitors:
     def _set_condition(self, text: str, now: bool | None) -> None:
         if text not in self._conditions or self._moments is None:
             return
-        bit = self._conditions[text][0]
-        before, unknown = self._letter, self._unknown
+        moments, bit = self._moments, self._conditions[text][0]
+        before, unknown = moments.letter, self._unknown
         self._measured[text] = now
         self._unknown = self._unknown | bit if now is None else self._unknown & ~bit
         if unknown == self._unknown and bool(before & bit) == bool(now):
             return
-        self._moments.state = self._moments.state | bit if now else self._moments.state & ~bit
-        self._letter = self._moments.state
-        self._read_moment(bit, before, BEGINNING)
+        moments.set_bit(bit, bool(now))
+        self._read_moment(moments.letter, before, bit, BEGINNING)
 
     # --- verdicts -------------------------------------------------------------------------------
 
@@ -270,8 +292,9 @@ class RunMonitors:
         """Decide all, unless operators have stopped the run: it could have gone on."""
         if record.outcome is not r.RunOutcome.STOPPED:
             certain: list[tuple[str, Verdict]] = []
-            if self._product is not None:
-                found = self._product.at_end(self._product_state, self._letter, self._unknown)
+            moments = self._moments
+            if self._product is not None and self._at is not None and moments is not None:
+                found = self._product.at_end(self._at, moments.letter, self._unknown)
                 certain += [(self._names[place], verdict) for place, verdict in found]
             for name, each in self._timed.items():
                 verdict = each.evaluation.end()

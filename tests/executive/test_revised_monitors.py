@@ -140,3 +140,27 @@ def test_a_resumed_run_has_the_monitors_of_its_revision(play: Callable[..., Any]
         start=StartRun("P", requirements=at_start),
     )
     assert decided(resumed(play, journal, story)) == {"after": VIOLATED, "ends": SATISFIED}
+
+
+def test_a_revision_monitors_again_after_all_was_decided(play: Callable[..., Any]) -> None:
+    old = asking("First Second Third", requirement("first", "<> completed(First)"))
+    late = requirement("late", "[](completed(First) -> [] !active(Second))")
+    now = requirement("now", "[] !(active(Second) && once(completed(Second)))")
+    third = requirement("third", "[] !active(Third)")
+    new = asking(
+        "First Second Third", requirement("first", "<> completed(First)"), late, now, third
+    )
+
+    async def story(world: World) -> list[r.Record]:
+        run = await world.executive.control.start(old)
+        await answer(world)
+        assert decided(world.seen) == {"first": SATISFIED}
+        await revised(world, run, new)
+        await answer(world)
+        await answer(world)
+        await world.executive.control.wait(run)
+        return world.seen
+
+    # First is completed before the revision, so "late" is not about it.
+    verdicts = {"first": SATISFIED, "late": SATISFIED, "now": SATISFIED, "third": VIOLATED}
+    assert decided(play(story)) == verdicts

@@ -86,7 +86,7 @@ def first_unlike(mission: Mission, seeds: range) -> str:
     for seed in seeds:
         walk, runs = Walk(mission, fleet, net, seed), NetRuns(net, mission, fleet, known)
         given: list[int] = []
-        moments = Moments(known, mission, fleet, given.append)
+        moments = Moments(known, mission, fleet, lambda letter, _: given.append(letter))  # noqa: B023
         receive = walk.run.receive
         unlike: list[str] = []
 
@@ -148,7 +148,7 @@ def letters(mission: Mission, formula: str, seed: int) -> list[frozenset[str]]:
     walk = Walk(mission, fleet, translate(mission, options=OPEN), seed)
     known = propositions(parse(formula))
     given: list[int] = []
-    moments = Moments(known, mission, fleet, given.append)
+    moments = Moments(known, mission, fleet, lambda letter, _: given.append(letter))
     receive = walk.run.receive
 
     def observed(item: Input, now_us: int) -> Step:
