@@ -1,21 +1,30 @@
-"""What monitors of requirements cost: CPU of the engine, and of whole rehearsals, with 0 and 20.
+"""What monitors of requirements cost: CPU time with 0 and 20 of them.
 
-`python -m bench.monitors` prints a table. The short run is of `missions/survey_pair.bpmn`; its 20
-requirements are those of docs/requirements.md and more of their kind. The long run is a patrol of
-1,000 rounds, whose 20 requirements stay open; each moment of it changes what some are about.
+`python -m bench.monitors` prints a table: of the bare engine, which forgets its records; of the
+engine with a journal on disk, which has each step before the next one, as in runs; and of whole
+rehearsals, in which the executive commands simulated vehicles. The short run is of
+`missions/survey_pair.bpmn`; its 20 requirements are those of docs/requirements.md and more of
+their kind. The long run is a patrol of 1,000 rounds, whose 20 requirements stay open; each moment
+of it changes what some are about.
 Rounds with and without take turns, and the least time of each counts.
 """
 
+import asyncio
+import re
+import tempfile
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
+from bench.play_m2pem import entry
 from m2pem.bpmn import parse_mission, read_mission
 from m2pem.engine.inputs import BehaviorReported, Input, MonitoredRequirement, StartRun
 from m2pem.engine.run import MissionRun
 from m2pem.engine.state import RunStatus
 from m2pem.fleet.fleet_file import load_fleet
+from m2pem.journal import RunHeader
+from m2pem.journal.sqlite import SqliteJournal
 from m2pem.mission.catalogue import BehaviorState
 from m2pem.mission.mission import Mission
 from m2pem.monitors.run_monitors import RunMonitors
@@ -65,7 +74,7 @@ _PATROL = f"""<definitions xmlns="http://www.omg.org/spec/BPMN/20100524/MODEL"
   {
     "".join(
         f'<scriptTask id="Go{n}"><extensionElements><m2pem:behavior type="vehicle" name="goto">'
-        '<m2pem:properties><m2pem:property name="target" value="38.1, -77.3"/></m2pem:properties>'
+        '<m2pem:properties><m2pem:property name="target" value="gate"/></m2pem:properties>'
         f'<m2pem:resources><m2pem:role name="driver" vehicle="{vehicle}"/></m2pem:resources>'
         "</m2pem:behavior></extensionElements></scriptTask>"
         for n, vehicle in enumerate(_VEHICLES)
@@ -139,27 +148,55 @@ def engine_s(mission: Mission, given: Given, runs: int) -> tuple[float, int]:
     return time.process_time() - begun_s, records
 
 
-def rehearsals_s(required: tuple[MonitoredRequirement, ...]) -> tuple[float, int]:
+def journaled_s(mission: Mission, given: Given) -> tuple[float, int]:
+    """CPU seconds of the engine and its journal on disk, and the number of records."""
+    return asyncio.run(_journaled_s(mission, given))
+
+
+async def _journaled_s(mission: Mission, given: Given) -> tuple[float, int]:
+    with tempfile.TemporaryDirectory(dir=Path.cwd()) as scratch:
+        journal = SqliteJournal.open(Path(scratch, "journal.db"))
+        name = await journal.create(RunHeader("bench.bpmn", mission.source, mission.process().id))
+        records, begun_s = 0, time.process_time()
+        run = MissionRun(mission, FLEET, name)
+        monitors = RunMonitors(run.state, FLEET)
+        for at_us, item in given:
+            steps = [run.receive(item, at_us)]
+            monitors.observe(steps[0].t_us, steps[0].records)
+            for verdict in monitors.take():
+                steps.append(run.receive(verdict, at_us))
+                monitors.observe(steps[-1].t_us, steps[-1].records)
+            await journal.append([entry(name, each) for each in steps])
+            records += sum(len(each.records) for each in steps)
+        took_s = time.process_time() - begun_s
+        await journal.release(name)
+        await journal.close()
+    return took_s, records
+
+
+def rehearsals_s(
+    mission: Mission, required: tuple[MonitoredRequirement, ...], times: int
+) -> tuple[float, int]:
     """CPU seconds of rehearsals, and the number of their records."""
-    mission = parse_mission(with_requirements(required), "survey_pair.bpmn")
-    rehearser = Rehearser(mission, FLEET, PLUGINS)
-    rehearser.rehearse()  # reads the requirements, once for all
+    rehearser = Rehearser(
+        parse_mission(with_requirements(mission, required), mission.file), FLEET, PLUGINS
+    )
+    rehearser.rehearse(data={"n": 0})  # reads the requirements, once for all
     records = 0
     begun_s = time.process_time()
-    for _ in range(REHEARSALS):
-        records += len(rehearser.rehearse().records)
+    for _ in range(times):
+        records += len(rehearser.rehearse(data={"n": 0}).records)
     return time.process_time() - begun_s, records
 
 
-def with_requirements(required: tuple[MonitoredRequirement, ...]) -> bytes:
+def with_requirements(mission: Mission, required: tuple[MonitoredRequirement, ...]) -> bytes:
     """The mission's file with requirements in it."""
     inside = "".join(
         f"<m2pem:requirement id={quoteattr(each.id)} ltl={quoteattr(each.formula)}/>"
         for each in required
     )
-    start = b'<bpmn:startEvent id="StartSurvey"'
-    added = f"<bpmn:extensionElements>{inside}</bpmn:extensionElements>".encode()
-    return MISSION.source.replace(start, added + start, 1)
+    added = rf"<\1extensionElements>{inside}</\1extensionElements>\g<0>".encode()
+    return re.sub(rb"<(bpmn:|)startEvent ", added, mission.source, count=1)
 
 
 def least(
@@ -175,28 +212,33 @@ def least(
     return min(without), min(with_), records
 
 
-def engine_row(name: str, mission: Mission, formulas: Sequence[str], runs: int) -> None:
-    """Print what monitors cost the engine."""
+def row(name: str, times: int, took: tuple[float, float, int]) -> None:
+    """Print what monitors cost. `took`: seconds without and with them, and records."""
+    without, with_, records = took
+    print(
+        f"| {name}, {records // times:,} records | {1e3 * without / times:.2f} "
+        f"| {1e3 * with_ / times:.2f} | {with_ / without - 1:.0%} |"
+    )
+
+
+def rows(name: str, mission: Mission, formulas: Sequence[str], runs: int, rehearsals: int) -> None:
+    """Print what monitors cost in runs of a mission."""
     required = of(formulas, mission)
     given = {each: inputs(mission, each) for each in ((), required)}
-    without, with_, records = least(required, lambda each: engine_s(mission, given[each], runs))
-    print(
-        f"| {name}, {records // runs:,} records: ms of the engine | {1e3 * without / runs:.2f} "
-        f"| {1e3 * with_ / runs:.2f} | {with_ / without - 1:.0%} |"
-    )
+    took = least(required, lambda each: engine_s(mission, given[each], runs))
+    row(f"{name}: engine", runs, took)
+    took = least(required, lambda each: journaled_s(mission, given[each]))
+    row(f"{name}: engine and journal", 1, took)
+    took = least(required, lambda each: rehearsals_s(mission, each, rehearsals))
+    row(f"{name}: rehearsal", rehearsals, took)
 
 
 def main() -> None:
     """Print the table."""
-    print("| | 0 monitors | 20 monitors | more |")
+    print("| ms | 0 monitors | 20 monitors | more |")
     print("|---|---|---|---|")
-    engine_row("short run", MISSION, _FORMULAS, RUNS)
-    engine_row("long run", parse_mission(_PATROL, "patrol.bpmn"), _OF_PATROL, 1)
-    without, with_, _ = least(requirements(), rehearsals_s)
-    print(
-        f"| short run: ms of a rehearsal | {1e3 * without / REHEARSALS:.2f} "
-        f"| {1e3 * with_ / REHEARSALS:.2f} | {with_ / without - 1:.0%} |"
-    )
+    rows("short run", MISSION, _FORMULAS, RUNS, REHEARSALS)
+    rows("long run", parse_mission(_PATROL, "patrol.bpmn"), _OF_PATROL, 1, 1)
 
 
 if __name__ == "__main__":

@@ -147,6 +147,8 @@ class Runner:
         self._strays: frozenset[str] = frozenset()
         self._inbox: list[Input] = []
         self._wake = asyncio.Event()
+        self._timer: asyncio.Task[None] | None = None
+        self._timer_us: int | None = None
         self._withheld: list[c.StartBehavior] = []
         self._submitted: list[tuple[Input, asyncio.Future[Step]]] = []
         self.done = asyncio.Event()
@@ -255,6 +257,7 @@ class Runner:
             log.exception("%s: a bug in m2pem", self.id)
             self._hold_everything(InternalError(f"{type(error).__name__}: {error}"))
         finally:
+            self._set_timer(None)
             self.done.set()
             for _, decided in self._submitted:
                 if not decided.done():
@@ -299,11 +302,9 @@ class Runner:
                 return [self._pause_by_itself() if self._never_waits() else Tick()]
             self._steps_at_wait = self.run.steps_done
             self._wake.clear()
-            dues = [each for each in (due_us, verdict_us) if each is not None]
-            if dues:
-                await self._wait_until(min(dues))
-            else:
-                await self._wake.wait()
+            dues = (each for each in (due_us, verdict_us) if each is not None)
+            self._set_timer(min(dues, default=None))
+            await self._wake.wait()
 
     def _next_verdict_us(self) -> int | None:
         """When time alone may decide a requirement, in microseconds since the Unix epoch."""
@@ -311,6 +312,19 @@ class Runner:
         if due_us is None or state.status is not RunStatus.RUNNING:
             return None
         return due_us + state.started_us + state.paused_total_us
+
+    def _set_timer(self, due_us: int | None) -> None:
+        """Wake the loop then. Few inputs change that time, so the timer is kept."""
+        timer = self._timer
+        if timer is not None and (timer.done() or self._timer_us != due_us):
+            timer.cancel()
+            self._timer = timer = None
+        if timer is None and due_us is not None:
+            self._timer, self._timer_us = asyncio.ensure_future(self._wake_at(due_us)), due_us
+
+    async def _wake_at(self, due_us: int) -> None:
+        await self._context.clock.sleep_until(due_us)
+        self._wake.set()
 
     def measure(self, resource: str, latest: "Latest") -> None:
         """Telemetry of a vehicle has come, or its link is lost: post what changes for requirements.
@@ -342,15 +356,6 @@ class Runner:
         )
         self._context.events.publish(Alert(self.id, "NEVER_WAITS", text, AlertSeverity.ERROR))
         return PauseRun(f"m2pem, as {why}")
-
-    async def _wait_until(self, due_us: int) -> None:
-        woken = asyncio.ensure_future(self._wake.wait())
-        due = asyncio.ensure_future(self._context.clock.sleep_until(due_us))
-        try:
-            await asyncio.wait((woken, due), return_when=asyncio.FIRST_COMPLETED)
-        finally:
-            woken.cancel()
-            due.cancel()
 
     async def _cycle(self, batch: Sequence[Input]) -> None:
         steps = [step for item in batch for step in self._decide_with_verdicts(item)]

@@ -94,6 +94,8 @@ class RunMonitors:
 
     def advance(self, t_us: int) -> None:
         """Mission time has passed without a record."""
+        if (least := self.due_us) is None or least > t_us:
+            return
         for name, each in list(self._timed.items()):
             while (due_us := each.evaluation.due_us) is not None and due_us <= t_us:
                 verdict = each.evaluation.advance(due_us)
@@ -106,8 +108,12 @@ class RunMonitors:
         """The mission time at which time alone may make a verdict certain; None: it cannot."""
         if not self._timed:
             return None
-        dues = (each.evaluation.due_us for each in self._timed.values())
-        return min((due for due in dues if due is not None), default=None)
+        least: int | None = None
+        for each in self._timed.values():
+            due_us = each.evaluation.due_us
+            if due_us is not None and (least is None or due_us < least):
+                least = due_us
+        return least
 
     def take(self) -> list[RequirementDecided]:
         """Return what has become certain, and is not recorded yet; each once."""

@@ -85,6 +85,11 @@ class TimedEvaluation:
         """When moments began that may still decide it, as time passes."""
         self._letters: list[tuple[int, int]] = []
         self._now_us = 0
+        self.due_us: int | None = None
+        """When time alone may decide it: then `advance` is to be called, if nothing comes before.
+
+        A bound belongs to its interval: what comes in the same microsecond counts.
+        """
 
     def read(self, t_us: int, letter: int, unknown: int = 0) -> Verdict:
         """A moment begins, with a letter of which some bits are not known."""
@@ -115,6 +120,7 @@ class TimedEvaluation:
         self._state = before
         self._starts, self._letters, self._changes_us = [2 * t_us], [(letter, unknown)], []
         self.verdict = self._anticipation.verdicts[here]
+        self.due_us = None
         return True
 
     def advance(self, t_us: int) -> Verdict:
@@ -134,15 +140,11 @@ class TimedEvaluation:
         for _, letter, unknown in self._pieces(segments, segments.last_at(settled), known=True):
             state = self._anticipation.step(state, letter, unknown)
         self.verdict = self._anticipation.at_end(state, letter, unknown)
+        self.due_us = None
         return self.verdict
 
-    @property
-    def due_us(self) -> int | None:
-        """When time alone may decide it: then `advance` is to be called, if nothing comes before.
-
-        A bound belongs to its interval: what comes in the same microsecond counts.
-        """
-        if not self._changes_us or self.verdict is not Verdict.OPEN:
+    def _next_due_us(self) -> int | None:
+        if self.verdict is not Verdict.OPEN:
             return None
         now = self._now_us
         dues = (t_us + delay + 1 for t_us in self._changes_us for delay in self._delays_us)
@@ -163,6 +165,7 @@ class TimedEvaluation:
                 self._state, kept = state, last + 1
         self._forget(segments, kept)
         self.verdict = self._anticipation.verdicts[state]
+        self.due_us = self._next_due_us()
         return self.verdict
 
     def _forget(self, segments: Segments, kept: int) -> None:
