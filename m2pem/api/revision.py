@@ -23,7 +23,8 @@ class RevisionEffect:
 class RevisionRefusal:
     """Why a revision cannot be. `candidates`: where the token can go instead, by the ids of
     elements and sequence flows of the new version; the nearest first. `labels`: what operators
-    call each of them. `resources`: the vehicles and payloads that the token commands now."""
+    call each of them. `resources`: the vehicles and payloads that the token commands now.
+    `can_end`: the token can end instead."""
 
     element: str
     token: int
@@ -31,6 +32,7 @@ class RevisionRefusal:
     candidates: tuple[str, ...] = ()
     labels: tuple[str, ...] = ()
     resources: tuple[str, ...] = ()
+    can_end: bool = False
 
 
 @dataclass(frozen=True, slots=True)

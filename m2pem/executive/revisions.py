@@ -145,6 +145,7 @@ class RunRevisions:
                     each.candidates,
                     tuple(called(loaded.elements[id_]) for id_ in each.candidates),
                     _commanded(state, each.token),
+                    each.can_end,
                 )
                 for each in plan.refusals
             ),

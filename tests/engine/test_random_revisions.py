@@ -1,5 +1,6 @@
 """Random missions are revised to others while they run: no token is left without a place."""
 
+from collections import Counter
 from collections.abc import Callable
 from random import Random
 
@@ -21,6 +22,7 @@ from tests.engine.random_play import RandomPlay
 from tests.engine.random_revisions import changed
 from tests.engine.snapshot import snapshot
 from tests.engine.test_random import BATCHES, GRAPH_BATCH, run_seeds
+from tests.engine.ways_out import check_ways_out
 from tests.seeds import examples, seeds_for
 
 DICE = st.randoms(use_true_random=False)
@@ -33,6 +35,8 @@ QUICK = settings(
 FEW = 150
 LONG_S = 600.0
 ROUNDS = 6
+OFFERED: Counter[str] = Counter()
+"""How many ways out were tried: to go elsewhere, and to end."""
 
 
 def another(dice: Random, text: str, now: Mission) -> Mission | None:
@@ -55,6 +59,7 @@ def with_moves(game: RandomPlay, new: Mission, dice: Random) -> tuple[RevisionPl
         assert again == plan or again.digest == plan.digest
         if not plan.refusals:
             return plan, moves
+        OFFERED.update(check_ways_out(state, new, plan, moves, now_us))
         for refusal in plan.refusals:
             assert refusal.text
             if refusal.token and refusal.element not in moves:
@@ -129,8 +134,10 @@ MAKES = pytest.mark.parametrize("make", [structured, graph])
 @MAKES
 def test_some_missions_of_all_sizes_are_revised(make: Callable[[Random], str]) -> None:
     done: list[int] = []
+    OFFERED.clear()
     run_seeds(lambda dice: done.append(one(make, dice)), range(FEW))
     assert sum(done) > FEW / 3, "most revisions are carried out"
+    assert min(OFFERED["go"], OFFERED["end"]) > FEW / 3, "most refusals have ways out"
 
 
 @pytest.mark.long

@@ -12,7 +12,6 @@ from m2pem.engine.execution import definitions_of, is_awaited, triggered_starts
 from m2pem.engine.records import Trigger
 from m2pem.engine.revision.draft import PlanDraft
 from m2pem.engine.revision.plan import Arming, EffectKind, called
-from m2pem.engine.revision.targets import candidates, go_to
 from m2pem.engine.revision.work import has_begun
 from m2pem.engine.state import RunState, Scope, Token, TokenOrScope, Wait
 from m2pem.errors import ExpressionError, ExpressionSyntaxError
@@ -56,10 +55,8 @@ class AwaitedEvents:
             return
         if node in awaited and not restarts and definitions_of(node):
             if not _is_awaited(again):
-                there = candidates(token, again.container)
-                text = f"a token waits at {called(node)}, which awaits nothing in the new version"
-                text = f"{text}: it can {go_to(there)}"
-                self._draft.refuse(node.id, token.id, text, there)
+                why = f"a token waits at {called(node)}, which awaits nothing in the new version"
+                self._draft.refuse_token(token, why, again.container)
                 return
             self._changed(token, node, again, awaited[node])
         if isinstance(node, Activity) and isinstance(again, Activity):
@@ -84,8 +81,8 @@ class AwaitedEvents:
         old = [flow.target for flow in node.outgoing]
         new = [flow.target for flow in again.outgoing]
         if node.parallel and [plain(each) for each in old] != [plain(each) for each in new]:
-            text = f"{called(node)} waits for all events after it: they cannot change meanwhile"
-            self._draft.refuse(node.id, token.id, text)
+            why = f"{called(node)} waits for all events after it, which change"
+            self._draft.refuse_token(token, why, again.container)
             return
         self._compare(token, old, new, awaited, may_arm=True)
 
@@ -150,8 +147,7 @@ class AwaitedEvents:
             return
         several = isinstance(node, Event) and node.parallel_multiple
         if several and len(waits) < len(definitions_of(node)):
-            text = f"{called(node)} has had one of its triggers, and they change: keep them"
-            self._draft.refuse(node.id, holder.id if isinstance(holder, Token) else 0, text)
+            self._changes_in_between(holder, node, again)
             return
         for wait in waits:
             self._draft.disarm(wait)
@@ -162,6 +158,17 @@ class AwaitedEvents:
         self._add(EffectKind.REARMS, holder, again, text)
         if _is_awaited(again):
             self._draft.arm(_arming(holder, again, since_us))
+
+    def _changes_in_between(self, holder: TokenOrScope, node: FlowNode, again: FlowNode) -> None:
+        """Refuse other triggers of an event that has had one of several."""
+        why = f"{called(node)} has had one of its triggers, and they change"
+        token = holder if isinstance(holder, Token) else holder.owner
+        if token is None:
+            self._draft.refuse(node.id, f"{why}: keep them")
+            return
+        on = self._new.elements[token.node.id]
+        assert isinstance(on, FlowNode)
+        self._draft.refuse_token(token, why, on.container)
 
     def _when(self, holder: TokenOrScope, event: FlowNode, since_us: int) -> str:
         """Return when a duration is over that counts from when it was armed, for a sentence."""

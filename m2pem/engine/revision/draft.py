@@ -1,6 +1,6 @@
 """A plan of a revision in the making."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 from m2pem.engine.revision.plan import (
     Arming,
@@ -10,8 +10,10 @@ from m2pem.engine.revision.plan import (
     Refusal,
     RevisionPlan,
 )
+from m2pem.engine.revision.targets import candidates, moved_with, way_out
 from m2pem.engine.state import RunState, Scope, Token, Wait
 from m2pem.mission.difference import Difference, difference
+from m2pem.mission.elements import Container
 from m2pem.mission.mission import Mission
 from m2pem.mission.version import version_of
 
@@ -35,9 +37,24 @@ class PlanDraft:
         """Add what the revision does."""
         self._effects.append(Effect(kind, element, token, text))
 
-    def refuse(self, element: str, token: int, text: str, candidates: Sequence[str] = ()) -> None:
-        """Add why the revision cannot be."""
-        self._refusals.append(Refusal(element, token, text, tuple(candidates)))
+    def refuse(self, element: str, text: str, token: int = 0) -> None:
+        """Add why the revision cannot be, where the way out is another one than moving a token."""
+        self._refusals.append(Refusal(element, token, text))
+
+    def refuse_token(self, token: Token, why: str, container: Container) -> None:
+        """Add why a token cannot be on its element in the new version, and where it can go.
+
+        `container`: that of the token's scope in the new version.
+        """
+        moved = moved_with(token)
+        there = candidates(moved, container)
+        refusal = _refusal_of(moved, f"{why}: {way_out(moved, there)}", there)
+        if refusal not in self._refusals:  # as of several instances
+            self._refusals.append(refusal)
+
+    def refuse_move(self, token: Token, why: str, container: Container) -> None:
+        """Add why a token cannot go where it is to go. `why` says where it can."""
+        self._refusals.append(_refusal_of(token, why, candidates(token, container)))
 
     def move(self, move: Move) -> None:
         """Have a token leave its element."""
@@ -81,3 +98,8 @@ class PlanDraft:
             tuple(self._armings),
             tuple(self._rechecked),
         )
+
+
+def _refusal_of(token: Token, text: str, there: tuple[str, ...]) -> Refusal:
+    """Return the refusal of a token that can go to some elements, and end unless it undoes one."""
+    return Refusal(token.node.id, token.id, text, there, token.compensates is None)

@@ -44,12 +44,14 @@ class Effect:
 @dataclass(frozen=True, slots=True)
 class Refusal:
     """Why a revision cannot be, and the way out. `candidates`: where the token can go instead, by
-    the ids of elements and sequence flows of the new version."""
+    the ids of elements and sequence flows of the new version. `can_end`: it can end instead. A
+    refusal of an instance is one of its activity as a whole."""
 
     element: str
     token: int
     text: str
     candidates: tuple[str, ...] = ()
+    can_end: bool = False
 
 
 @dataclass(frozen=True, slots=True)

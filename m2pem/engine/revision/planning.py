@@ -11,7 +11,7 @@ from m2pem.engine.apply.tokens import is_join
 from m2pem.engine.revision.awaited import AwaitedEvents
 from m2pem.engine.revision.draft import PlanDraft
 from m2pem.engine.revision.plan import EffectKind, Move, RevisionPlan, called
-from m2pem.engine.revision.targets import candidates, go_to, why_not
+from m2pem.engine.revision.targets import why_not
 from m2pem.engine.revision.work import plan_work, same_instances
 from m2pem.engine.state import CompletedActivity, RunState, RunStatus, Scope, Token
 from m2pem.mission.difference import plain
@@ -59,10 +59,10 @@ class _Planning:
     def plan(self) -> RevisionPlan:
         state, draft = self._state, self._draft
         if state.status in (RunStatus.NEW, RunStatus.ENDED):
-            draft.refuse("", 0, f"the run is {state.status.value}: only one under way is revised")
+            draft.refuse("", f"the run is {state.status.value}: only one under way is revised")
             return draft.finish()
         if draft.is_unchanged and not self._moves:
-            draft.refuse("", 0, "the run has this version already, and no token is moved")
+            draft.refuse("", "the run has this version already, and no token is moved")
             return draft.finish()
         for scope in state.scopes.values():
             if scope.owner is None:
@@ -72,7 +72,7 @@ class _Planning:
         root = state.root
         if root is not None and root.id not in state.scopes and self._process(root) is None:
             text = f"the run began with {called(root.container)}: keep it in the new version"
-            draft.refuse(root.container.id, 0, text)
+            draft.refuse(root.container.id, text)
         self._unused_moves()
         self._data_stores()
         return draft.finish()
@@ -86,7 +86,7 @@ class _Planning:
                 text = f"no token is on {called(old[element])}, which is to be moved"
             else:
                 text = f"the mission has no element {element!r}; {did_you_mean(element, old)}"
-            self._draft.refuse(element, 0, text)
+            self._draft.refuse(element, text)
 
     def _data_stores(self) -> None:
         state = self._state
@@ -95,7 +95,7 @@ class _Planning:
             if any(name.partition(".")[0] == key for name in values | set(state.shared.data)):
                 what = "is a data store now" if key in self._new.data_stores else "is none now"
                 text = f"{key!r} has a value, and {what}: give the data store another name"
-                self._draft.refuse("", 0, text)
+                self._draft.refuse("", text)
 
     # --- scopes ---------------------------------------------------------------------------------
 
@@ -104,7 +104,7 @@ class _Planning:
         process = self._process(scope)
         if process is None:
             text = f"{called(scope.container)} is under way, and not in the new version"
-            self._draft.refuse(scope.container.id, 0, f"{text}: keep it, or stop the run")
+            self._draft.refuse(scope.container.id, f"{text}: keep it, or stop the run")
             return
         self._waiting.append((scope, process))
 
@@ -127,7 +127,7 @@ class _Planning:
                     f"{called(node)} has taken {', '.join(flow.id for flow in used)}, and waits to "
                     "reset: its incoming sequence flows cannot change before it has"
                 )
-                self._draft.refuse(node.id, 0, text)
+                self._draft.refuse(node.id, text)
         if isinstance(scope.container, AdHocSubProcess) and scope.loop is None:
             self._ad_hoc(scope, container)
 
@@ -139,10 +139,9 @@ class _Planning:
         draft, token = self._draft, scope.owner
         number = token.id if token is not None else 0
         if (old.active_elements is None) != (container.active_elements is None):
-            text = (
-                f"who chooses the activities of {called(old)} cannot change while it is under way"
-            )
-            draft.refuse(old.id, number, text)
+            why = f"who chooses the activities of {called(old)} changes while it is under way"
+            assert token is not None
+            draft.refuse_token(token, why, container.container)
             return
         there = {node.id for node in container.entries}
         for node in scope.chosen:
@@ -184,17 +183,13 @@ class _Planning:
                 self._waiting.append((token.inner, _inside(token.inner, again)))
 
     def _homeless(self, token: Token, container: Container, why: str) -> None:
-        there = candidates(token, container)
-        doing = _doing(self._state, token)
-        text = f"a token is on {called(token.node)}, {why}{doing}: it can {go_to(there)}"
-        if token.compensates is not None:
-            text = f"a token undoes {called(token.node)}, {why}: wait until that is done"
-        self._draft.refuse(token.node.id, token.id, text, there)
+        text = f"a token is on {called(token.node)}, {why}{_doing(self._state, token)}"
+        self._draft.refuse_token(token, text, container)
 
     def _move(self, token: Token, container: Container, target: str) -> None:
         node = token.node
         if refusal := why_not(token, container, target, self._new):
-            self._draft.refuse(node.id, token.id, refusal, candidates(token, container))
+            self._draft.refuse_move(token, refusal, container)
             return
         ending = _ending(self._state, token)
         if target:
@@ -234,26 +229,24 @@ class _Planning:
         if not isinstance(node, Activity) or not isinstance(again, Activity):
             return True
         if token.instance is None and (why := same_instances(token, node, again)):
-            draft.refuse(node.id, token.id, f"{why} {_or_begin_again(node)}", (node.id,))
+            draft.refuse_token(token, why, again.container)
             return False
         gathered = token.scope.gathered.get(node)
         if gathered and node.start_quantity != again.start_quantity:
-            text = (
+            why = (
                 f"{len(gathered)} tokens wait at {called(node)}, of which the startQuantity changes"
             )
-            draft.refuse(node.id, token.id, f"{text} {_or_begin_again(node)}", (node.id,))
+            draft.refuse_token(token, why, again.container)
             return False
         other = _called_id(node) != _called_id(again)
         if other and token.inner is not None and token.inner.loop is None:
-            text = (
-                f"{called(node)} has called {_called_id(node)}, and now calls {_called_id(again)}"
-            )
-            draft.refuse(node.id, token.id, f"{text} {_or_begin_again(node)}", (node.id,))
+            why = f"{called(node)} has called {_called_id(node)}, and now calls {_called_id(again)}"
+            draft.refuse_token(token, why, again.container)
             return False
         begun_by_event = isinstance(node, SubProcess) and node.triggered_by_event
         if begun_by_event != (isinstance(again, SubProcess) and again.triggered_by_event):
-            text = f"{called(node)} is under way, and is begun in another way in the new version"
-            draft.refuse(node.id, token.id, text)
+            why = f"{called(node)} is under way, and is begun in another way in the new version"
+            draft.refuse_token(token, why, again.container)
             return False
         return True
 
@@ -277,23 +270,23 @@ class _Planning:
         there = type(again) is type(node) and isinstance(again, Activity)
         if not there or not isinstance(again, Activity) or again.container is not container:
             text = f"{called(node)} has completed and may be undone: keep it in the new version"
-            self._draft.refuse(node.id, 0, text)
+            self._draft.refuse(node.id, text)
             return None
         kept = completion.kept_scope
         if kept is None:
             old, new = node.compensation, again.compensation
             if old is not None and (new is None or new.id != old.id or type(new) is not type(old)):
                 text = f"{called(node)} has completed, and {called(old)} is to undo it: keep both"
-                self._draft.refuse(node.id, 0, text)
+                self._draft.refuse(node.id, text)
             return None
         if again.compensation is not None:
             text = f"{called(node)} has completed and is undone by what was done in it: keep that"
-            self._draft.refuse(node.id, 0, text)
+            self._draft.refuse(node.id, text)
             return None
         other = _called_id(again) != _called_id(node)
         if other and kept.loop is None:
             text = f"{called(node)} has called {_called_id(node)}, which may be undone: keep it"
-            self._draft.refuse(node.id, 0, text)
+            self._draft.refuse(node.id, text)
             return None
         return _inside(kept, again)
 
@@ -310,10 +303,6 @@ def _inside(scope: Scope, node: FlowNode) -> Container:
 
 def _called_id(node: Activity) -> str:
     return node.called.id if isinstance(node, CallActivity) else ""
-
-
-def _or_begin_again(node: FlowNode) -> str:
-    return f"(a move of {node.id} to itself begins it again)"
 
 
 def _a(kind: str) -> str:

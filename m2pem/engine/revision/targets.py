@@ -18,6 +18,14 @@ NAMED = 6
 """Candidates that a refusal names in its sentence, at most."""
 
 
+def moved_with(token: Token) -> Token:
+    """Return the token that is moved in place of one: an instance of a loop or multi-instance
+    activity is moved with its activity as a whole."""
+    while token.instance is not None and token.scope.owner is not None:
+        token = token.scope.owner
+    return token
+
+
 def candidates(token: Token, container: Container) -> tuple[str, ...]:
     """Return where a token can go in the container that its scope has in the new version, the
     nearest after its element in the old version first."""
@@ -66,14 +74,20 @@ def why_not(token: Token, container: Container, target: str, new: Mission) -> st
     return f"the token on {what!r} stays in {container.label!r}; {_can(there)}"
 
 
-def _can(there: Collection[str]) -> str:
-    return f"it can {go_to(there)}"
+def way_out(token: Token, there: Collection[str]) -> str:
+    """Return what can be done about a token that cannot stay, as the rest of a sentence.
+
+    `there`: its candidates.
+    """
+    if token.compensates is not None:
+        return "it undoes an activity: wait until that is done"
+    return _can(there, token.node.id)
 
 
-def go_to(there: Collection[str]) -> str:
-    """Return where a token can go, as the rest of a sentence."""
+def _can(there: Collection[str], again: str = "") -> str:
+    """Return where a token can go. `again`: its element, which begins again then."""
     if not there:
-        return "end"
-    listed = list(there)[:NAMED]
+        return "it can end"
+    listed = [f"{each} (begins again)" if each == again else each for each in list(there)[:NAMED]]
     more = f" (and {len(there) - NAMED} more)" if len(there) > NAMED else ""
-    return f"go to {', '.join(listed)}{more}, or end"
+    return f"it can go to {', '.join(listed)}{more}, or end"

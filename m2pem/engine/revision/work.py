@@ -74,7 +74,7 @@ def plan_work(
     behavior = state.behaviors.get(token.behavior)
     if behavior is not None and behavior.phase is BehaviorPhase.UNSETTLED:
         text = f"answer prompt {token.prompt} first: it is not known what {doing} does"
-        draft.refuse(node.id, token.id, f"{what} of {called(node)} changes: {text}")
+        draft.refuse(node.id, f"{what} of {called(node)} changes: {text}", token.id)
         return False
     text = f"{what} of {called(again)} changes: {doing} is cancelled and the task begins again"
     draft.add(EffectKind.RESTARTS, node.id, token.id, text)

@@ -49,6 +49,7 @@ async def test_what_is_refused_says_where_the_token_can_go(world: MakeWorld) -> 
         assert (refusal["element"], refusal["candidates"]) == ("Question", ["End", "Another"])
         assert refusal["labels"] == ["end event End", "user task Another"]
         assert refusal["resources"] == []
+        assert refusal["can_end"] is True
         refused = await browser.http.post(path, json={"mission": "gone", "plan": plan["plan"]})
         assert refused.status_code == 409
         assert "a token is on user task Question" in refused.text

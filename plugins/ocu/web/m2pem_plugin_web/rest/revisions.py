@@ -58,7 +58,7 @@ class EffectModel(BaseModel):
 
 class RefusalModel(BaseModel):
     """Why it cannot be. `candidates`: where the token can go instead, `labels`: what each of them
-    is called. `resources`: what the token commands now."""
+    is called. `resources`: what the token commands now. `can_end`: it can end instead."""
 
     element: str
     token: int
@@ -66,6 +66,7 @@ class RefusalModel(BaseModel):
     candidates: list[str]
     labels: list[str]
     resources: list[str]
+    can_end: bool
 
 
 class PlanModel(BaseModel):
@@ -111,6 +112,7 @@ def plan_model(preview: RevisionPreview) -> PlanModel:
                 candidates=list(each.candidates),
                 labels=list(each.labels),
                 resources=list(each.resources),
+                can_end=each.can_end,
             )
             for each in preview.refusals
         ],

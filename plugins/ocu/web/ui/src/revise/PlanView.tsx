@@ -113,7 +113,7 @@ interface MoveProps {
   move(element: string, target: string | undefined): void;
 }
 
-function Move({ choice: { element, targets }, moves, move }: MoveProps) {
+function Move({ choice: { element, targets, canEnd }, moves, move }: MoveProps) {
   return (
     <label class="rev-move">
       {fill(words.moveOf, { element })}{" "}
@@ -129,7 +129,7 @@ function Move({ choice: { element, targets }, moves, move }: MoveProps) {
             {fill(words.moveTo, { element: label })}
           </option>
         ))}
-        <option value="">{words.moveEnd}</option>
+        {canEnd && <option value="">{words.moveEnd}</option>}
       </select>
     </label>
   );

@@ -14,13 +14,19 @@ const PLAN: Plan = {
   approval: "",
 };
 
-const refusal = (element: string, token: number, candidates: string[]): Refusal => ({
+const refusal = (
+  element: string,
+  token: number,
+  candidates: string[],
+  can_end = candidates.length > 0,
+): Refusal => ({
   element,
   token,
   text: `a token is on ${element}`,
   candidates,
   labels: candidates.map((id) => `task ${id}`),
   resources: [],
+  can_end,
 });
 
 describe("the plan of a revision", () => {
@@ -37,8 +43,13 @@ describe("the plan of a revision", () => {
   it("offers a choice for each element with tokens that can go elsewhere", () => {
     const plan = { ...PLAN, refusals: [refusal("Fly", 1, ["Land"]), refusal("Fly", 2, ["Land"])] };
     expect(choicesWith([], plan)).toEqual([
-      { element: "Fly", targets: [{ id: "Land", label: "task Land" }] },
+      { element: "Fly", targets: [{ id: "Land", label: "task Land" }], canEnd: true },
     ]);
+  });
+
+  it("offers a token that can go nowhere to end, where it can", () => {
+    const plan = { ...PLAN, refusals: [refusal("Handle", 4, [], true)] };
+    expect(choicesWith([], plan)).toEqual([{ element: "Handle", targets: [], canEnd: true }]);
   });
 
   it("offers none where no token can go elsewhere", () => {
@@ -47,7 +58,9 @@ describe("the plan of a revision", () => {
   });
 
   it("keeps the choices that were made when the next plan refuses them no more", () => {
-    const known = [{ element: "Fly", targets: [{ id: "Land", label: "task Land" }] }];
+    const known = [
+      { element: "Fly", targets: [{ id: "Land", label: "task Land" }], canEnd: true },
+    ];
     const plan = { ...PLAN, refusals: [refusal("Look", 3, ["Land"])] };
     expect(choicesWith(known, plan).map(({ element }) => element)).toEqual(["Fly", "Look"]);
   });

@@ -16,6 +16,7 @@ export interface Refusal {
   candidates: string[];
   labels: string[];
   resources: string[];
+  can_end: boolean;
 }
 
 export interface Plan {
@@ -43,6 +44,7 @@ export type Moves = Readonly<Record<string, string>>;
 export interface Choice {
   element: string;
   targets: readonly { id: string; label: string }[];
+  canEnd: boolean;
 }
 
 /** What concerns vehicles comes first; otherwise in the order of the plan. */
@@ -56,11 +58,10 @@ export function vehiclesFirst<T extends { resources: readonly string[] }>(all: r
 /** The choices that were known, and those of the tokens that a plan refuses to leave where they are. */
 export function choicesWith(known: readonly Choice[], plan: Plan): Choice[] {
   const found = new Map(known.map((each) => [each.element, each]));
-  for (const { element, token, candidates, labels } of plan.refusals) {
-    if (token === 0 || (candidates.length === 0 && !found.has(element))) continue;
-    if (found.has(element)) continue;
+  for (const { element, candidates, labels, can_end } of plan.refusals) {
+    if (found.has(element) || (candidates.length === 0 && !can_end)) continue;
     const targets = candidates.map((id, at) => ({ id, label: labels[at] ?? id }));
-    found.set(element, { element, targets });
+    found.set(element, { element, targets, canEnd: can_end });
   }
   return [...found.values()];
 }
