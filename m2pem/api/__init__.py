@@ -108,7 +108,12 @@ if TYPE_CHECKING:
         raw_parameters,
         restored_work,
     )
-    from m2pem.api.revision import RevisionEffect, RevisionPreview, RevisionRefusal
+    from m2pem.api.revision import (
+        RevisionEffect,
+        RevisionPreview,
+        RevisionRefusal,
+        RunVersion,
+    )
     from m2pem.api.run_view import RunView
     from m2pem.api.runs import (
         CONTROL_REQUEST,
@@ -264,7 +269,7 @@ _MODULES = {
     "m2pem.api.remaining": (
         "RemainingRoute RemainingSurvey RemainingWork raw_parameters restored_work"
     ),
-    "m2pem.api.revision": "RevisionEffect RevisionPreview RevisionRefusal",
+    "m2pem.api.revision": "RevisionEffect RevisionPreview RevisionRefusal RunVersion",
     "m2pem.api.run_view": "RunView",
     "m2pem.api.runs": (
         "CONTROL_REQUEST NEWS SCHEDULE Alert GeometryVersion HandedOver IncidentPreview"
@@ -482,6 +487,7 @@ __all__ = [
     "RunId",
     "RunStatus",
     "RunSummary",
+    "RunVersion",
     "RunView",
     "SearchLimits",
     "SearchProgress",

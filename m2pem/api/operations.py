@@ -28,7 +28,7 @@ from m2pem.api.authoring import MissionFiles
 from m2pem.api.control import MissionControl
 from m2pem.api.health import ExecutiveAddress, HealthCheck
 from m2pem.api.people import OpenControlRequest, OperatorPresence, OperatorsChanged
-from m2pem.api.revision import RevisionPreview
+from m2pem.api.revision import RevisionPreview, RunVersion
 from m2pem.api.runs import (
     Alert,
     GeometryVersion,
@@ -115,6 +115,13 @@ class Resolve(Choice, frozen=True):
 
     by: str = ""
     even_if_stuck: bool = False
+
+
+class OfVersion(Params, frozen=True):
+    """As `MissionControl.version_files`."""
+
+    run: str
+    version: str
 
 
 class PlanRevision(Params, frozen=True):
@@ -430,6 +437,8 @@ OPERATIONS: dict[str, Operation] = {
         Operation("incidents", Nothing, list[OpenIncident]),
         Operation("preview_incident", Choice, IncidentPreview, alone=True),
         Operation("resolve_incident", Resolve, alone=True),
+        Operation("versions", OfRun, list[RunVersion]),
+        Operation("version_files", OfVersion, MissionFiles),
         Operation("plan_revision", PlanRevision, RevisionPreview, alone=True),
         Operation("revise", Revision, alone=True),
         Operation("alerts", Alerts, list[OperatorAlert]),

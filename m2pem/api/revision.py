@@ -1,9 +1,27 @@
-"""What a revision of a running mission would do, as operators see it before it is done."""
+"""What a revision of a running mission would do, as operators see it before it is done; and the
+versions that a run has had."""
 
 from dataclasses import dataclass
 
 from m2pem.api.runs import IncidentPreview, RunId
 from m2pem.findings import Finding, Severity
+
+
+@dataclass(frozen=True, slots=True)
+class RunVersion:
+    """A version of its mission that a run has, or has had, from record `seq` on.
+
+    `version`: of the files; the same files have the same one. `mission`: the file's name. `at_us`:
+    microseconds since the Unix epoch, by the executive's clock. `by`: who began the run, or revised
+    it. `shared_with`: other runs under way that have this version now.
+    """
+
+    version: str
+    mission: str
+    seq: int
+    at_us: int
+    by: str
+    shared_with: tuple[RunId, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -107,7 +107,7 @@ async def _versions(url: str | None, run_ids: tuple[str, ...]) -> "list[dict[str
     """Return each version of a mission that a run has had, in the order of the runs."""
     from m2pem.cli.journals import find_run, journal_to_read
     from m2pem.executive.run_summary import summary
-    from m2pem.mission.version import version_of_files
+    from m2pem.executive.run_versions import versions_of
 
     found: list[dict[str, Any]] = []
     async with journal_to_read(url) as journal:
@@ -115,23 +115,18 @@ async def _versions(url: str | None, run_ids: tuple[str, ...]) -> "list[dict[str
         for line in lines:
             if line.gone:
                 continue
-            header = line.header
-            first = version_of_files(header.mission, header.library)
-            had = [(first, header.mission_name, 1, "")]
-            for entry in await journal.revisions(line.run):
-                item = entry.revision
-                if item is not None:
-                    had.append((item.version, item.mission_name, entry.seq, item.by))
-            for number, (version, mission, seq, by) in enumerate(had, 1):
+            had = [version for version, _ in await versions_of(journal, line)]
+            for each in had:
                 found.append(
                     {
                         "run": line.run,
                         "status": summary(line).status.value,
-                        "version": version,
-                        "mission": mission,
-                        "seq": seq,
-                        "by": by,
-                        "is_last": number == len(had),
+                        "version": each.version,
+                        "mission": each.mission,
+                        "seq": each.seq,
+                        "at_us": each.at_us,
+                        "by": each.by,
+                        "is_last": each is had[-1],
                     }
                 )
     return found
@@ -147,13 +142,14 @@ def _print_versions(found: "list[dict[str, Any]]", output: str) -> None:
     if not found:
         click.echo("no runs yet")
         return
-    header = ("RUN", "STATUS", "VERSION", "", "FROM RECORD", "BY", "MISSION")
+    header = ("RUN", "STATUS", "VERSION", "", "SINCE (UTC)", "FROM RECORD", "BY", "MISSION")
     rows = [
         (
             each["run"],
             each["status"],
             each["version"][:SHORT],
             "last" if each["is_last"] else "",
+            _time(each["at_us"]),
             str(each["seq"]),
             each["by"],
             each["mission"],

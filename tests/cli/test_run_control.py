@@ -71,6 +71,8 @@ OTHERWISE = {
     "incidents": "m2pem incidents, which tests/cli/test_incidents.py tries",
     "preview_incident": "m2pem resolve asks it first",
     "resolve_incident": "m2pem resolve",
+    "versions": "m2pem runs --versions reads the journal",
+    "version_files": "m2pem runs --export has the files of all versions",
     "plan_revision": "m2pem revise asks it first",
     "revise": "m2pem revise, which tests/cli/test_revise.py tries",
     "runs": "m2pem runs, and runs in m2pem attach",

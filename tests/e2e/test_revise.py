@@ -78,6 +78,7 @@ def test_a_route_that_is_driven_is_changed_and_a_task_is_added(
     assert (first["seq"], first["mission"], first["is_last"]) == (1, str(long), False)
     assert (last["by"], last["mission"], last["is_last"]) == ("anna@here", str(short), True)
     assert last["version"] == version_of_files(short.read_bytes(), ())
+    assert last["at_us"] >= first["at_us"] > 0
     assert last["version"][:12] in m2pem.run("runs", "--versions")[1]
     program.until_record("TokenEntered", element="Stop")
     program.until_record("RunEnded", outcome="completed")

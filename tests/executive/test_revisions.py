@@ -94,6 +94,31 @@ def test_a_plan_that_holds_no_more_is_refused(play):
     play(story, "ugv1")
 
 
+def test_a_run_goes_back_to_a_version_that_it_has_had(play):
+    async def story(world: World):
+        control = world.executive.control
+        run = await begun(world)
+        plan = await control.plan_revision(run, TWO)
+        await control.revise(run, TWO, plan.plan, by="anna")
+        first, last = await control.versions(run)
+        assert (first.version, first.seq) == (version_of_files(FIRST, ()), 1)
+        assert (last.version, last.by) == (plan.version, "anna")
+        files = await control.version_files(run, first.version)
+        plan = await control.plan_revision(run, files)
+        await control.revise(run, files, plan.plan, by="bert")
+        assert [each.by for each in (await control.versions(run))[1:]] == ["anna", "bert"]
+        world.fake.report(f"{run}.b1", SUCCEEDED)
+        summary = await control.wait(run)
+        assert len(await control.versions(run)) == 3, "also when it has ended"
+        with pytest.raises(OperatorError, match="r1 has not had version 'x'; it has had "):
+            await control.version_files(run, "x")
+        with pytest.raises(OperatorError, match="the journal has no run r9"):
+            await control.versions("r9")
+        return summary
+
+    assert play(story, "ugv1").status is RunStatus.COMPLETED
+
+
 def test_a_version_that_does_not_fit_the_fleet_is_refused(play):
     async def story(world: World):
         control = world.executive.control

@@ -1,15 +1,32 @@
 """Operations on the versions of running missions."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Protocol
 
-from m2pem.api.authoring import MissionSource
-from m2pem.api.revision import RevisionPreview
+from m2pem.api.authoring import MissionFiles, MissionSource
+from m2pem.api.revision import RevisionPreview, RunVersion
 from m2pem.api.runs import RunId
 
 
 class RevisionControl(Protocol):
     """The operations of `MissionControl` on the versions of running missions."""
+
+    async def versions(self, run: RunId) -> Sequence[RunVersion]:
+        """Return each version of its mission that a run has had, the present one last; also of a
+        run that has ended.
+
+        Raises:
+            OperatorError: the journal has no such run.
+        """
+        ...
+
+    async def version_files(self, run: RunId, version: str) -> MissionFiles:
+        """Return the files of a version that a run has had: to look at, or to revise it back.
+
+        Raises:
+            OperatorError: the journal has no such run, or it has not had that version.
+        """
+        ...
 
     async def plan_revision(
         self, run: RunId, mission: MissionSource, *, moves: Mapping[str, str] | None = None

@@ -74,6 +74,8 @@ SERVED_OTHERWISE = {
     "fleet": "/diagnostics names its vehicles and payloads",
 }
 NOT_SERVED = {
+    "versions": "m2pem runs --versions and the page list them",
+    "version_files": "m2pem runs --versions and the page list them",
     "plan_revision": "m2pem revise shows the plan: an operator must read it before",
     "revise": "m2pem revise: an operator must read the plan before",
     "request_control": "operators over ROS take what is free; take_vehicle names the holder",

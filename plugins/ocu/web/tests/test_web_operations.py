@@ -8,7 +8,7 @@ import httpx
 import pytest
 from fastapi import FastAPI
 from m2pem_plugin_web.live.standbys import Standbys
-from m2pem_plugin_web.rest import alerts, incidents, people, schedule, standbys, steering
+from m2pem_plugin_web.rest import alerts, incidents, people, revisions, schedule, standbys, steering
 from rest_world import As, app_of
 
 from m2pem.api import (
@@ -102,6 +102,8 @@ QUERIES = {
     "runs": "/api/runs",
     "records": "/api/runs/{run}/records",
     "mission": "/api/runs/{run}/mission",
+    "versions": "/api/runs/{run}/versions",
+    "version_files": "/api/runs/{run}/mission",
     "mission_time_s": "/api/runs/{run}",
     "prompts": "/api/prompts",
     "incidents": "/api/incidents",
@@ -179,6 +181,7 @@ def app(control: Mock) -> FastAPI:
         alerts.router(control),
         people.router(control),
         standbys.router(Standbys(control)),
+        revisions.router(control, Mock()),
     )
 
 

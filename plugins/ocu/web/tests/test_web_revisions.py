@@ -97,3 +97,53 @@ async def test_only_who_starts_missions_revises_them(world: MakeWorld) -> None:
         body = {**wanted, "plan": plan.json()["plan"]}
         assert (await operator.http.post(path, json=body)).status_code == 403
         assert (await viewer.http.post(f"{path}/plan", json=wanted)).status_code == 403
+
+
+async def test_versions_are_listed_and_a_run_is_revised_back(world: MakeWorld) -> None:
+    async with world(users={"carol": Role.COMMANDER}) as here:
+        asked = await here.asked()
+        path = f"/api/runs/{asked.run}"
+        browser = await here.browser("carol")
+        (begun,) = (await browser.http.get(f"{path}/versions")).json()
+        assert (begun["seq"], begun["shared_with"]) == (1, [])
+        other = await here.asked()
+        wanted = {"mission": "other", "xml": OTHER.decode()}
+        plan = (await browser.http.post(f"{path}/revision/plan", json=wanted)).json()
+        done = await browser.http.post(f"{path}/revision", json={**wanted, "plan": plan["plan"]})
+        assert done.status_code == 204
+        first, last = (await browser.http.get(f"{path}/versions")).json()
+        assert first == {**begun, "shared_with": [other.run]}
+        assert (last["version"], last["by"]) == (plan["version"], "carol")
+        assert last["seq"] > 1
+        assert last["at_us"] >= first["at_us"] > 0
+
+        drawn = await browser.http.get(f"{path}/mission", params={"version": first["version"]})
+        (file,) = drawn.json()["files"]
+        assert "Really go on?" not in file["xml"]
+        back = {"had": first["version"]}
+        plan = (await browser.http.post(f"{path}/revision/plan", json=back)).json()
+        assert (plan["version"], plan["previous"]) == (first["version"], last["version"])
+        done = await browser.http.post(f"{path}/revision", json={**back, "plan": plan["plan"]})
+        assert done.status_code == 204
+        versions = (await browser.http.get(f"{path}/versions")).json()
+        assert [each["version"] for each in versions] == [
+            first["version"],
+            last["version"],
+            first["version"],
+        ]
+
+
+async def test_a_version_that_the_run_has_not_had_is_refused(world: MakeWorld) -> None:
+    async with world() as here:
+        asked = await here.asked()
+        path = f"/api/runs/{asked.run}"
+        browser = await here.browser()
+        answer = await browser.http.post(f"{path}/revision/plan", json={"had": "0" * 64})
+        assert answer.status_code == 409
+        assert "has not had version '000000000000'; it has had" in answer.text
+        drawn = await browser.http.get(f"{path}/mission", params={"version": "0" * 64})
+        assert drawn.status_code == 409
+        assert (await browser.http.get("/api/runs/r99/versions")).status_code == 404
+        for wrong in ({}, {"mission": "other", "had": "0"}, {"had": "0", "xml": "<a/>"}):
+            sent = await browser.http.post(f"{path}/revision/plan", json=wrong)
+            assert sent.status_code == 422

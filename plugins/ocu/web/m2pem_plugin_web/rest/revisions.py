@@ -1,17 +1,25 @@
-"""/api/runs/{run}/revision: a running mission goes on with a new version of its file."""
+"""/api/runs/{run}/revision: a running mission goes on with a new version of its file; and the
+versions that it has had."""
 
 from typing import Annotated
 
 from fastapi import APIRouter
 from pydantic import BaseModel, Field, model_validator
 
-from m2pem.api import Draft, MissionControl, RevisionPreview
-from m2pem_plugin_web.access.permissions import Commander, Operator
+from m2pem.api import Draft, MissionControl, MissionSource, RevisionPreview
+from m2pem_plugin_web.access.permissions import Commander, Operator, Viewer
 from m2pem_plugin_web.missions.folder import MissionFolder
 from m2pem_plugin_web.problems import RESPONSES
 from m2pem_plugin_web.rest.drafts import WrittenName, of_folder, source_of
 from m2pem_plugin_web.rest.incidents import OutlookModel
-from m2pem_plugin_web.rest.models import Body, FindingModel, Name, finding_models, known_run
+from m2pem_plugin_web.rest.models import (
+    Body,
+    FindingModel,
+    Name,
+    find_run,
+    finding_models,
+    known_run,
+)
 
 MOST_MOVES = 1000
 
@@ -20,20 +28,26 @@ class NewVersionModel(Body):
     """A new version: a mission of the folder. `version`: of that mission, None for its newest.
 
     `xml`: the new version itself, which is not saved; it is called as `mission`, and may use the
-    other files of the folder.
+    other files of the folder. `had`: in place of all these, a version that the run has had.
 
     `moves`: by element, the element or sequence flow that its token goes to first; "": it ends.
     """
 
-    mission: WrittenName
+    mission: WrittenName | None = None
     version: str | None = None
     xml: str | None = None
+    had: Name | None = None
     moves: Annotated[dict[Name, str], Field(max_length=MOST_MOVES)] = Field(default_factory=dict)
 
     @model_validator(mode="after")
     def _one_of_both(self) -> "NewVersionModel":
-        if self.xml is not None and self.version is not None:
-            raise ValueError("send xml, or a version of a mission of the folder, not both")
+        if (self.mission is None) == (self.had is None):
+            raise ValueError("send a mission, or a version that the run has had")
+        if [self.xml, self.version, self.had].count(None) < 2:
+            raise ValueError(
+                "send xml, or a version of a mission of the folder, or one that the run has had: "
+                "only one of them"
+            )
         return self
 
 
@@ -43,6 +57,19 @@ class RevisionModel(NewVersionModel):
 
     plan: Name
     even_if_stuck: bool = False
+
+
+class VersionModel(BaseModel):
+    """A version that a run has had from record `seq` on. `at_us`: since then, by the executive's
+    clock; `by`: who began the run, or revised it. `shared_with`: runs under way that have it, too.
+    """
+
+    version: str
+    mission: str
+    seq: int
+    at_us: int
+    by: str
+    shared_with: list[str]
 
 
 class EffectModel(BaseModel):
@@ -128,18 +155,39 @@ def router(control: MissionControl, folder: MissionFolder) -> APIRouter:
     """The routes of revisions. `folder`: where new versions are."""
     routes = APIRouter(prefix="/api/runs", tags=["runs"], responses=RESPONSES)
 
-    async def draft(wanted: NewVersionModel) -> Draft:
+    async def new_version(run: str, wanted: NewVersionModel) -> MissionSource:
+        if wanted.mission is None:
+            assert wanted.had is not None
+            return await control.version_files(run, wanted.had)
         if wanted.xml is not None:
             source = source_of(wanted.xml)
         else:
             source = await of_folder(folder.source, wanted.mission, wanted.version)
         return Draft(folder.file(wanted.mission), source)
 
+    @routes.get("/{run}/versions")
+    async def versions(_: Viewer, run: str) -> list[VersionModel]:
+        """Each version of its mission that a run has had, the present one last."""
+        await find_run(control, run)
+        found = await control.versions(run)
+        return [
+            VersionModel(
+                version=each.version,
+                mission=each.mission,
+                seq=each.seq,
+                at_us=each.at_us,
+                by=each.by,
+                shared_with=list(each.shared_with),
+            )
+            for each in found
+        ]
+
     @routes.post("/{run}/revision/plan")
     async def plan(_: Operator, run: str, wanted: NewVersionModel) -> PlanModel:
         """What it would do to a run to go on with a new version of its mission."""
         async with known_run(control, run):
-            found = await control.plan_revision(run, await draft(wanted), moves=wanted.moves)
+            version = await new_version(run, wanted)
+            found = await control.plan_revision(run, version, moves=wanted.moves)
         return plan_model(found)
 
     @routes.post("/{run}/revision", status_code=204)
@@ -148,7 +196,7 @@ def router(control: MissionControl, folder: MissionFolder) -> APIRouter:
         async with known_run(control, run):
             await control.revise(
                 run,
-                await draft(wanted),
+                await new_version(run, wanted),
                 wanted.plan,
                 moves=wanted.moves,
                 by=person.name,

@@ -131,9 +131,14 @@ def router(control: MissionControl, folder: MissionFolder, hub: Hub) -> APIRoute
         return Response(content, media_type="application/json")
 
     @routes.get("/{run}/mission")
-    async def mission(_: Viewer, run: str) -> RunMissionModel:
-        """What a run executes now; a run that is over, what it had in the end."""
+    async def mission(_: Viewer, run: str, version: Name | None = None) -> RunMissionModel:
+        """What a run executes now; a run that is over, what it had in the end. `version`: one that
+        it has had, of which only the file of the mission itself is sent."""
         summary = await find_run(control, run)
+        if version is not None:
+            kept = await control.version_files(run, version)
+            files = await file_models(control, [MissionFile(kept.file, "", kept.source)])
+            return RunMissionModel(name=kept.file, process=summary.process, files=files)
         found = await control.mission(run)
         files = await file_models(control, found.files())
         return RunMissionModel(name=found.file, process=summary.process, files=files)
