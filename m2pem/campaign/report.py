@@ -1,14 +1,15 @@
-"""The report of a campaign: Markdown with plots, the rows, and the worst runs as answers files."""
+"""What the report of a campaign says: sections with tables and charts, for any writer."""
 
 import math
-from collections.abc import Sequence
-from pathlib import Path
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 from m2pem.campaign.campaign import CampaignResult
-from m2pem.campaign.folder import write_parquet
-from m2pem.campaign.runs import Row, answers_text, replayed
+from m2pem.campaign.charts import Chart, Histogram, Interval, Intervals
+from m2pem.campaign.runs import Row
 from m2pem.campaign.statistics import (
     CONFIDENCE,
+    Estimate,
     compared,
     effects,
     ends,
@@ -26,31 +27,122 @@ WORST = 5
 MOST_EFFECTS = 15
 
 
-def report_lines(result: CampaignResult, other: CampaignResult | None = None) -> list[str]:
-    """Return the report as lines of Markdown. `other`: the campaign that it is compared with."""
+class Code(str):
+    """A cell with what is typed."""
+
+    __slots__ = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Cells by rows; the first cell names its row."""
+
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """`before`, `after`: paragraphs around the table."""
+
+    title: str
+    before: tuple[str, ...]
+    table: Table
+    after: tuple[str, ...] = ()
+    chart: Chart | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """A whole report, without any markup."""
+
+    title: str
+    paragraphs: tuple[str, ...]
+    sections: tuple[Section, ...]
+
+
+def answers_name(row: Row) -> str:
+    """Return the answers file of a run, in the campaign's folder."""
+    return f"worst/run-{row['run']}.yaml"
+
+
+def report_of(
+    result: CampaignResult, other: CampaignResult | None = None, *, answers: bool = False
+) -> Report:
+    """Return the report. `other`: the campaign that it is compared with. `answers`: the worst runs
+    are there as answers files."""
     rows = rehearsed(result.rows)
-    lines = [f"# Campaign of {result.order.mission.file}", ""]
-    lines.append(
+    paragraphs = [
         f"{len(rows):,} runs of {result.wanted:,}, seed {result.order.seed}. Intervals are of "
         f"{CONFIDENCE:.0%} confidence."
-    )
+    ]
     if failed := [row for row in result.rows if row["error"]]:
-        lines += ["", f"{len(failed)} runs could not be rehearsed; the first is run "]
-        lines[-1] += f"{failed[0]['run']}: {failed[0]['error']}"
+        first = failed[0]
+        paragraphs.append(
+            f"{len(failed)} runs could not be rehearsed; the first is run {first['run']}: "
+            f"{first['error']}"
+        )
     if result.decision:
-        lines += ["", f"Sequential test: {result.decision} after {result.decided_after:,} runs."]
-    if not rows:
-        return lines
-    lines += ["", "## Ends", "", "| outcome | end | runs | probability | interval |"]
-    lines.append("|---|---|---|---|---|")
-    for (outcome, end), estimate in ends(rows).items():
-        lines.append(_row(outcome, end, f"{estimate.count:,}", *_probability(estimate)))
+        paragraphs.append(
+            f"Sequential test: {result.decision} after {result.decided_after:,} runs."
+        )
+    sections = []
+    if rows:
+        sections = [
+            _ends(rows),
+            *_requirements(rows, result.order.required),
+            _quantities(rows),
+            *_effects(rows),
+            *([] if other is None else [_difference(result, other)]),
+            *([_worst(rows)] if answers else []),
+        ]
+    title = f"Campaign of {result.order.mission.file}"
+    return Report(title, tuple(paragraphs), tuple(sections))
+
+
+def _table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> Table:
+    """Return a table without columns in which no row has anything."""
+    listed = [tuple(row) for row in rows]
+    kept = [place for place in range(len(columns)) if any(row[place] for row in listed)]
+    return Table(
+        tuple(columns[place] for place in kept),
+        tuple(tuple(row[place] for place in kept) for row in listed),
+    )
+
+
+def _ends(rows: Sequence[Row]) -> Section:
     bad = estimated(sum(not is_good(row) for row in rows), len(rows))
-    lines.append(_row("any failure", "", f"{bad.count:,}", *_probability(bad)))
-    lines += _requirement_lines(rows, result.order.required)
-    lines += ["", "## Times, distances and batteries", "", "| | 5 % | median | 95 % | mean |"]
-    lines.append("|---|---|---|---|---|")
-    lines.append(_quantiles("time, s", [row["took_s"] for row in rows]))
+    counted = [*ends(rows).items(), (("any failure", ""), bad)]
+    columns = ("outcome", "end", "runs", "probability", "interval")
+    listed = [(*end, f"{each.count:,}", *_probability(each)) for end, each in counted]
+    return Section("Ends", (), _table(columns, listed))
+
+
+def _probability(estimate: Estimate) -> tuple[str, str]:
+    return f"{estimate.share:.4f}", f"{estimate.low:.4f} to {estimate.high:.4f}"
+
+
+def _requirements(rows: Sequence[Row], required: Sequence[str]) -> list[Section]:
+    found = requirements(rows)
+    if not found:
+        return []
+    table = _table(
+        ("requirement", "satisfied", "interval", "violated", "interval"),
+        (
+            (
+                f"{name} (required)" if name in required else name,
+                *_probability(kept.satisfied),
+                *_probability(kept.violated),
+            )
+            for name, kept in found.items()
+        ),
+    )
+    after = ("A run that violates what is required counts as a failure.",) if required else ()
+    return [Section("Requirements", (), table, after)]
+
+
+def _quantities(rows: Sequence[Row]) -> Section:
+    listed = [_quantiles("time, s", [row["took_s"] for row in rows])]
     keys = dict.fromkeys(key for row in rows for key in row)
     for start, name, factor in (
         ("distance.", "distance of {}, m", 1),
@@ -59,128 +151,87 @@ def report_lines(result: CampaignResult, other: CampaignResult | None = None) ->
         for key in keys:
             if key.startswith(start):
                 shown = name.format(key.removeprefix(start))
-                lines.append(_quantiles(shown, [factor * row[key] for row in rows if key in row]))
-    lines += _effect_lines(rows)
-    if other is not None:
-        lines += _difference_lines(result, other)
-    return lines
-
-
-def _probability(estimate: object) -> tuple[str, str]:
-    share, _, interval = str(estimate).partition(" ")
-    return share, interval.strip("()")
-
-
-def _requirement_lines(rows: Sequence[Row], required: Sequence[str]) -> list[str]:
-    found = requirements(rows)
-    if not found:
-        return []
-    lines = ["", "## Requirements", ""]
-    lines.append("| requirement | satisfied | interval | violated | interval |")
-    lines.append("|---|---|---|---|---|")
-    for name, kept in found.items():
-        shown = f"{name} (required)" if name in required else name
-        lines.append(_row(shown, *_probability(kept.satisfied), *_probability(kept.violated)))
-    if required:
-        lines += ["", "A run that violates what is required counts as a failure."]
-    return lines
-
-
-def _effect_lines(rows: Sequence[Row]) -> list[str]:
-    found = effects(rows)
-    if not found:
-        return []
-    lines = ["", "## What failures depend on", ""]
-    lines.append("| what was drawn | runs | change of failure | interval | of the time, s | rank |")
-    lines.append("|---|---|---|---|---|---|")
-    for each in found[:MOST_EFFECTS]:
-        interval = f"{each.low:+.4f} to {each.high:+.4f}" + ("" if each.certain else " (may be 0)")
-        took, rank = _number(each.took_s, "+.1f"), _number(each.rank, "+.2f")
-        lines.append(_row(each.name, each.split, f"{each.failure:+.4f}", interval, took, rank))
-    return lines
-
-
-def _difference_lines(result: CampaignResult, other: CampaignResult) -> list[str]:
-    difference = compared(other.rows, result.rows)
-    lines = ["", f"## Against {other.order.mission.file}", ""]
-    lines.append(
-        f"{difference.pairs:,} pairs of runs with the same random numbers; this less that."
+                values = [factor * row[key] for row in rows if key in row]
+                listed.append(_quantiles(shown, values))
+    good, failed = (
+        [row["took_s"] for row in rows if is_good(row) is wanted] for wanted in (True, False)
     )
-    lines += ["", "| | difference | interval |", "|---|---|---|"]
+    return Section(
+        "Times, distances and batteries",
+        (),
+        _table(("quantity", "5 %", "median", "95 %", "mean"), listed),
+        chart=Histogram("times", "Times", "time until the end, s", good, failed),
+    )
+
+
+def _quantiles(name: str, values: Sequence[float]) -> tuple[str, ...]:
+    found = quantiles(values)
+    numbers = (found.low, found.median, found.high, found.mean)
+    return (name, *(f"{each:.1f}" for each in numbers))
+
+
+def _effects(rows: Sequence[Row]) -> list[Section]:
+    found = effects(rows)[:MOST_EFFECTS]
+    if not found:
+        return []
+    title = "What failures depend on"
+    columns = (
+        "what was drawn",
+        "runs",
+        "change of failure",
+        "interval",
+        "change of time, s",
+        "rank",
+    )
+    listed = [
+        (
+            each.name,
+            each.split,
+            f"{each.failure:+.4f}",
+            f"{each.low:+.4f} to {each.high:+.4f}" + ("" if each.certain else " (may be 0)"),
+            _number(each.took_s, "+.1f"),
+            _number(each.rank, "+.2f"),
+        )
+        for each in found
+    ]
+    intervals = [
+        Interval(f"{each.name}: {each.split}", each.failure, each.low, each.high) for each in found
+    ]
+    chart = Intervals("effects", title, "change of the probability of failure", intervals)
+    return [Section(title, (), _table(columns, listed), chart=chart)]
+
+
+def _difference(result: CampaignResult, other: CampaignResult) -> Section:
+    difference = compared(other.rows, result.rows)
+    listed = []
     for name, values, shape in (
         ("probability of failure", difference.failure, "+.4f"),
         ("time of runs that are good in both, s", difference.took_s, "+.2f"),
     ):
         mean, low, high = (_number(each, shape) for each in values)
-        lines.append(_row(name, mean, f"{low} to {high}"))
-    return lines
+        listed.append((name, mean, f"{low} to {high}"))
+    pairs = f"{difference.pairs:,} pairs of runs with the same random numbers; this less that."
+    return Section(
+        f"Against {other.order.mission.file}",
+        (pairs,),
+        _table(("quantity", "difference", "interval"), listed),
+    )
 
 
-def _row(*cells: str) -> str:
-    return f"| {' | '.join(cell.replace('|', '/') for cell in cells)} |"
-
-
-def _quantiles(name: str, values: Sequence[float]) -> str:
-    found = quantiles(values)
-    numbers = (found.low, found.median, found.high, found.mean)
-    return _row(name, *(f"{each:.1f}" for each in numbers))
+def _worst(rows: Sequence[Row]) -> Section:
+    listed = [
+        (
+            str(row["run"]),
+            row["outcome"],
+            row["end"],
+            f"{row['took_s']:.1f}",
+            Code(f"m2pem simulate ... --answers {answers_name(row)}"),
+        )
+        for row in worst(rows, WORST)
+    ]
+    columns = ("run", "outcome", "end", "time, s", "rehearse it again")
+    return Section("Worst runs", (), _table(columns, listed))
 
 
 def _number(value: float, shape: str) -> str:
     return "" if math.isnan(value) else format(value, shape)
-
-
-def write_report(folder: Path, result: CampaignResult, other: CampaignResult | None = None) -> None:
-    """Write `report.md`, its plots if matplotlib is there, `runs.parquet`, and the worst runs as
-    answers files."""
-    rows = rehearsed(result.rows)
-    lines = report_lines(result, other)
-    if rows:
-        lines += ["", "## Worst runs", ""]
-        for row in worst(rows, WORST):
-            run = row["run"]
-            drawn, _ = replayed(result.order, run)
-            file = folder / "worst" / f"run-{run}.yaml"
-            file.parent.mkdir(exist_ok=True)
-            remark = f"Run {run} of a campaign of {result.order.mission.file}: {row['outcome']}"
-            file.write_text(answers_text(drawn, remark), encoding="utf-8")
-            lines.append(
-                f"- run {run}: {row['outcome']} ({row['end']}) after {row['took_s']:.1f} s: "
-                f"`m2pem simulate ... --answers worst/{file.name}`"
-            )
-        lines += _plots(folder, rows)
-        write_parquet(folder / "runs.parquet", result.rows)
-    (folder / "report.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
-
-
-def _plots(folder: Path, rows: Sequence[Row]) -> list[str]:
-    try:
-        from matplotlib.figure import Figure  # noqa: PLC0415  # an extra, slow to load
-    except ModuleNotFoundError:
-        return []
-    figure = Figure(figsize=(7, 3), layout="constrained")
-    axes = figure.subplots()
-    groups = [[row["took_s"] for row in rows if is_good(row) is good] for good in (True, False)]
-    axes.hist(groups, bins=40, stacked=True, label=["good", "failed"], color=["C0", "C3"])
-    axes.set_xlabel("time until the end, s")
-    axes.set_ylabel("runs")
-    axes.legend()
-    figure.savefig(folder / "times.svg", metadata={"Date": None})
-    lines = ["", "![Times](times.svg)"]
-    found = effects(rows)[:MOST_EFFECTS][::-1]
-    if found:
-        figure = Figure(figsize=(7, 1 + 0.35 * len(found)), layout="constrained")
-        axes = figure.subplots()
-        places = range(len(found))
-        middle = [each.failure for each in found]
-        spans = [
-            [each.failure - each.low for each in found],
-            [each.high - each.failure for each in found],
-        ]
-        axes.errorbar(middle, places, xerr=spans, fmt="o", capsize=3)
-        axes.axvline(0, color="grey", linewidth=0.8)
-        axes.set_yticks(places, [f"{each.name}: {each.split}" for each in found])
-        axes.set_xlabel("change of the probability of failure")
-        figure.savefig(folder / "effects.svg", metadata={"Date": None})
-        lines += ["", "![What failures depend on](effects.svg)"]
-    return lines

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from m2pem.campaign.runs import Row
+from m2pem.campaign.variations import shown
 
 CONFIDENCE = 0.95
 
@@ -100,7 +101,7 @@ def effects(rows: Sequence[Row]) -> list[Effect]:
 def _effects_of(name: str, rows: Sequence[Row]) -> Iterable[Effect]:
     known = [row for row in rows if name in row]
     values = [row[name] for row in known]
-    shown = name.removeprefix("drawn.")
+    drawn = name.removeprefix("drawn.")
     if len(set(values)) < 2:
         return
     if isinstance(values[0], float):
@@ -111,12 +112,14 @@ def _effects_of(name: str, rows: Sequence[Row]) -> Iterable[Effect]:
         rank = math.nan
         if len(set(failures)) > 1:
             rank = float(spearmanr(values, failures).statistic)
-        yield _effect(shown, f"above {median:.4g}", known, [each > median for each in values], rank)
+        yield _effect(
+            drawn, f"above {shown(drawn, median)}", known, [each > median for each in values], rank
+        )
     elif isinstance(values[0], bool):
-        yield _effect(shown, "with it", known, values, math.nan)
+        yield _effect(drawn, "with it", known, values, math.nan)
     else:
         for choice in sorted(set(values)):
-            yield _effect(shown, f"{choice}", known, [each == choice for each in values], math.nan)
+            yield _effect(drawn, f"{choice}", known, [each == choice for each in values], math.nan)
 
 
 def _effect(

@@ -4,6 +4,7 @@ A drawn run is an answers file (docs/rehearsal.md), which `m2pem simulate` repla
 """
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -149,6 +150,21 @@ class VariationsModel(_Model):
 
 
 Drawn = float | bool | str
+
+_DEGREES = ("deg", math.degrees(1))
+_SHOWN: Mapping[str, tuple[str, float]] = {
+    "from": _DEGREES,
+    "wind_from": _DEGREES,
+    "battery": ("%", 100),
+    **dict.fromkeys(("wind", "max_speed", "cruise_speed", "climb_rate"), ("m/s", 1)),
+}
+"""By the last part of a name: the unit that people read, and its factor. Others are times, in s."""
+
+
+def shown(name: str, value: float) -> str:
+    """Return a number that was drawn, with its unit. `name`: as in `DrawnRun.values`."""
+    unit, factor = _SHOWN.get(name.rpartition(".")[2], ("s", 1))
+    return f"{factor * value:.4g} {unit}"
 
 
 @dataclass(frozen=True, slots=True)

@@ -127,7 +127,9 @@ def campaign(
     seed gives the same runs on any number of processes or computers. An interrupt (Ctrl-C) keeps
     what is done.
     """
-    from m2pem.campaign.report import report_lines, write_report
+    from m2pem.campaign.markdown import markdown_lines
+    from m2pem.campaign.report import report_of
+    from m2pem.campaign.report_files import write_report
     from m2pem.executive.loading import load_source
 
     if resume and out is None:
@@ -154,7 +156,7 @@ def campaign(
         compared = _run(other_order, runs, test=None, out=beside, options=options)
     if out is not None:
         write_report(out, result, compared)
-    click.echo("\n".join(report_lines(result, compared)))
+    click.echo("\n".join(markdown_lines(report_of(result, compared))))
     interrupted = result.interrupted or (compared is not None and compared.interrupted)
     return INTERRUPTED if interrupted else 0
 

@@ -8,7 +8,10 @@ from typing import Any
 
 from m2pem.api.authoring import MissionSource
 from m2pem.campaign.campaign import CampaignResult, run_campaign
-from m2pem.campaign.report import report_lines, write_report
+from m2pem.campaign.html import html_page
+from m2pem.campaign.markdown import markdown_lines
+from m2pem.campaign.report import report_of
+from m2pem.campaign.report_files import write_report
 from m2pem.campaign.runs import Row, order_of, read_text
 from m2pem.campaign.statistics import Effect, Estimate, effects, ends, estimated, is_good, rehearsed
 from m2pem.mission.mission import Mission
@@ -47,10 +50,14 @@ class Campaign:
     @property
     def report(self) -> str:
         """The report, in Markdown."""
-        return "\n".join(report_lines(self.result)) + "\n"
+        return "\n".join(markdown_lines(report_of(self.result))) + "\n"
+
+    def to_html(self) -> str:
+        """Return the report as a page that needs no other file."""
+        return html_page(report_of(self.result))
 
     def write(self, folder: str | Path) -> None:
-        """Write the report with its plots, the rows as Parquet, and the worst runs as answers
+        """Write the report with its charts, the rows as Parquet, and the worst runs as answers
         files."""
         path = Path(folder)
         path.mkdir(parents=True, exist_ok=True)

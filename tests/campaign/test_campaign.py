@@ -10,7 +10,7 @@ from m2pem.campaign import campaign as campaigns
 from m2pem.campaign import pool
 from m2pem.campaign.campaign import run_campaign
 from m2pem.campaign.pool import rehearse_on_processes
-from m2pem.campaign.report import write_report
+from m2pem.campaign.report_files import write_report
 from m2pem.campaign.runs import Order, Row, order_of, rehearse_runs, replayed, row_of
 from m2pem.campaign.statistics import SequentialTest, estimated, is_good
 from m2pem.errors import OperatorError

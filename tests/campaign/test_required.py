@@ -5,7 +5,8 @@ from pathlib import Path
 import pytest
 
 from m2pem.campaign.campaign import run_campaign
-from m2pem.campaign.report import report_lines
+from m2pem.campaign.markdown import markdown_lines
+from m2pem.campaign.report import report_of
 from m2pem.campaign.runs import Order
 from m2pem.campaign.statistics import SequentialTest, is_good, requirements
 from m2pem.errors import OperatorError
@@ -48,7 +49,7 @@ def test_a_violation_of_what_is_required_is_a_failure(order: MakeOrder) -> None:
 
 
 def test_the_report_has_each_requirement(order: MakeOrder) -> None:
-    lines = report_lines(run_campaign(quick(order, "quick"), 20))
+    lines = markdown_lines(report_of(run_campaign(quick(order, "quick"), 20)))
     assert "## Requirements" in lines
     assert any(line.startswith("| quick (required) | ") for line in lines)
     assert any(line.startswith("| begun | ") for line in lines)

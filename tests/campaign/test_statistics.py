@@ -67,6 +67,25 @@ def test_what_failures_depend_on_comes_first_and_what_they_do_not_is_uncertain()
     assert abs(of_wind.rank) < 0.1
 
 
+@pytest.mark.parametrize(
+    ("name", "value", "text"),
+    [
+        ("wind", 6.5, "6.5 m/s"),
+        ("wind.from", math.pi / 2, "90 deg"),
+        ("vehicles.uav1.wind_from", math.pi, "180 deg"),
+        ("vehicles.uav1.battery", 0.625, "62.5 %"),
+        ("vehicles.uav1.climb_rate", 2.0, "2 m/s"),
+        ("vehicles.uav1.endurance", 600.0, "600 s"),
+        ("behaviors.A.duration", 12.5, "12.5 s"),
+        ("links.uav1.1.for", 3.0, "3 s"),
+    ],
+)
+def test_what_is_compared_with_a_value_says_its_unit(name: str, value: float, text: str) -> None:
+    rows = [row(run, True, **{name: value + (run - 1) / 100}) for run in range(3)]
+    [effect] = effects(rows)
+    assert effect.split == f"above {text}"
+
+
 def test_pairs_are_compared_more_exactly_than_two_groups() -> None:
     first = [row(run, run % 3 > 0, 100.0 + run) for run in range(300)]
     second = [row(run, run % 3 > 0 and run % 30 != 1, 95.0 + run) for run in range(250)]
