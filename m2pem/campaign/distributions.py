@@ -11,8 +11,14 @@ from dataclasses import dataclass
 from statistics import NormalDist
 from typing import Any
 
-Read = Callable[[object], float]
-"""Reads a number with its unit; raises ValueError."""
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """What is drawn: how a value is read, which may raise ValueError, and its bounds."""
+
+    read: Callable[[object], float]
+    low: float = -math.inf
+    high: float = math.inf
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +47,45 @@ class Draw:
         return ((int.from_bytes(digest, "big") >> 11) + 0.5) / 2**53
 
 
+def distribution_schema(
+    quantity: Quantity, value: Mapping[str, Any], interval: str
+) -> dict[str, Any]:
+    """Return the JSON Schema of a distribution. `value`: that of a value. `interval`: the pattern
+    of LOW..HIGH."""
+    positive = {"type": "number", "exclusiveMinimum": 0}
+
+    def several(count: int) -> dict[str, Any]:
+        return {"type": "array", "items": value, "minItems": count, "maxItems": count}
+
+    def named(optional: str = "", **parameters: Mapping[str, Any]) -> dict[str, Any]:
+        return {
+            "type": "object",
+            "properties": {**parameters, **dict.fromkeys(optional.split(), value)},
+            "required": list(parameters),
+            "additionalProperties": False,
+        }
+
+    kinds: dict[str, Mapping[str, Any]] = {
+        "uniform": several(2),
+        "normal": named("low high", mean=value, sd=value),
+        "triangular": several(3),
+    }
+    if math.isinf(quantity.high):
+        kinds |= {
+            "lognormal": named(median=value, sigma=positive),
+            "exponential": value,
+            "weibull": named(scale=value, shape=positive),
+        }
+    one_kind = {
+        "type": "object",
+        "properties": kinds,
+        "additionalProperties": False,
+        "minProperties": 1,
+        "maxProperties": 1,
+    }
+    return {"anyOf": [value, {"type": "string", "pattern": interval}, one_kind]}
+
+
 def weighted(weights: Mapping[str, float], share: float) -> str:
     """Return the choice at a share of all weights, in their order."""
     left = share * sum(weights.values())
@@ -51,7 +96,7 @@ def weighted(weights: Mapping[str, float], share: float) -> str:
     return [choice for choice, weight in weights.items() if weight > 0][-1]  # it was rounded
 
 
-def read_distribution(said: object, read: Read) -> Distribution:
+def read_distribution(said: object, quantity: Quantity) -> Distribution:
     """Read a distribution: a value, `LOW..HIGH`, or a map with the name of a distribution.
 
     Raises:
@@ -61,31 +106,31 @@ def read_distribution(said: object, read: Read) -> Distribution:
         low, _, high = (part.strip() for part in said.partition(".."))
         unit = high.lstrip("+-0123456789.eE").strip()
         return _uniform(
-            [low if not unit or low[-1:].isalpha() or "%" in low else low + unit, high], read
+            [low if not unit or low[-1:].isalpha() or "%" in low else low + unit, high], quantity
         )
     if not isinstance(said, Mapping):
-        value = read(said)
+        value = quantity.read(said)
         return Distribution(str(said), lambda _: value)
     if len(said) != 1 or (kind := next(iter(said))) not in _KINDS:
         raise ValueError(f"a distribution is a value, LOW..HIGH or one of {', '.join(_KINDS)}")
-    return _KINDS[kind](said[kind], read)
+    return _KINDS[kind](said[kind], quantity)
 
 
-def _numbers(said: object, count: int, what: str, read: Read) -> list[float]:
+def _numbers(said: object, count: int, what: str, quantity: Quantity) -> list[float]:
     if not isinstance(said, list) or len(said) != count:
         raise ValueError(f"{what}: a list of {count} values")
-    return [read(each) for each in said]
+    return [quantity.read(each) for each in said]
 
 
-def _uniform(said: object, read: Read) -> Distribution:
-    low, high = _numbers(said, 2, "uniform: [low, high]", read)
+def _uniform(said: object, quantity: Quantity) -> Distribution:
+    low, high = _numbers(said, 2, "uniform: [low, high]", quantity)
     if low > high:
         raise ValueError(f"uniform: {low:g} is above {high:g}")
     return Distribution(f"uniform {low:g}..{high:g}", lambda share: low + (high - low) * share)
 
 
-def _triangular(said: object, read: Read) -> Distribution:
-    low, mode, high = _numbers(said, 3, "triangular: [low, mode, high]", read)
+def _triangular(said: object, quantity: Quantity) -> Distribution:
+    low, mode, high = _numbers(said, 3, "triangular: [low, mode, high]", quantity)
     if not low <= mode <= high or low == high:
         raise ValueError("triangular: low <= mode <= high, and low < high")
     turn = (mode - low) / (high - low)
@@ -105,11 +150,17 @@ def _parameters(said: object, what: str, needed: str, optional: str = "") -> Map
     return said
 
 
-def _normal(said: object, read: Read) -> Distribution:
+def _refuse_bound(kind: str, quantity: Quantity) -> None:
+    if quantity.high < math.inf:
+        fit = "uniform, normal or triangular"
+        raise ValueError(f"{kind} has no upper bound, and this is {quantity.high:g} at most: {fit}")
+
+
+def _normal(said: object, quantity: Quantity) -> Distribution:
     given = _parameters(said, "normal", "mean sd", "low high")
-    mean, sd = read(given["mean"]), read(given["sd"])
-    low = read(given["low"]) if "low" in given else -math.inf
-    high = read(given["high"]) if "high" in given else math.inf
+    mean, sd = quantity.read(given["mean"]), quantity.read(given["sd"])
+    low = quantity.read(given["low"]) if "low" in given else quantity.low
+    high = quantity.read(given["high"]) if "high" in given else quantity.high
     if sd <= 0 or low >= high:
         raise ValueError("normal: sd is above 0, and low below high")
     normal = NormalDist(mean, sd)
@@ -123,9 +174,10 @@ def _normal(said: object, read: Read) -> Distribution:
     return Distribution(f"normal {mean:g}, {sd:g}", value)
 
 
-def _lognormal(said: object, read: Read) -> Distribution:
+def _lognormal(said: object, quantity: Quantity) -> Distribution:
     given = _parameters(said, "lognormal", "median sigma")
-    median, sigma = read(given["median"]), _plain(given["sigma"])
+    _refuse_bound("lognormal", quantity)
+    median, sigma = quantity.read(given["median"]), _plain(given["sigma"])
     if median <= 0 or sigma <= 0:
         raise ValueError("lognormal: median and sigma are above 0")
     normal = NormalDist()
@@ -135,16 +187,18 @@ def _lognormal(said: object, read: Read) -> Distribution:
     )
 
 
-def _exponential(said: object, read: Read) -> Distribution:
-    mean = read(said)
+def _exponential(said: object, quantity: Quantity) -> Distribution:
+    mean = quantity.read(said)
+    _refuse_bound("exponential", quantity)
     if mean <= 0:
         raise ValueError("exponential: the mean is above 0")
     return Distribution(f"exponential {mean:g}", lambda share: -mean * math.log1p(-share))
 
 
-def _weibull(said: object, read: Read) -> Distribution:
+def _weibull(said: object, quantity: Quantity) -> Distribution:
     given = _parameters(said, "weibull", "scale shape")
-    scale, shape = read(given["scale"]), _plain(given["shape"])
+    _refuse_bound("weibull", quantity)
+    scale, shape = quantity.read(given["scale"]), _plain(given["shape"])
     if scale <= 0 or shape <= 0:
         raise ValueError("weibull: scale and shape are above 0")
     return Distribution(
@@ -159,7 +213,7 @@ def _plain(said: object) -> float:
     return float(said)
 
 
-_KINDS: Mapping[str, Callable[[object, Read], Distribution]] = {
+_KINDS: Mapping[str, Callable[[object, Quantity], Distribution]] = {
     "uniform": _uniform,
     "normal": _normal,
     "lognormal": _lognormal,

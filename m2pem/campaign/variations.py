@@ -1,4 +1,4 @@
-"""What a campaign varies: the shape of a variations file, and the answers that are drawn by it.
+"""What a campaign varies: the answers that are drawn by a variations file.
 
 A drawn run is an answers file (docs/rehearsal.md), which `m2pem simulate` replays.
 """
@@ -8,146 +8,23 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-from pydantic import (
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    StringConstraints,
-    ValidationError,
+from m2pem.campaign.distributions import Distribution, Draw, weighted
+from m2pem.campaign.variations_file import (
+    Arrival,
+    VariationsModel,
+    VariedBehavior,
+    VariedService,
+    read_model,
 )
-
-from m2pem.api.simulator_settings import fraction
-from m2pem.campaign.distributions import Distribution, Draw, read_distribution, weighted
 from m2pem.errors import AnswersError
 from m2pem.findings import has_errors
 from m2pem.fleet.fleet import Fleet
-from m2pem.fleet.yaml_source import YamlSource, note_shape_findings, parse_yaml, read_yaml
+from m2pem.fleet.yaml_source import YamlSource
 from m2pem.mission.mission import Mission
 from m2pem.rehearsal.answers import Answers, check_answers
 from m2pem.rehearsal.answers_file import AnswersModel
-from m2pem.units import Dimension, quantity
-
-VISITS = 8
-"""For so many visits of an element what happens is drawn, unless the file says otherwise."""
-
-_SETTINGS: Mapping[str, Dimension] = {
-    "max_speed": Dimension.SPEED,
-    "cruise_speed": Dimension.SPEED,
-    "climb_rate": Dimension.SPEED,
-    "endurance": Dimension.DURATION,
-    "wind": Dimension.SPEED,
-    "wind_from": Dimension.ANGLE,
-}
-"""Settings of simulated vehicles that may be drawn, besides `battery`."""
-
-
-def _of(dimension: Dimension) -> BeforeValidator:
-    def read(said: object) -> float:
-        value = quantity(said, dimension)
-        if value < 0 and dimension is not Dimension.ANGLE:
-            raise ValueError(f"{said!r} is below 0")
-        return value
-
-    return BeforeValidator(
-        lambda said: said if isinstance(said, Distribution) else read_distribution(said, read)
-    )
-
-
-def _speed(said: object) -> float:
-    return quantity(said, Dimension.SPEED)
-
-
-Text = Annotated[str, StringConstraints(min_length=1)]
-Seconds = Annotated[Distribution, _of(Dimension.DURATION)]
-Speed = Annotated[Distribution, _of(Dimension.SPEED)]
-Angle = Annotated[Distribution, _of(Dimension.ANGLE)]
-Probability = Annotated[float, Field(ge=0, le=1, strict=False)]
-Weight = Annotated[float, Field(ge=0, strict=False)]
-Setting = Annotated[Any, BeforeValidator(lambda said: said)]
-_NOW = read_distribution(0.0, lambda _: 0.0)
-
-
-class _Model(BaseModel):
-    model_config = ConfigDict(
-        strict=True, extra="forbid", frozen=True, arbitrary_types_allowed=True
-    )
-
-
-class Failure(_Model):
-    """With what probability a behavior or service fails, when after its start, and with what."""
-
-    probability: Probability
-    after: Seconds = _NOW
-    error: Text = "FAILED"
-
-
-class VariedBehavior(_Model):
-    """Of each visit of a task with a behavior. `duration`: its own, in place of the vehicle's."""
-
-    duration: Seconds | None = None
-    fails: Failure | None = None
-
-
-class WeightedData(_Model):
-    """Data that a service writes, as often as its weight says."""
-
-    weight: Weight = 1.0
-    data: dict[Text, Any]
-
-
-class VariedService(_Model):
-    """Of each visit of a service task."""
-
-    after: Seconds = _NOW
-    fails: Failure | None = None
-    write: list[WeightedData] = Field(default_factory=list)
-
-
-class Arrival(_Model):
-    """A signal or message from outside, which may also not come."""
-
-    id: Text
-    at: Seconds
-    probability: Probability = 1.0
-    data: dict[Text, Any] = Field(default_factory=dict)
-
-
-class VariedLink(_Model):
-    """A link to a vehicle that is lost at a time, for a while, with a probability."""
-
-    vehicle: Text
-    at: Seconds
-    for_: Seconds | None = Field(None, alias="for")
-    probability: Probability = 1.0
-
-
-class VariedWind(_Model):
-    """The wind. Without `from`, it comes from any direction."""
-
-    speed: Speed
-    from_: Angle = Field(
-        read_distribution("0 deg..360 deg", lambda each: quantity(each, Dimension.ANGLE)),
-        alias="from",
-    )
-
-
-class VariationsModel(_Model):
-    """A whole file."""
-
-    visits: Annotated[int, Field(ge=1, le=1000)] = VISITS
-    behaviors: dict[Text, VariedBehavior] = Field(default_factory=dict)
-    services: dict[Text, VariedService] = Field(default_factory=dict)
-    answers: dict[Text, dict[Text, Weight]] = Field(default_factory=dict)
-    answer_times: dict[Text, Seconds] = Field(default_factory=dict)
-    signals: list[Arrival] = Field(default_factory=list)
-    messages: list[Arrival] = Field(default_factory=list)
-    links: list[VariedLink] = Field(default_factory=list)
-    vehicles: dict[Text, dict[Text, Setting]] = Field(default_factory=dict)
-    wind: VariedWind | None = None
-
 
 Drawn = float | bool | str
 
@@ -182,14 +59,10 @@ class Variations:
     def __init__(self, model: VariationsModel, source: YamlSource) -> None:
         self.model = model
         self.source = source
-        self._settings = {
-            vehicle: {key: _setting(key, said) for key, said in settings.items()}
-            for vehicle, settings in model.vehicles.items()
-        }
 
     def draw(self, seed: int, run: int) -> DrawnRun:
         """Return what happens in one run. The same seed and run give the same."""
-        return _Drawing(self.model, self._settings, Draw(seed, run)).whole()
+        return _Drawing(self.model, Draw(seed, run)).whole()
 
     def refuse_misfits(self, mission: Mission, fleet: Fleet) -> None:
         """Check that the mission and the fleet have all that is varied.
@@ -197,7 +70,7 @@ class Variations:
         Raises:
             AnswersError: with every finding, by the lines of the file.
         """
-        drawing = _Drawing(self.model, self._settings, Draw(0, 0), everything=True)
+        drawing = _Drawing(self.model, Draw(0, 0), everything=True)
         answers = Answers(AnswersModel.model_validate(drawing.whole().answers), self.source)
         findings = check_answers(answers, mission, fleet)
         if has_errors(findings):
@@ -210,40 +83,11 @@ def read_variations(said: Path | bytes) -> Variations:
     Raises:
         AnswersError: with every finding, each with its line.
     """
-    source = parse_yaml(said, "variations.yaml") if isinstance(said, bytes) else read_yaml(said)
-    model = VariationsModel()
-    if not source.findings and source.data is not None:
-        try:
-            model = VariationsModel.model_validate(source.data)
-        except ValidationError as error:
-            note_shape_findings(source, error, VariationsModel)
-    for vehicle, settings in model.vehicles.items():
-        for key, said_so in settings.items():
-            try:
-                _setting(key, said_so)
-            except ValueError as error:
-                source.error(("vehicles", vehicle, key), "bad-value", str(error))
-    for element in model.answer_times:
-        if element not in model.answers:
-            what = f"`answers` does not say what is decided at {element}"
-            source.error(("answer_times", element), "bad-value", what)
-    if source.findings:
-        what = f"{source.file} is no variations file that can be used"
-        raise AnswersError(what, source.findings)
-    return Variations(model, source)
-
-
-def _setting(key: str, said: object) -> Distribution:
-    if key == "battery":
-        return read_distribution(said, fraction)
-    if key not in _SETTINGS:
-        known = ", ".join(["battery", *_SETTINGS])
-        raise ValueError(f"{key} of a vehicle cannot be drawn; what can: {known}")
-    return read_distribution(said, lambda each: quantity(each, _SETTINGS[key]))
+    return Variations(*read_model(said))
 
 
 def _as_setting(key: str, value: float) -> float | str:
-    return f"{value!r} rad" if _SETTINGS.get(key) is Dimension.ANGLE else value
+    return f"{value!r} rad" if key == "wind_from" else value
 
 
 class _Drawing:
@@ -252,13 +96,11 @@ class _Drawing:
     def __init__(
         self,
         model: VariationsModel,
-        settings: Mapping[str, Mapping[str, Distribution]],
         draw: Draw,
         *,
         everything: bool = False,
     ) -> None:
         self._model = model
-        self._settings = settings
         self._draw = draw
         self._everything = everything
         self._values: dict[str, Drawn] = {}
@@ -359,9 +201,10 @@ class _Drawing:
         vehicles: dict[str, dict[str, Any]] = {
             vehicle: {
                 key: _as_setting(key, self._number(f"vehicles.{vehicle}.{key}", distribution))
-                for key, distribution in settings.items()
+                for key, distribution in settings
+                if distribution is not None
             }
-            for vehicle, settings in self._settings.items()
+            for vehicle, settings in self._model.vehicles.items()
         }
         for number, link in enumerate(self._model.links):
             key = f"links.{link.vehicle}" + (f".{number}" if number else "")

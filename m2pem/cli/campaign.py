@@ -8,6 +8,7 @@ import click
 
 from m2pem.cli.options import (
     UnusableError,
+    as_json,
     data_option,
     example,
     fleet_option,
@@ -37,6 +38,15 @@ def _read_test(_: click.Context, __: click.Parameter, text: str | None) -> "Sequ
     except ValueError as error:
         wanted = "P0,P1,ALPHA,BETA such as 0.01,0.02,0.05,0.05"
         raise click.BadParameter(f"{text!r} is not {wanted}: {error}") from error
+
+
+def _print_schema(context: click.Context, _: click.Parameter, wanted: bool) -> None:
+    if not wanted or context.resilient_parsing:
+        return
+    from m2pem.campaign.variations_file import variations_schema
+
+    click.echo(as_json(variations_schema()))
+    context.exit()
 
 
 @click.command(
@@ -101,6 +111,14 @@ def _read_test(_: click.Context, __: click.Parameter, text: str | None) -> "Sequ
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
     metavar="FLEET",
     help="Compare with another fleet, with the same random numbers.",
+)
+@click.option(
+    "--schema",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=_print_schema,
+    help="Print the JSON Schema of variations files instead.",
 )
 def campaign(
     mission: str,

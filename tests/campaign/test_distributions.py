@@ -1,19 +1,20 @@
 """Distributions, judged by scipy's."""
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
 import pytest
 from scipy import stats
 
-from m2pem.campaign.distributions import Draw, read_distribution, weighted
+from m2pem.campaign.distributions import Draw, Quantity, read_distribution, weighted
 from m2pem.units import Dimension, quantity
 
 SHARES = (0.001, 0.1, 0.3, 0.5, 0.9, 0.999)
 
 
-def seconds(said: object) -> float:
-    return quantity(said, Dimension.DURATION)
+SECONDS = Quantity(lambda said: quantity(said, Dimension.DURATION))
+AT_LEAST_0 = Quantity(SECONDS.read, 0.0)
 
 
 @pytest.mark.parametrize(
@@ -35,7 +36,7 @@ def seconds(said: object) -> float:
     ],
 )
 def test_a_distribution_is_that_of_scipy(said: object, judge: Any) -> None:
-    distribution = read_distribution(said, seconds)
+    distribution = read_distribution(said, SECONDS)
     for share in SHARES:
         assert distribution.value(share) == pytest.approx(judge.ppf(share))
 
@@ -60,7 +61,18 @@ def test_a_distribution_is_that_of_scipy(said: object, judge: Any) -> None:
 )
 def test_what_is_no_distribution_is_refused(said: Mapping[str, object] | str) -> None:
     with pytest.raises(ValueError, match=r".+"):
-        read_distribution(said, seconds)
+        read_distribution(said, SECONDS)
+
+
+def test_what_has_bounds_is_drawn_within_them() -> None:
+    said = {"normal": {"mean": "2 s", "sd": "4 s"}}
+    distribution = read_distribution(said, AT_LEAST_0)
+    for share in SHARES:
+        judge = stats.truncnorm(-0.5, math.inf, 2, 4)
+        assert distribution.value(share) == pytest.approx(judge.ppf(share))
+    lifelong = {"exponential": "1 s"}
+    with pytest.raises(ValueError, match="no upper bound, and this is 5 at most"):
+        read_distribution(lifelong, Quantity(SECONDS.read, 0.0, 5.0))
 
 
 def test_draws_are_even_and_depend_on_each_of_their_names() -> None:

@@ -49,7 +49,7 @@ wind: {speed: 0..8 m/s}
         ("behaviors:\n  A: {fails: {probability: 2}}", "variations.yaml:2"),
         ("behaviors:\n  A: {fails: {after: 2 s}}", "'probability' is missing"),
         ("behaviors:\n  A: {duration: 5..2 s}", "5 is above 2"),
-        ("vehicles:\n  uav1: {batery: 5 %}", "batery of a vehicle cannot be drawn"),
+        ("vehicles:\n  uav1: {batery: 5 %}", "did you mean 'battery'"),
         ("vehicles:\n  uav1: {battery: 5 kg..8}", "variations.yaml:2"),
         ("links: [{vehicle: uav1}]", "'at' is missing"),
         ("answer_times:\n  Ask: 5 s", "variations.yaml:2.*what is decided at Ask"),

@@ -1,5 +1,6 @@
 """`m2pem campaign`."""
 
+import json
 import signal
 import subprocess
 import sys
@@ -7,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from m2pem.campaign.variations_file import variations_schema
 from tests.campaign.conftest import TWO, sequence
 from tests.command_line import REPOSITORY
 
@@ -76,6 +78,10 @@ def test_an_interrupt_keeps_what_is_done(mission: Path, tmp_path: Path) -> None:
     assert "runs of 1,000,000" in stdout
     assert "Traceback" not in stderr
     assert (out / "report.md").exists()
+
+
+def test_the_schema_of_variations_files_is_printed_without_a_mission() -> None:
+    assert json.loads(m2pem("campaign", "--schema")) == variations_schema()
 
 
 @pytest.mark.parametrize(
