@@ -328,6 +328,11 @@ def _behavior_progressed(view: RunView, record: r.BehaviorProgressed) -> _Senten
     return text, Importance.DETAIL
 
 
+def _behavior_adjusted(view: RunView, record: r.BehaviorAdjusted) -> _Sentence:
+    changed = ", ".join(f"{name} {value}" for name, value in record.parameters.items())
+    return f"{_behavior(view, record.behavior)}: goes on with {changed}", Importance.NORMAL
+
+
 def _behavior_cancel_requested(view: RunView, record: r.BehaviorCancelRequested) -> _Sentence:
     why = f", {record.code}" if record.code else ""
     text = f"{_behavior(view, record.behavior)}: being cancelled{why}{_in_brackets(record.reason)}"
@@ -544,6 +549,7 @@ _SENTENCES: dict[type, Callable[[RunView, Any], _Sentence]] = {
     r.AllocationEnded: _allocation_ended,
     r.BehaviorRequested: _behavior_requested,
     r.BehaviorProgressed: _behavior_progressed,
+    r.BehaviorAdjusted: _behavior_adjusted,
     r.BehaviorCancelRequested: _behavior_cancel_requested,
     r.BehaviorUnsettled: _behavior_unsettled,
     r.BehaviorContinued: _behavior_continued,
@@ -615,6 +621,7 @@ _KINDS: dict[type, Kind] = {
             r.AllocationEnded,
             r.BehaviorRequested,
             r.BehaviorProgressed,
+            r.BehaviorAdjusted,
             r.BehaviorCancelRequested,
             r.BehaviorUnsettled,
             r.BehaviorContinued,

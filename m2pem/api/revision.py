@@ -26,9 +26,10 @@ class RunVersion:
 
 @dataclass(frozen=True, slots=True)
 class RevisionEffect:
-    """One thing that a revision does. `kind`: moves, ends, restarts, goes on, arms, rearms, disarms
-    or changes. `element`: its id. `token`: the id of a token; 0: it is no token's. `text`: a
-    sentence for people. `resources`: the vehicles and payloads that the token commands now."""
+    """One thing that a revision does. `kind`: moves, ends, restarts, adjusts, goes on, arms,
+    rearms, disarms or changes. `element`: its id. `token`: the id of a token; 0: it is no token's.
+    `text`: a sentence for people. `resources`: the vehicles and payloads that the token commands
+    now."""
 
     kind: str
     element: str

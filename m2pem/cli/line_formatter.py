@@ -34,6 +34,7 @@ SHOWN = frozenset(
         r.ResourceKept,
         r.KeepingEnded,
         r.BehaviorUnsettled,
+        r.BehaviorAdjusted,
         r.BehaviorContinued,
         r.BehaviorRestarted,
         r.PromptOpened,

@@ -45,6 +45,16 @@ class StartBehavior:
 
 
 @dataclass(frozen=True, slots=True)
+class AdjustBehavior:
+    """Let a behavior go on with other parameters. `goes_on`: as it does then; `names`: of the
+    parameters that change. It is sent under `epoch`."""
+
+    epoch: int
+    goes_on: StartBehavior
+    names: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class CancelBehavior:
     """Cancel a behavior; its terminal report releases the resources."""
 
@@ -109,6 +119,7 @@ Command: TypeAlias = Union[
     AllocateResources,
     WithdrawAllocation,
     StartBehavior,
+    AdjustBehavior,
     CancelBehavior,
     HoldResource,
     ResumeResource,

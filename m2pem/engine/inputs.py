@@ -333,7 +333,8 @@ class Revise(_Input, frozen=True):
     the header of a run. `moves`: where a token on an element goes first, by the ids of elements or,
     at a join, of sequence flows; "": it ends there. `plan`: the digest of the plan that was shown;
     the run is only revised if that is what the revision does now. `requirements`: those that the
-    run is monitored for from then on.
+    run is monitored for from then on. `adjustable`: behaviors whose speed their arbiters can change
+    while they go on.
     """
 
     version: str
@@ -344,6 +345,7 @@ class Revise(_Input, frozen=True):
     moves: dict[str, str] = msgspec.field(default_factory=dict)
     by: str = ""
     requirements: tuple[MonitoredRequirement, ...] = ()
+    adjustable: tuple[str, ...] = ()
 
 
 class OperatorNoted(_Input, frozen=True):

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Sequence
 
 from m2pem.engine import records as r
 from m2pem.engine.commands import (
+    AdjustBehavior,
     AllocateResources,
     CancelBehavior,
     CancelService,
@@ -28,6 +29,7 @@ _WITH_COMMANDS = frozenset(
         r.AllocationEnded,
         r.BehaviorRequested,
         r.BehaviorRestarted,
+        r.BehaviorAdjusted,
         r.BehaviorCancelRequested,
         r.BehaviorUnsettled,
         r.BehaviorContinued,
@@ -63,6 +65,7 @@ def commands_of(state: RunState, records: Sequence[Record]) -> list[Command]:
             case (
                 r.BehaviorRequested()
                 | r.BehaviorRestarted()
+                | r.BehaviorAdjusted()
                 | r.BehaviorCancelRequested()
                 | r.BehaviorUnsettled()
                 | r.BehaviorContinued()
@@ -100,6 +103,7 @@ def commands_of(state: RunState, records: Sequence[Record]) -> list[Command]:
                 commands.extend(
                     ResumeResource(name) for name in _resources_to_resume(state, records)
                 )
+                commands.extend(_adjusted(state))
             case _:
                 pass
     return commands
@@ -110,12 +114,15 @@ def _behavior(state: RunState, behavior: Behavior, record: Record) -> list[Comma
         case r.BehaviorRequested() | r.BehaviorRestarted():
             if behavior.phase is not BehaviorPhase.CANCELLING:
                 return [_start(state, behavior)]
+        case r.BehaviorAdjusted() if state.status is not RunStatus.PAUSED:
+            return [_adjust(state, behavior)]
         case r.BehaviorCancelRequested():
             return [_cancel(state, behavior)]
         case r.BehaviorUnsettled():
             return _hold(behavior)
         case r.BehaviorContinued() if behavior.phase is BehaviorPhase.ACTIVE:
-            return [ResumeResource(name) for name in behavior.resources]
+            resumes = [ResumeResource(name) for name in behavior.resources]
+            return [*resumes, _adjust(state, behavior)] if behavior.adjusted else [*resumes]
     return []
 
 
@@ -153,6 +160,8 @@ def outstanding(state: RunState) -> list[Command]:
         commands.extend(_held_for(state, incident.resources))
     if state.status is RunStatus.PAUSED:
         commands.extend(HoldResource(resource) for resource in _commanded(state))
+    else:
+        commands.extend(_adjusted(state))
     return commands
 
 
@@ -214,6 +223,20 @@ def _start(state: RunState, behavior: Behavior) -> StartBehavior:
         behavior.preempts,
         tuple(state.kept[each].id for each in behavior.resources if each in state.kept),
     )
+
+
+def _adjust(state: RunState, behavior: Behavior) -> AdjustBehavior:
+    return AdjustBehavior(state.epoch, _start(state, behavior), behavior.adjusted)
+
+
+def _adjusted(state: RunState) -> list[Command]:
+    """Return what was adjusted since it was started, which a pause or a crash may have kept from
+    the arbiters; they may get it twice."""
+    return [
+        _adjust(state, behavior)
+        for behavior in state.behaviors.values()
+        if behavior.adjusted and behavior.phase is BehaviorPhase.ACTIVE
+    ]
 
 
 def _cancel(state: RunState, behavior: Behavior) -> CancelBehavior:

@@ -244,6 +244,7 @@ class Behavior:
     """A behavior that was requested and has not ended. Fields as in record `BehaviorRequested`.
 
     `remaining`: the parameters by which another vehicle would do what is left, as last reported.
+    `adjusted`: names of the parameters that were changed since it was started.
     """
 
     id: str
@@ -262,6 +263,7 @@ class Behavior:
     number: int = 0
     native_ref: str | None = None
     remaining: dict[str, Value] | None = None
+    adjusted: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Protocol
 
-from m2pem.api.arbiter import Arbiter, BehaviorReport, BehaviorRequest, fences
+from m2pem.api.arbiter import Arbiter, BehaviorReport, BehaviorRequest, adjusts, fences
 from m2pem.api.clock import Clock
 from m2pem.api.epoch_fence import run_of
-from m2pem.engine.commands import CancelBehavior, StartBehavior
+from m2pem.engine.commands import AdjustBehavior, CancelBehavior, StartBehavior
 from m2pem.errors import StaleCommandError
 from m2pem.executive.behavior_lifecycle import DispatcherView
 from m2pem.executive.fleet_connections import FleetArbiters
@@ -116,6 +116,16 @@ class Dispatcher:
         task = self._enqueue(command.resources, lambda: self._start(command))
         self._starts[command.behavior] = task
         task.add_done_callback(lambda _: self._starts.pop(command.behavior, None))
+
+    def adjust(self, command: AdjustBehavior) -> None:
+        """Let a behavior go on with other parameters, unless it has ended or is being cancelled."""
+        self._enqueue(command.goes_on.resources, lambda: self._adjust(command))
+
+    def may_adjust(self, behavior: str) -> bool:
+        """Whether the speed of a behavior that is commanded can be changed while it goes on. Where
+        vehicles share space, it cannot: the space is reserved for the time at its first speed."""
+        active = self._active.get(behavior)
+        return active is not None and self._clearance is None and adjusts(active.arbiter)
 
     def cancel(self, command: CancelBehavior) -> None:
         """End a behavior; if it has not within its arbiter's limit, it is given up as LOST.
@@ -456,6 +466,26 @@ class Dispatcher:
         wrong = await self._call(f"start {command.behavior}", arbiter.start(request))
         if wrong and self._active.get(command.behavior) is active:
             self._refuse(command.behavior, "REJECTED", wrong)
+
+    async def _adjust(self, command: AdjustBehavior) -> None:
+        goes_on = command.goes_on
+        await self._claims.confirmed()
+        active = self._active.get(goes_on.behavior)
+        if active is None or active.deadline is not None or self._is_barred(goes_on):
+            return
+        kind = BehaviorType(goes_on.type)
+        spec = self.spec(active.resources, goes_on.name, kind)
+        if spec is None or not adjusts(active.arbiter):
+            log.error("%s keeps its speed: its arbiter cannot change it", goes_on.behavior)
+            return
+        try:
+            parameters = self.request(goes_on, spec).parameters
+        except ParameterError as error:
+            log.error("%s keeps its speed: %s", goes_on.behavior, error)
+            return
+        changed = {name: parameters[name] for name in command.names}
+        call = active.arbiter.adjust(goes_on.behavior, command.epoch, changed)
+        await self._call(f"adjust {goes_on.behavior}", call)
 
     def request(self, command: StartBehavior, spec: BehaviorSpec) -> BehaviorRequest:
         """What an arbiter is asked for.

@@ -12,7 +12,7 @@ from m2pem.bpmn.one_task import is_one_task
 from m2pem.engine.inputs import MonitoredRequirement, Revise
 from m2pem.engine.revision import RevisionPlan, plan_revision
 from m2pem.engine.revision.plan import called
-from m2pem.engine.state import RunState
+from m2pem.engine.state import BehaviorPhase, RunState
 from m2pem.errors import MissionError, OperatorError
 from m2pem.executive.incidents import IncidentChoices
 from m2pem.executive.loading import monitored_requirements
@@ -20,7 +20,9 @@ from m2pem.executive.run_starter import RunStarter
 from m2pem.executive.runner import Runner
 from m2pem.executive.supervisor import Supervisor
 from m2pem.findings import Finding, has_errors
+from m2pem.fleet.behaviors import ADJUSTABLE
 from m2pem.fleet.space import waits_for_space
+from m2pem.mission.behavior import BehaviorType
 from m2pem.mission.difference import Difference
 from m2pem.mission.mission import Mission
 
@@ -67,10 +69,29 @@ class RunRevisions:
         if loaded.chooses_resources or waits_for_space(self._supervisor.fleet):
             await asyncio.to_thread(load_solver)
         # From here nothing is awaited: the plan is of this moment.
-        plan = plan_revision(state, loaded, moves, self._supervisor.clock.now_us())
+        now_us, adjustable = self._supervisor.clock.now_us(), self._adjustable(state)
+        plan = plan_revision(state, loaded, moves, now_us, adjustable)
         files = (loaded.file, loaded.source, plan.digest, loaded.library)
-        item = Revise(plan.version, *files, moves=dict(moves), by=by, requirements=requirements)
+        item = Revise(
+            plan.version,
+            *files,
+            moves=dict(moves),
+            by=by,
+            requirements=requirements,
+            adjustable=adjustable,
+        )
         return Prepared(loaded, plan, tuple(found), item)
+
+    def _adjustable(self, state: RunState) -> tuple[str, ...]:
+        """Return the behaviors whose speed can be changed while they go on."""
+        return tuple(
+            each.id
+            for each in state.behaviors.values()
+            if each.phase is BehaviorPhase.ACTIVE
+            and each.type == BehaviorType.VEHICLE
+            and each.name in ADJUSTABLE
+            and self._supervisor.dispatcher.may_adjust(each.id)
+        )
 
     def _requirements(
         self, state: RunState, new: Mission, names: Sequence[str]

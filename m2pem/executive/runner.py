@@ -524,6 +524,9 @@ class Runner:
                 context.allocator.withdraw(command.allocation)
             case c.StartBehavior():
                 self._start(command)
+            case c.AdjustBehavior():
+                if not self._is_held:  # else it goes out when the run is resumed
+                    context.dispatcher.adjust(command)
             case c.CancelBehavior():
                 if not early_done:
                     self._cancel(command)
@@ -590,7 +593,7 @@ class Runner:
     def take_up(self, commands: Sequence[c.Command]) -> None:
         """Carry out what was open before a restart, under this epoch: older ones are refused."""
         for command in commands:
-            if isinstance(command, (c.StartBehavior, c.CancelBehavior)):
+            if isinstance(command, (c.StartBehavior, c.AdjustBehavior, c.CancelBehavior)):
                 command = replace(command, epoch=self.epoch)  # noqa: PLW2901
             self._dispatch(command)
 

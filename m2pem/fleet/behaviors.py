@@ -22,6 +22,10 @@ ALTITUDE_FRAME = ParameterSpec(
 ENDING_PARAMETERS = frozenset({"duration", "timeout", "turns"})
 """Parameters with which a behavior that would go on until it is interrupted ends by itself."""
 
+ADJUSTABLE = frozenset({"single_vehicle_routing", "goto", "area_survey", "reverse"})
+"""Behaviors of a vehicle whose speed can be changed on the way, if its arbiter adjusts: they are
+over at a place, not after a time."""
+
 _SLOWEST_M_S = 0.01
 _SHORTEST_M = 0.1
 _RIGHT_ANGLE = math.pi / 2

@@ -8,6 +8,7 @@ from msgspec.structs import replace
 
 from m2pem.api.arbiter import BehaviorRequest
 from m2pem.api.remaining import RemainingWork
+from m2pem.fleet.behaviors import ADJUSTABLE
 from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.simulation.course import RefusedError
 from m2pem.simulation.event_queue import EventQueue, TimedCall
@@ -127,9 +128,6 @@ SCRIPTED = "a fault of the simulation"
 
 LONGEST_CATCH_UP_US = 3_600_000_000
 """A pursuit that was not observed for longer begins again where it was so long ago."""
-
-ADJUSTABLE = frozenset({"single_vehicle_routing", "goto", "area_survey", "reverse"})
-"""Behaviors whose speed can be changed on the way: they are over at a place, not after a time."""
 
 
 class Simulation:

@@ -111,16 +111,25 @@ class Play:
     def stop(self) -> Self:
         return self.give(i.StopRun("ops"))
 
-    def plan(self, text: str, **moves: str) -> RevisionPlan:
-        """The plan of a revision to the mission that `text` says."""
-        return plan_revision(self.run.state, mission(text), moves, self.now_us)
+    def plan(self, text: str, *adjustable: str, **moves: str) -> RevisionPlan:
+        """The plan of a revision to the mission that `text` says; `adjustable`: behaviors whose
+        arbiters can change their speed."""
+        return plan_revision(self.run.state, mission(text), moves, self.now_us, adjustable)
 
-    def revise(self, text: str, **moves: str) -> Self:
+    def revise(self, text: str, *adjustable: str, **moves: str) -> Self:
         """Revise the run to the mission that `text` says, by the plan of this moment."""
         new = mission(text)
-        plan = plan_revision(self.run.state, new, moves, self.now_us)
+        plan = self.plan(text, *adjustable, **moves)
         assert not plan.refusals, plan.refusals
-        item = i.Revise(plan.version, "new.bpmn", new.source, plan.digest, moves=moves, by="ops")
+        item = i.Revise(
+            plan.version,
+            "new.bpmn",
+            new.source,
+            plan.digest,
+            moves=moves,
+            by="ops",
+            adjustable=adjustable,
+        )
         return self.give(item)
 
     def advance(self, seconds: float) -> Self:

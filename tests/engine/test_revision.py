@@ -1,5 +1,7 @@
 """A running mission is revised: what becomes of tokens, of what they do and of what they await."""
 
+import pytest
+
 from m2pem.engine import inputs as i
 from m2pem.engine.revision import EffectKind
 from m2pem.engine.state import RunStatus
@@ -135,6 +137,66 @@ def test_a_paused_run_begins_its_task_again_when_it_is_resumed() -> None:
     assert play.orders() == ["cancel b1"]
     play.resume()
     assert play.orders() == ["start b2 goto uav1"]
+
+
+FASTER = TWO_TASKS.replace("speed=5", "speed=6")
+
+
+def test_a_behavior_goes_on_at_another_speed_if_its_arbiter_can() -> None:
+    play = Play(TWO_TASKS).start()
+    play.trace()
+    play.orders()
+    (effect,) = play.plan(FASTER, "r1.b1").effects
+    assert effect.kind is EffectKind.ADJUSTS
+    assert effect.text == (
+        "the speed of script task go becomes 6, and behavior goto of uav1 goes on"
+    )
+    play.revise(FASTER, "r1.b1")
+    assert play.trace() == ["revise", "adjust b1 6"]
+    assert play.orders() == ["adjust b1 speed=6"]
+    assert play.behavior("go").parameters == {"speed": "6"}
+    assert play.report("go").ended == "completed"
+
+
+def test_a_plan_with_another_speed_is_that_of_the_arbiters_that_were_asked() -> None:
+    play = Play(TWO_TASKS).start()
+    plan = play.plan(FASTER, "r1.b1")
+    item = i.Revise(plan.version, "m.bpmn", mission(FASTER).source, plan.digest)
+    assert "the run has gone on since" in play.give(item).ignored()
+
+
+def test_a_paused_run_sends_the_other_speed_when_it_is_resumed() -> None:
+    play = Play(TWO_TASKS).start().report("go", state=BehaviorState.RUNNING).pause()
+    play.orders()
+    play.revise(FASTER, "r1.b1")
+    assert play.orders() == []
+    play.resume()
+    assert play.orders() == ["resume uav1", "adjust b1 speed=6"]
+
+
+def test_what_resumes_a_run_sends_the_other_speed_once_more() -> None:
+    play = Play(TWO_TASKS).start().revise(FASTER, "r1.b1")
+    assert [type(each).__name__ for each in play.run.outstanding()] == [
+        "StartBehavior",
+        "AdjustBehavior",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("do goto uav1 speed=5", "do goto uav1 speed=6 altitude=20"),
+        ("do goto uav1 speed=5", "do goto uav1"),
+        ("do goto uav1", "do goto uav1 speed=6"),
+        ("do goto uav1 speed=5", "do goto uav2 speed=6"),
+        ("do goto uav1 speed=5", "do goto uav1 speed=${fast}"),
+    ],
+)
+def test_what_differs_in_more_than_a_speed_begins_again(old: str, new: str) -> None:
+    begun = TWO_TASKS.replace("do goto uav1 speed=5", old)
+    play = Play(begun).start()
+    plan = play.plan(begun.replace(old, new), "r1.b1")
+    assert kinds(plan) == [("restarts", "go")]
 
 
 def test_another_prompt_is_asked_again() -> None:

@@ -66,6 +66,7 @@ APPLIERS: dict[type, Callable[[RunState, Any], None]] = {
     r.AllocationEnded: tasks.allocation_ended,
     r.BehaviorRequested: tasks.behavior_requested,
     r.BehaviorProgressed: tasks.behavior_progressed,
+    r.BehaviorAdjusted: tasks.behavior_adjusted,
     r.BehaviorCancelRequested: tasks.behavior_cancel_requested,
     r.BehaviorUnsettled: tasks.behavior_unsettled,
     r.BehaviorContinued: tasks.behavior_continued,

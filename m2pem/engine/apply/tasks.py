@@ -76,6 +76,12 @@ def behavior_progressed(state: RunState, record: r.BehaviorProgressed) -> None:
         behavior.remaining = record.remaining
 
 
+def behavior_adjusted(state: RunState, record: r.BehaviorAdjusted) -> None:
+    behavior = state.behaviors[record.behavior]
+    behavior.parameters = {**behavior.parameters, **record.parameters}
+    behavior.adjusted = (*behavior.adjusted, *(record.parameters.keys() - behavior.adjusted))
+
+
 def behavior_cancel_requested(state: RunState, record: r.BehaviorCancelRequested) -> None:
     behavior = state.behaviors[record.behavior]
     behavior.phase = BehaviorPhase.CANCELLING
@@ -96,6 +102,7 @@ def behavior_restarted(state: RunState, record: r.BehaviorRestarted) -> None:
     behavior = state.behaviors[record.behavior]
     behavior.phase = BehaviorPhase.ACTIVE
     behavior.state = None
+    behavior.adjusted = ()
     behavior.number = 0
     behavior.native_ref = None
 

@@ -93,6 +93,13 @@ class BehaviorProgressed(BaseRecord, frozen=True):
     remaining: dict[str, Value] | None = None
 
 
+class BehaviorAdjusted(BaseRecord, frozen=True):
+    """A behavior goes on with these parameters, in place of those of the same names."""
+
+    behavior: str
+    parameters: dict[str, Value]
+
+
 class BehaviorCancelRequested(BaseRecord, frozen=True):
     """A behavior is to be cancelled; its resources are released when it has ended."""
 

@@ -6,10 +6,19 @@ plan that was shown.
 """
 
 from m2pem.engine.revision.carrying_out import revise
-from m2pem.engine.revision.plan import Arming, Effect, EffectKind, Move, Refusal, RevisionPlan
+from m2pem.engine.revision.plan import (
+    Adjustment,
+    Arming,
+    Effect,
+    EffectKind,
+    Move,
+    Refusal,
+    RevisionPlan,
+)
 from m2pem.engine.revision.planning import plan_revision
 
 __all__ = [
+    "Adjustment",
     "Arming",
     "Effect",
     "EffectKind",

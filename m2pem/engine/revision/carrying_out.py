@@ -34,7 +34,7 @@ def revise(x: Steps, item: Revise) -> None:
     if new is None:
         x.ignore("the new version of the mission cannot be read")
         return
-    plan = plan_revision(x.state, new, item.moves, x.now_us)
+    plan = plan_revision(x.state, new, item.moves, x.now_us, item.adjustable)
     if plan.version != item.version:
         x.ignore(f"the files are not those of version {item.version}")
     elif plan.refusals:
@@ -63,6 +63,8 @@ def _carry_out(x: Steps, plan: RevisionPlan, item: Revise) -> None:
     monitor(x, item.requirements)
     for move in plan.moves:
         _enter(x, move)
+    for adjustment in plan.adjustments:
+        x.emit(r.BehaviorAdjusted(adjustment.behavior, adjustment.parameters))
     for arming in plan.armings:
         _arm(x, arming)
     for number in plan.restarted:

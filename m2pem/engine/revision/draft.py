@@ -1,8 +1,9 @@
 """A plan of a revision in the making."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 from m2pem.engine.revision.plan import (
+    Adjustment,
     Arming,
     Effect,
     EffectKind,
@@ -19,9 +20,16 @@ from m2pem.mission.version import version_of
 
 
 class PlanDraft:
-    """What was found so far."""
+    """What was found so far. `adjustable`: behaviors whose speed can change while they go on."""
 
-    def __init__(self, state: RunState, new: Mission, moves: Mapping[str, str]) -> None:
+    def __init__(
+        self,
+        state: RunState,
+        new: Mission,
+        moves: Mapping[str, str],
+        adjustable: Collection[str] = (),
+    ) -> None:
+        self.adjustable = adjustable
         self.difference: Difference = difference(state.mission, new)
         self._versions = version_of(new), version_of(state.mission)
         self._requested = dict(moves)
@@ -29,6 +37,7 @@ class PlanDraft:
         self._refusals: list[Refusal] = []
         self._moves: list[Move] = []
         self._restarted: list[int] = []
+        self._adjustments: list[Adjustment] = []
         self._disarmed: list[int] = []
         self._armings: list[Arming] = []
         self._rechecked: list[int] = []
@@ -64,6 +73,10 @@ class PlanDraft:
         """Have the task of a token begin again."""
         self._restarted.append(token.id)
 
+    def adjust(self, adjustment: Adjustment) -> None:
+        """Have a behavior go on with other parameters."""
+        self._adjustments.append(adjustment)
+
     def disarm(self, wait: Wait) -> None:
         """Have an event awaited no longer."""
         self._disarmed.append(wait.id)
@@ -94,6 +107,7 @@ class PlanDraft:
             tuple(self._refusals),
             tuple(self._moves),
             tuple(self._restarted),
+            tuple(self._adjustments),
             tuple(self._disarmed),
             tuple(self._armings),
             tuple(self._rechecked),

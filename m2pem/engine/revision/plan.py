@@ -7,6 +7,7 @@ from enum import StrEnum
 
 from m2pem.mission.difference import Difference
 from m2pem.mission.elements import Element
+from m2pem.mission.values import Value
 
 
 class EffectKind(StrEnum):
@@ -18,6 +19,8 @@ class EffectKind(StrEnum):
     """The work of the token's element ends, and the token is consumed."""
     RESTARTS = "restarts"
     """The task of the token begins again: its behavior, prompt or service is cancelled first."""
+    ADJUSTS = "adjusts"
+    """The behavior of the token goes on at another speed."""
     GOES_ON = "goes on"
     """A token that waited at a join waits no longer, or for others than before."""
     ARMS = "arms"
@@ -76,11 +79,19 @@ class Arming:
 
 
 @dataclass(frozen=True, slots=True)
+class Adjustment:
+    """A behavior goes on with these parameters in place of those of the same names."""
+
+    behavior: str
+    parameters: dict[str, Value]
+
+
+@dataclass(frozen=True, slots=True)
 class RevisionPlan:
     """What a revision does to a run in the state for which the plan was made.
 
     `version`, `previous`: of the files (`m2pem.mission.version`). `requested`: where tokens were
-    asked to go, by element. The last five fields are what carrying it out needs; `rechecked`:
+    asked to go, by element. The last six fields are what carrying it out needs; `rechecked`:
     scopes of ad-hoc subprocesses that offer or begin other activities now.
     """
 
@@ -92,6 +103,7 @@ class RevisionPlan:
     refusals: tuple[Refusal, ...]
     moves: tuple[Move, ...] = field(repr=False, default=())
     restarted: tuple[int, ...] = field(repr=False, default=())
+    adjustments: tuple[Adjustment, ...] = field(repr=False, default=())
     disarmed: tuple[int, ...] = field(repr=False, default=())
     armings: tuple[Arming, ...] = field(repr=False, default=())
     rechecked: tuple[int, ...] = field(repr=False, default=())

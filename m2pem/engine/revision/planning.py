@@ -5,7 +5,7 @@ that are asked for alone; `now_us` is only for what its sentences say about time
 """
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 from m2pem.engine.apply.tokens import is_join
 from m2pem.engine.revision.awaited import AwaitedEvents
@@ -30,26 +30,36 @@ from m2pem.suggestions import did_you_mean
 
 
 def plan_revision(
-    state: RunState, new: Mission, moves: Mapping[str, str], now_us: int
+    state: RunState,
+    new: Mission,
+    moves: Mapping[str, str],
+    now_us: int,
+    adjustable: Collection[str] = (),
 ) -> RevisionPlan:
     """Return what a revision to a new version does to a run.
 
     `moves`: where a token on an element goes first, by the ids of elements or, at a join, of
-    sequence flows; "": it ends there. `now_us`: microseconds since the Unix epoch.
+    sequence flows; "": it ends there. `now_us`: microseconds since the Unix epoch. `adjustable`:
+    behaviors whose speed can change while they go on.
     """
-    return _Planning(state, new, moves, now_us).plan()
+    return _Planning(state, new, moves, now_us, adjustable).plan()
 
 
 class _Planning:
     """The plan of one revision in the making."""
 
     def __init__(
-        self, state: RunState, new: Mission, moves: Mapping[str, str], now_us: int
+        self,
+        state: RunState,
+        new: Mission,
+        moves: Mapping[str, str],
+        now_us: int,
+        adjustable: Collection[str],
     ) -> None:
         self._state = state
         self._new = new
         self._moves = moves
-        self._draft = PlanDraft(state, new, moves)
+        self._draft = PlanDraft(state, new, moves, adjustable)
         self._events = AwaitedEvents(state, new, self._draft, now_us)
         self._moved: set[str] = set()
         self._waiting: deque[tuple[Scope, Container]] = deque()

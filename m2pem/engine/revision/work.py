@@ -1,11 +1,14 @@
 """What a revision does to the work of a token on an activity: its behavior, prompt or service.
 
-Work that the new version says in another way begins again, from the start of its task.
+Work that the new version says in another way begins again, from the start of its task; but a
+behavior of which only the speed changes goes on, if its arbiter can change that.
 """
+
+from dataclasses import replace
 
 from m2pem.engine.incidents import behavior_at
 from m2pem.engine.revision.draft import PlanDraft
-from m2pem.engine.revision.plan import EffectKind, called
+from m2pem.engine.revision.plan import Adjustment, EffectKind, called
 from m2pem.engine.state import BehaviorPhase, RunState, Token
 from m2pem.mission.behavior import Behavior
 from m2pem.mission.difference import Plain, plain
@@ -76,6 +79,12 @@ def plan_work(
         text = f"answer prompt {token.prompt} first: it is not known what {doing} does"
         draft.refuse(node.id, f"{what} of {called(node)} changes: {text}", token.id)
         return False
+    speed = "" if _geometry(state, new, token) else _speed(node, again)
+    if speed and behavior is not None and behavior.id in draft.adjustable:
+        text = f"the speed of {called(again)} becomes {speed}, and {doing} goes on"
+        draft.add(EffectKind.ADJUSTS, node.id, token.id, text)
+        draft.adjust(Adjustment(behavior.id, {_SPEED: speed}))
+        return False
     text = f"{what} of {called(again)} changes: {doing} is cancelled and the task begins again"
     draft.add(EffectKind.RESTARTS, node.id, token.id, text)
     draft.restart(token)
@@ -84,6 +93,27 @@ def plan_work(
         for wait in own:
             draft.disarm(wait)
     return True
+
+
+_SPEED = "speed"
+
+
+def _speed(node: Activity, again: Activity) -> str:
+    """Return the speed in the new version, if that alone differs and both say it; else ""."""
+    old, new = behavior_at(node), behavior_at(again)
+    if old is None or new is None:
+        return ""
+    was = {each.name: each.value for each in old.parameters}
+    now = {each.name: each.value for each in new.parameters}
+    speed = now.get(_SPEED)
+    if not isinstance(speed, str) or not isinstance(was.get(_SPEED), str):
+        return ""
+    return "" if _difference(_without_speed(old), _without_speed(new)) else speed
+
+
+def _without_speed(behavior: Behavior) -> Behavior:
+    others = tuple(each for each in behavior.parameters if each.name != _SPEED)
+    return replace(behavior, parameters=others)
 
 
 def _doing(state: RunState, token: Token) -> str:

@@ -48,8 +48,10 @@ def place(simulator: Simulator, number: int) -> tuple[float, float]:
     return east, north
 
 
-def drives(*targets: tuple[float, float]) -> list[tuple[str, dict[str, object]]]:
-    return [("goto", {"target": list(at(*each)), "speed": 5}) for each in targets]
+def drives(
+    *targets: tuple[float, float], speed: str = "5 m/s"
+) -> list[tuple[str, dict[str, object]]]:
+    return [("goto", {"target": list(at(*each)), "speed": speed}) for each in targets]
 
 
 def both(first: list[Any], second: list[Any]) -> bytes:
@@ -104,3 +106,41 @@ def test_a_way_that_is_driven_is_changed_and_the_other_vehicle_goes_on(tmp_path:
         ("A2", ("rover1",)),
     ]
     assert after[0].preempts == (cancelled[0].behavior,)
+
+
+@pytest.mark.timeout(240)
+def test_only_the_speed_of_a_way_that_is_driven_is_changed(tmp_path: Path) -> None:
+    slower = both(drives((FAR_M, 0.0), speed="2 m/s"), OTHER)
+
+    async def main(clock: Clock) -> list[Any]:
+        specs = [
+            VehicleSpec(Kind.ROVER, number, Location(*at(*each), HOME_ALTITUDE_M), estimator_s=1.0)
+            for number, each in STARTS.items()
+        ]
+        async with Simulator(specs, speed=SPEED, to=None) as simulator:
+            fleet = load_fleet(fleet_file(tmp_path, simulator))
+            executive = Executive(fleet, MemoryJournal(), PluginManager(), clock, speed=SPEED)
+
+            async def driven_m(number: int) -> float:
+                """How far a rover comes in ten seconds of its own."""
+                begun_m, now_s = place(simulator, number)[0], simulator[number].autopilot.now_s
+                await simulator.until(lambda: simulator[number].autopilot.now_s > now_s + 10.0)
+                return place(simulator, number)[0] - begun_m
+
+            async with executive:
+                control = executive.control
+                run = await control.start(BEGUN)
+                await simulator.until(lambda: place(simulator, 1)[0] > 10)
+                before = simulator[1].motions, simulator[2].motions
+                plan = await control.plan_revision(run, slower)
+                assert [(each.kind, each.element) for each in plan.effects] == [("adjusts", "A1")]
+                await control.revise(run, slower, plan.plan)
+                await driven_m(1)
+                assert await driven_m(1) == pytest.approx(20.0, abs=2.0)
+                assert (simulator[1].motions, simulator[2].motions) == before
+                assert (await control.wait(run)).status is RunStatus.COMPLETED
+                return [each.record for each in await control.records(run)]
+
+    records = run_on_loopback(main, SPEED)
+    assert sum(isinstance(each, r.BehaviorAdjusted) for each in records) == 1
+    assert not any(isinstance(each, r.BehaviorCancelRequested) for each in records)

@@ -277,6 +277,11 @@ class RunTrace:
         if (span := self._behaviors.get(record.behavior)) is not None:
             span.add(record.state.value, at_us, native_reference=record.native_ref or "")
 
+    def _adjusted(self, record: r.BehaviorAdjusted, seq: int, at_us: int) -> None:
+        if (span := self._behaviors.get(record.behavior)) is not None:
+            changed = tuple(f"{name}={value}" for name, value in record.parameters.items())
+            span.add("adjusted", at_us, parameters=changed)
+
     def _cancelling(self, record: r.BehaviorCancelRequested, seq: int, at_us: int) -> None:
         if (span := self._behaviors.get(record.behavior)) is not None:
             span.add("cancel requested", at_us, error_code=record.code, reason=record.reason)
@@ -456,6 +461,7 @@ _HANDLERS: dict[type, Callable[..., None]] = {
     r.AllocationEnded: RunTrace._not_allocated,
     r.BehaviorRequested: RunTrace._behavior,
     r.BehaviorProgressed: RunTrace._progressed,
+    r.BehaviorAdjusted: RunTrace._adjusted,
     r.BehaviorCancelRequested: RunTrace._cancelling,
     r.BehaviorUnsettled: RunTrace._unsettled,
     r.BehaviorContinued: RunTrace._continued,

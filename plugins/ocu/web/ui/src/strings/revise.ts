@@ -40,6 +40,7 @@ export const revise = {
     moves: "moves",
     ends: "ends",
     restarts: "begins again",
+    adjusts: "goes on at another speed",
     "goes on": "goes on",
     arms: "is awaited",
     rearms: "is awaited otherwise",

@@ -42,6 +42,7 @@ export const revise: Translation<typeof english.revise> = {
     moves: "geht weiter",
     ends: "endet",
     restarts: "beginnt neu",
+    adjusts: "fährt mit anderer Geschwindigkeit fort",
     "goes on": "fährt fort",
     arms: "wird erwartet",
     rearms: "wird anders erwartet",
