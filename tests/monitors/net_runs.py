@@ -8,12 +8,9 @@ from m2pem.verify.ltl.formula import Completed, Proposition
 from m2pem.verify.net.encoding import Encoding
 from m2pem.verify.net.petri_net import Kind, PetriNet, Role
 from m2pem.verify.requirements.propositions import Labels
+from tests.verify.trace_mapping import TooManyStatesError
 
 MOST_STATES = 20_000
-
-
-class TooManyStatesError(Exception):
-    """The net leaves too much open."""
 
 
 class NetRuns:

@@ -21,8 +21,9 @@ from m2pem.verify.net.petri_net import Exactness, PetriNet
 from m2pem.verify.translate import Options, translate
 from tests.engine.notation import mission as notation
 from tests.engine.random_missions import graph, structured
-from tests.monitors.net_runs import NetRuns, TooManyStatesError
+from tests.monitors.net_runs import NetRuns
 from tests.verify.models import Walk
+from tests.verify.trace_mapping import TooManyStatesError
 
 ROOT = Path(__file__).parents[2]
 OPEN = Options(open_world=True, service_writes={"Detector": ["detection.type"]})
@@ -77,14 +78,21 @@ def all_propositions(mission: Mission, net: PetriNet) -> list[Proposition]:
     ]
 
 
-def first_unlike(mission: Mission, seeds: range) -> str:
-    """What a run of the engine does that no run of the net does; "" if there is nothing."""
+def first_unlike(mission: Mission, seeds: range) -> str | None:
+    """What a run of the engine does that no run of the net does; "" if there is nothing.
+
+    None: the states of the net could not be followed in any run, as they are too many.
+    """
     net, fleet = translate(mission, options=OPEN), fleet_for(mission)
     if any(each.exactness is Exactness.BOUNDED for each in net.approximations):
         return ""
     known = all_propositions(mission, net)
+    followed = 0
     for seed in seeds:
-        walk, runs = Walk(mission, fleet, net, seed), NetRuns(net, mission, fleet, known)
+        try:
+            walk, runs = Walk(mission, fleet, net, seed), NetRuns(net, mission, fleet, known)
+        except TooManyStatesError:
+            continue
         given: list[int] = []
         moments = Moments(known, mission, fleet, lambda letter, _: given.append(letter))  # noqa: B023
         receive = walk.run.receive
@@ -109,9 +117,10 @@ def first_unlike(mission: Mission, seeds: range) -> str:
             lost = walk.go()
         except TooManyStatesError:
             continue
+        followed += 1
         if not lost and unlike:
             return unlike[0]
-    return ""
+    return "" if followed else None
 
 
 @pytest.mark.parametrize("part", range(PARTS))
@@ -134,12 +143,18 @@ def test_each_moment_of_a_run_is_one_of_a_run_of_the_net(part: int) -> None:
     ("first", "last"), [(0, 60), pytest.param(60, 1_000, marks=pytest.mark.long)]
 )
 def test_it_is_so_of_random_missions(first: int, last: int) -> None:
-    wrong = {}
+    wrong, compared, passed_over = {}, 0, 0
     for seed in range(first, last):
         mission = notation((structured if seed % 2 else graph)(Random(seed)))
-        if is_step_by_step(mission) and (found := first_unlike(mission, range(3))):
+        if not is_step_by_step(mission):
+            continue
+        found = first_unlike(mission, range(3))
+        compared += found is not None
+        passed_over += found is None
+        if found:
             wrong[seed] = found
     assert wrong == {}
+    assert passed_over * 50 <= compared
 
 
 def letters(mission: Mission, formula: str, seed: int) -> list[frozenset[str]]:
