@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from html import escape
 
 from m2pem.campaign.charts import DARK, DARK_SCREEN, LIGHT
-from m2pem.campaign.report import Code, Report, Section, Table
+from m2pem.campaign.report import Report, Section, Table
 
 STYLE = (
     f":root{{color-scheme:light dark;{LIGHT}}}{DARK_SCREEN}{{:root{{{DARK}}}}}"
@@ -59,6 +59,9 @@ def _section(section: Section, name: str) -> Iterator[str]:
     yield _wide(f"Table: {section.title}", _table(section.table, name))
     for text in section.after:
         yield f"<p>{escape(text)}</p>"
+    if section.commands:
+        typed = escape("\n".join(section.commands))
+        yield _wide(f"Commands: {section.title}", f"<pre>{typed}</pre>")
     if section.chart is not None:
         drawn = _wide(f"Chart: {section.chart.title}", section.chart.svg())
         yield f"<figure>\n{drawn}\n</figure>"
@@ -80,8 +83,8 @@ def _table(table: Table, name: str) -> str:
     )
     body = "\n".join(
         "<tr>"
-        f'<th scope="row"{style[0]}>{_cell(row[0])}</th>'
-        + "".join(f"<td{style[place]}>{_cell(cell)}</td>" for place, cell in enumerate(row[1:], 1))
+        f'<th scope="row"{style[0]}>{escape(row[0])}</th>'
+        + "".join(f"<td{style[place]}>{escape(cell)}</td>" for place, cell in enumerate(row[1:], 1))
         + "</tr>"
         for row in table.rows
     )
@@ -96,8 +99,3 @@ def _style(cells: Sequence[str]) -> str:
     if any(map(_NUMBER.fullmatch, cells)):
         return ' class="number"'
     return ' class="interval"' if any(map(_INTERVAL.match, cells)) else ""
-
-
-def _cell(cell: str) -> str:
-    text = escape(cell)
-    return f"<code>{text}</code>" if isinstance(cell, Code) else text

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from m2pem.campaign.report import Code, Report, Section
+from m2pem.campaign.report import Report, Section
 
 
 def markdown_lines(report: Report, *, images: bool = False) -> list[str]:
@@ -23,15 +23,13 @@ def _section(section: Section, *, images: bool) -> list[str]:
     lines += [_row(cells) for cells in section.table.rows]
     for text in section.after:
         lines += ["", text]
+    if section.commands:
+        lines += ["", *(f"    {each}" for each in section.commands)]
     if images and section.chart is not None:
         lines += ["", f"![{section.chart.title}]({section.chart.name}.svg)"]
     return lines
 
 
 def _row(cells: Sequence[str]) -> str:
-    return f"| {' | '.join(map(_cell, cells))} |"
-
-
-def _cell(cell: str) -> str:
-    text = f"`{cell}`" if isinstance(cell, Code) else cell
-    return text.replace("|", "\\|")
+    escaped = (cell.replace("|", "\\|") for cell in cells)
+    return f"| {' | '.join(escaped)} |"

@@ -3,10 +3,11 @@
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from m2pem.campaign.campaign import CampaignResult
 from m2pem.campaign.charts import Chart, Histogram, Interval, Intervals
-from m2pem.campaign.runs import Row
+from m2pem.campaign.runs import Order, Row, replay_command
 from m2pem.campaign.statistics import (
     CONFIDENCE,
     Estimate,
@@ -27,12 +28,6 @@ WORST = 5
 MOST_EFFECTS = 15
 
 
-class Code(str):
-    """A cell with what is typed."""
-
-    __slots__ = ()
-
-
 @dataclass(frozen=True, slots=True)
 class Table:
     """Cells by rows; the first cell names its row."""
@@ -43,12 +38,13 @@ class Table:
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """`before`, `after`: paragraphs around the table."""
+    """`before`, `after`: paragraphs around the table. `commands`: to be typed, after these."""
 
     title: str
     before: tuple[str, ...]
     table: Table
     after: tuple[str, ...] = ()
+    commands: tuple[str, ...] = ()
     chart: Chart | None = None
 
 
@@ -67,10 +63,10 @@ def answers_name(row: Row) -> str:
 
 
 def report_of(
-    result: CampaignResult, other: CampaignResult | None = None, *, answers: bool = False
+    result: CampaignResult, other: CampaignResult | None = None, folder: Path | None = None
 ) -> Report:
-    """Return the report. `other`: the campaign that it is compared with. `answers`: the worst runs
-    are there as answers files."""
+    """Return the report. `other`: the campaign that it is compared with. `folder`: where the
+    worst runs are, as answers files."""
     rows = rehearsed(result.rows)
     paragraphs = [
         f"{len(rows):,} runs of {result.wanted:,}, seed {result.order.seed}. Intervals are of "
@@ -94,7 +90,7 @@ def report_of(
             _quantities(rows),
             *_effects(rows),
             *([] if other is None else [_difference(result, other)]),
-            *([_worst(rows)] if answers else []),
+            *([] if folder is None else [_worst(rows, result.order, folder)]),
         ]
     title = f"Campaign of {result.order.mission.file}"
     return Report(title, tuple(paragraphs), tuple(sections))
@@ -218,19 +214,17 @@ def _difference(result: CampaignResult, other: CampaignResult) -> Section:
     )
 
 
-def _worst(rows: Sequence[Row]) -> Section:
+def _worst(rows: Sequence[Row], order: Order, folder: Path) -> Section:
     listed = [
-        (
-            str(row["run"]),
-            row["outcome"],
-            row["end"],
-            f"{row['took_s']:.1f}",
-            Code(f"m2pem simulate ... --answers {answers_name(row)}"),
-        )
+        (str(row["run"]), row["outcome"], row["end"], f"{row['took_s']:.1f}")
         for row in worst(rows, WORST)
     ]
-    columns = ("run", "outcome", "end", "time, s", "rehearse it again")
-    return Section("Worst runs", (), _table(columns, listed))
+    commands = (replay_command(order, folder / answers_name(row)) for row in worst(rows, WORST))
+    after = (
+        "Each command rehearses its run again, in the folder in which the campaign was begun:",
+    )
+    table = _table(("run", "outcome", "end", "time, s"), listed)
+    return Section("Worst runs", (), table, after, tuple(commands))
 
 
 def _number(value: float, shape: str) -> str:

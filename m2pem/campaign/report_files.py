@@ -7,7 +7,7 @@ from m2pem.campaign.folder import write_parquet
 from m2pem.campaign.html import html_page
 from m2pem.campaign.markdown import markdown_lines
 from m2pem.campaign.report import WORST, answers_name, report_of
-from m2pem.campaign.runs import answers_text, replayed
+from m2pem.campaign.runs import answers_text, replay_command, replayed
 from m2pem.campaign.statistics import rehearsed, worst
 
 
@@ -20,10 +20,11 @@ def write_report(folder: Path, result: CampaignResult, other: CampaignResult | N
         file = folder / answers_name(row)
         file.parent.mkdir(exist_ok=True)
         remark = f"Run {row['run']} of a campaign of {result.order.mission.file}: {row['outcome']}"
-        file.write_text(answers_text(drawn, remark), encoding="utf-8")
+        command = replay_command(result.order, file)
+        file.write_text(answers_text(drawn, f"{remark}\n{command}"), encoding="utf-8")
     if rows:
         write_parquet(folder / "runs.parquet", result.rows)
-    report = report_of(result, other, answers=True)
+    report = report_of(result, other, folder)
     for section in report.sections:
         if section.chart is not None:
             file = folder / f"{section.chart.name}.svg"

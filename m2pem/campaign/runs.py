@@ -1,5 +1,7 @@
 """The runs of a campaign, a chunk at a time: what each process of a pool or cluster does."""
 
+import json
+import shlex
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -7,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from m2pem.api.authoring import MissionFiles
+from m2pem.api.data_text import value_of
 from m2pem.api.runs import RunStatus, StampedRecord
 from m2pem.campaign.variations import DrawnRun, Variations, read_variations
 from m2pem.engine import records as r
@@ -220,7 +223,37 @@ def answers_text(drawn: DrawnRun, remark: str) -> str:
     yaml.default_flow_style = None
     yaml.width = 120
     yaml.dump(drawn.answers, out)
-    return f"# {remark}\n{out.getvalue()}"
+    return "".join(f"# {line}\n" for line in remark.splitlines()) + out.getvalue()
+
+
+def replay_command(order: Order, answers: Path) -> str:
+    """Return the command, for a shell, that rehearses a run of a campaign again from its answers
+    file: the same records, in the folder in which the campaign was begun."""
+    words = ["m2pem", "simulate", order.mission.file, "--fleet", restore(order.fleet).file]
+    if order.process is not None:
+        words += ["--process", order.process]
+    own = Path(order.mission.file).parent
+    called = [
+        each for each in order.mission.library if any(of == "call" for of, *_ in each.answers)
+    ]
+    for folder in dict.fromkeys(Path(each.name).parent for each in called):
+        if folder != own:
+            words += ["--path", str(folder)]
+    for name, value in order.data.items():
+        words += ["--data", f"{name}={_written(value)}"]
+    words += ["--answers", str(answers), "--max-steps", str(order.max_steps)]
+    return shlex.join(words)
+
+
+def _written(value: Value) -> str:
+    """Return a value of the data as `--data` reads it."""
+    if isinstance(value, str):
+        try:
+            if value_of(value, "") == value:
+                return value
+        except OperatorError:
+            pass  # it needs quotes
+    return json.dumps(value, ensure_ascii=False)
 
 
 def read_text(file: Path) -> bytes:
