@@ -4,8 +4,8 @@ from collections.abc import Iterable, Mapping
 
 from m2pem.engine.inputs import MonitoredRequirement
 from m2pem.engine.records import RequirementMonitored
-from m2pem.verify.ltl import propositions, show
-from m2pem.verify.ltl.formula import Active, Completed, needs_steps
+from m2pem.verify.ltl import show
+from m2pem.verify.ltl.formula import Active, Completed, needs_steps, walk
 from m2pem.verify.requirements import Requirement
 
 
@@ -22,7 +22,7 @@ def monitored(requirements: Iterable[Requirement]) -> tuple[MonitoredRequirement
             tuple(
                 dict.fromkeys(
                     named.element
-                    for named in propositions(each.formula)
+                    for named in walk(each.formula)
                     if isinstance(named, Active | Completed)
                 )
             ),
