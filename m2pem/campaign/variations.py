@@ -33,6 +33,7 @@ _SHOWN: Mapping[str, tuple[str, float]] = {
     "from": _DEGREES,
     "wind_from": _DEGREES,
     "battery": ("%", 100),
+    "duration_factor": ("times", 1),
     **dict.fromkeys(("wind", "max_speed", "cruise_speed", "climb_rate"), ("m/s", 1)),
 }
 """By the last part of a name: the unit that people read, and its factor. Others are times, in s."""
@@ -172,6 +173,9 @@ class _Drawing:
         if varied.duration is not None:
             after_s = self._number(f"{key}.duration", varied.duration, visit)
             return {"after": after_s, "end": "succeeded"}
+        if varied.duration_factor is not None:
+            factor = self._number(f"{key}.duration_factor", varied.duration_factor, visit)
+            return {"end": "simulated", "factor": factor}
         return {"end": "simulated"}
 
     def _service(self, name: str, varied: VariedService, visit: int) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 from pydantic import (
     BaseModel,
@@ -14,6 +14,7 @@ from pydantic import (
     ValidationError,
     WithJsonSchema,
     create_model,
+    model_validator,
 )
 
 from m2pem.api.simulator_settings import fraction
@@ -25,12 +26,16 @@ from m2pem.campaign.distributions import (
 )
 from m2pem.errors import AnswersError
 from m2pem.fleet.yaml_source import YamlSource, note_shape_findings, parse_yaml, read_yaml
-from m2pem.units import UNITS, Dimension, quantity
+from m2pem.units import UNITS, Dimension, plain_number, quantity
 
 VISITS = 8
 """For so many visits of an element what happens is drawn, unless the file says otherwise."""
 
+LEAST_FACTOR = 0.001
+"""A normal distribution of factors begins there."""
+
 _NUMBER = r"\+?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?"
+_ABOVE_0 = rf"(?=\+?[0-9]*\.?[0-9]*[1-9]){_NUMBER}"
 _SIGNED = rf"-?{_NUMBER}"
 _PERCENT = r"\+?(100(\.0*)?|[0-9]{1,2}(\.[0-9]*)?|\.[0-9]+)\s*%"
 _FRACTION = r"\+?(1(\.0*)?|0(\.[0-9]*)?|\.[0-9]+|[0-9](\.[0-9]*)?[eE]-[0-9]+)"
@@ -70,6 +75,13 @@ def _of(dimension: Dimension) -> BeforeValidator:
     return _drawn(dimension.value, Quantity(read, 0.0), value, rf"{text}\s*\.\.\s*{text}")
 
 
+def _factor(said: object) -> float:
+    value = plain_number(said)
+    if value <= 0:
+        raise ValueError(f"{said!r} is not above 0")
+    return value
+
+
 _ANGLE_UNITS = "|".join(UNITS[Dimension.ANGLE])
 _ANGLE = Quantity(lambda said: quantity(said, Dimension.ANGLE))
 
@@ -100,6 +112,20 @@ _READ_FRACTION = _drawn(
     rf"({_PERCENT[:-1]}%?|{_FRACTION})\s*\.\.\s*({_PERCENT}|{_FRACTION})",
 )
 Fraction = Annotated[Distribution, _READ_FRACTION]
+Factor = Annotated[
+    Distribution,
+    _drawn(
+        "factor",
+        Quantity(_factor, LEAST_FACTOR),
+        {
+            "anyOf": [
+                {"type": "number", "exclusiveMinimum": 0},
+                {"type": "string", "pattern": rf"^\s*{_ABOVE_0}\s*$"},
+            ]
+        },
+        rf"{_ABOVE_0}\s*\.\.\s*{_ABOVE_0}",
+    ),
+]
 Probability = Annotated[float, Field(ge=0, le=1)]
 Weight = Annotated[float, Field(ge=0)]
 
@@ -127,10 +153,22 @@ class Failure(_Model):
 
 
 class VariedBehavior(_Model):
-    """Of each visit of a task with a behavior. `duration`: its own, in place of the vehicle's."""
+    """Of each visit of a task with a behavior. `duration`: its own, in place of the vehicle's.
+    `duration_factor`: how many times as long it takes as by the vehicle's motion."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"not": {"required": ["duration", "duration_factor"]}}
+    )
 
     duration: Seconds | None = None
+    duration_factor: Factor | None = None
     fails: Failure | None = None
+
+    @model_validator(mode="after")
+    def _one_duration(self) -> Self:
+        if {"duration", "duration_factor"} <= self.model_fields_set:
+            raise ValueError("it has both 'duration' and 'duration_factor': one of them decides")
+        return self
 
 
 class WeightedData(_Model):

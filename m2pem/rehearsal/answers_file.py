@@ -87,9 +87,11 @@ class ServiceEntry(_Model):
 
 
 class BehaviorEntry(_Model):
-    """The end of one behavior that a task commands on simulated vehicles or payloads."""
+    """The end of one behavior that a task commands on simulated vehicles or payloads. `factor`: how
+    many times as long it takes as by its motion."""
 
     after: Seconds = 0.0
+    factor: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 1.0
     end: Literal["succeeded", "failed", "stalled", "lost", "simulated"]
     error: Text | None = None
 
@@ -97,6 +99,8 @@ class BehaviorEntry(_Model):
     def _error_of_a_failure(self) -> Self:
         if ("after" in self.model_fields_set) != (self.end != "simulated"):
             raise ValueError("'after' goes with every end but 'simulated', which comes by itself")
+        if "factor" in self.model_fields_set and self.end != "simulated":
+            raise ValueError(f"'factor' goes with 'end: simulated', not {self.end}")
         if self.error is not None and self.end in ("succeeded", "stalled", "simulated"):
             raise ValueError(f"'error' goes with 'end: failed' or 'end: lost', not {self.end}")
         return self

@@ -13,13 +13,16 @@ from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.values import Value
 from m2pem.plugins import Plugins
 from m2pem.rehearsal.answers import Answers
-from m2pem.rehearsal.answers_file import ServiceEntry
+from m2pem.rehearsal.answers_file import BehaviorEntry, ServiceEntry
 from m2pem.simulation.arbiters import SimArbiter
 
 if TYPE_CHECKING:
     from m2pem.engine.records import Record
     from m2pem.fleet.fleet import Fleet
     from m2pem.mission.mission import Mission
+
+_SIMULATED = BehaviorEntry(end="simulated")
+"""As without an entry."""
 
 Unscripted = Callable[[str], ServiceEntry | None]
 """What a service of that class does where the answers say nothing; None: it is run."""
@@ -142,11 +145,14 @@ class ScriptedArbiter:
         scripted = self._answers.behavior(run, f"{run}.{number}")
         # Of a team's behavior each member's own part is scripted, not what it takes over later.
         own = part in ([], [*request.resources])
-        if scripted is not None and own and scripted[1].end != "simulated":
+        if scripted is not None and own and scripted[1] != _SIMULATED:
             element, entry = scripted
             if isinstance(self._arbiter, SimArbiter):
-                error = entry.error or ""
-                self._arbiter.script(request.id, entry.after, entry.end, error)
+                if entry.end == "simulated":
+                    self._arbiter.scale_time(request.id, entry.factor)
+                else:
+                    error = entry.error or ""
+                    self._arbiter.script(request.id, entry.after, entry.end, error)
             elif element not in self._warned:
                 self._warned.add(element)
                 self._logger.warning("answers for %s act on simulated arbiters only", element)

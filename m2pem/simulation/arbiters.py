@@ -102,7 +102,7 @@ class SimArbiter:
     nothing happens while nothing moves, and then links can't be watched by silence.
 
     Beside the protocol, tests and rehearsals look at `effects`, `expects`, `searching`, `vehicles`
-    and `broadcast`, and use `script`, `inject`, `lose_link` and `restore_link`.
+    and `broadcast`, and use `script`, `scale_time`, `inject`, `lose_link` and `restore_link`.
     """
 
     capabilities = ArbiterCapabilities(adjusts=True, sights=True, addresses=True, fences=True)
@@ -165,6 +165,7 @@ class SimArbiter:
             resource: FaultList(own_faults(resource, self._settings)) for resource in self._bodies
         }
         self._scripts: dict[BehaviorId, Strike] = {}
+        self._factors: dict[BehaviorId, float] = {}
         self._connected = False
         self._late: list[tuple[SimPayload, Detection]] = []
         self._listener: asyncio.Task[None] | None = None
@@ -353,6 +354,10 @@ class SimArbiter:
             raise ValueError(f"a behavior ends failed, succeeded, stalled or lost, not {end!r}")
         self._scripts[behavior] = Strike(after_s, end, error, sole=True)
 
+    def scale_time(self, behavior: BehaviorId, factor: float) -> None:
+        """Say, before it starts, how many times as long a behavior takes as by its motion."""
+        self._factors[behavior] = factor
+
     def inject(self, resource: ResourceId, fault: Fault) -> None:
         """Let a fault strike the next behaviors of a resource."""
         self._faults[resource].add(fault)
@@ -386,6 +391,7 @@ class SimArbiter:
 
     def _start(self, execution: Execution, request: BehaviorRequest, now_us: int) -> None:
         execution.watch = Warp(now_us)
+        execution.factor = self._factors.pop(request.id, 1.0)
         strike = self._scripts.pop(request.id, None)
         fault = self._take_fault(request) if strike is None else None
         if fault is not None and fault.kind == "reject":

@@ -104,7 +104,8 @@ class Part:
 class Execution:
     """One behavior. `watch` is its own time, which stops while its first body is held.
 
-    `last`: the report given last, `number` its number. `outcome`: what physically became of it,
+    `factor`: how many times as long it takes as by its motion. `last`: the report given last,
+    `number` its number. `outcome`: what physically became of it,
     which may not have been reported yet; None while it lasts. `deaf`: it stalled. `shots`: what it
     takes.
     """
@@ -114,6 +115,7 @@ class Execution:
     behavior: str
     resources: tuple[ResourceId, ...]
     watch: Warp
+    factor: float = 1.0
     parts: list[Part] = field(default_factory=list)
     strike: Strike | None = None
     limit_s: float | None = None

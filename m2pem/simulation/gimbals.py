@@ -30,6 +30,10 @@ class Shots(msgspec.Struct, frozen=True):
     shutter_s: float = 0.0
     began_us: int = 0
 
+    def time_scaled(self, factor: float) -> "Shots":
+        """Return the same pictures, each of which takes `factor` times as long."""
+        return Shots(self.count, self.every_s * factor, self.shutter_s * factor, self.began_us)
+
     def taken(self, after_s: float) -> int:
         """How many pictures there are after so much of the behavior's own time."""
         passed_s = after_s - self.shutter_s + _ROUNDING_S

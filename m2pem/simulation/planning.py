@@ -91,6 +91,15 @@ class Assignment:
     shots: Shots | None = None
     work: RemainingWork | None = None
 
+    def time_scaled(self, factor: float) -> "Assignment":
+        """Return the same, which takes `factor` times as long."""
+        return dataclasses.replace(
+            self,
+            plan=self.plan and self.plan.time_scaled(factor),
+            limit_s=self.limit_s and self.limit_s * factor,
+            shots=self.shots and self.shots.time_scaled(factor),
+        )
+
 
 class Planner:
     """Knows the bodies and where everybody is."""

@@ -41,6 +41,17 @@ class Profile(msgspec.Struct, frozen=True):
         """The whole time."""
         return self.accelerating_s + self.cruising_s + self.braking_s
 
+    def time_scaled(self, factor: float) -> "Profile":
+        """Return the profile over the same length that takes `factor` times as long."""
+        return Profile(
+            self.length,
+            self.v_in / factor,
+            self.v_peak / factor,
+            self.v_out / factor,
+            self.accel / factor**2,
+            self.decel / factor**2,
+        )
+
     def at(self, t: float) -> tuple[float, float]:
         """Distance gone and speed, `t` seconds after the start (clamped to the duration)."""
         t_up, t_cruise = self.accelerating_s, self.cruising_s
@@ -316,3 +327,14 @@ class Slew(msgspec.Struct, frozen=True, tag=True):
 
 VehiclePhase: TypeAlias = Union[Travel, Curve, Pivot, Stand, Steer]
 PayloadPhase: TypeAlias = Slew
+
+
+def time_scaled(phase: VehiclePhase | PayloadPhase, factor: float) -> VehiclePhase | PayloadPhase:
+    """Return the same motion, but for steps of a pursuit, `factor` times as long."""
+    match phase:
+        case Travel() | Curve():
+            return msgspec.structs.replace(phase, profile=phase.profile.time_scaled(factor))
+        case Steer():
+            return phase
+        case _:
+            return msgspec.structs.replace(phase, duration_s=phase.duration_s * factor)

@@ -171,6 +171,8 @@ class Simulation:
         try:
             assignments = self._planner.assign(request, now_us)
             self._check_free(request)
+            if execution.factor != 1:
+                assignments = [each.time_scaled(execution.factor) for each in assignments]
         except RefusedError as refused:
             self.reject(execution, refused.code, refused.reason)
             return
@@ -225,6 +227,7 @@ class Simulation:
             return
         if execution.behavior not in ADJUSTABLE:
             return
+        speed_m_s /= execution.factor
         for part in execution.parts:
             body = part.body
             if isinstance(body, SimVehicle) and not part.done and body.adjust(speed_m_s, now_us):

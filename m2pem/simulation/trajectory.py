@@ -19,6 +19,7 @@ from m2pem.simulation.segments import (
     Travel,
     along,
     chain,
+    time_scaled,
 )
 from m2pem.units import US_PER_S
 
@@ -82,6 +83,11 @@ class Plan(Generic[S]):
     def duration_s(self) -> float:
         """How long it lasts; infinite when it repeats."""
         return math.inf if self.cycle_from is not None else self._ends[-1]
+
+    def time_scaled(self, factor: float) -> "Plan[S]":
+        """Return the same motion, which takes `factor` times as long."""
+        phases = [time_scaled(phase, factor) for phase in self.phases]  # type: ignore[arg-type]  # only such phases are made
+        return Plan(phases, self.cycle_from)  # type: ignore[arg-type]  # each is of its kind still
 
     def at(self, t: float) -> S:
         """Where the body is at plan time `t`, in seconds; before and after it stands."""

@@ -46,6 +46,14 @@ def test_it_decides_how_and_when_a_run_ends(
     assert (row["outcome"], row["end"], row["took_s"]) == (outcome, end, took_s)
 
 
+def test_a_factor_slows_the_vehicle_on_the_same_way(plain: Row) -> None:
+    row = one_run("vignette1", "behaviors: {DriveRoute: {duration_factor: 1.5}}")
+    assert row["took_s"] == pytest.approx(1.5 * plain["took_s"])
+    assert row["distance.evsg1"] == pytest.approx(plain["distance.evsg1"])
+    assert row["battery.evsg1"] < plain["battery.evsg1"]
+    assert row["drawn.behaviors.DriveRoute.duration_factor"] == 1.5
+
+
 def test_the_time_that_an_operator_takes_delays_the_mission(plain: Row) -> None:
     said = "answers: {UserSendRoute: {continue: 1}}"
     at_once = one_run("vignette1", said)

@@ -77,6 +77,7 @@ def test_what_failures_depend_on_comes_first_and_what_they_do_not_is_uncertain()
         ("vehicles.uav1.climb_rate", 2.0, "2 m/s"),
         ("vehicles.uav1.endurance", 600.0, "600 s"),
         ("behaviors.A.duration", 12.5, "12.5 s"),
+        ("behaviors.A.duration_factor", 1.5, "1.5 times"),
         ("links.uav1.1.for", 3.0, "3 s"),
     ],
 )

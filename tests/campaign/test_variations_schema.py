@@ -72,6 +72,7 @@ def test_the_page_shows_the_example() -> None:
         "behaviors: {A: {fails: {after: 2 s}}}",
         "behaviors: {A: {fails: {probability: 0.5, error: ''}}}",
         "behaviors: {A: {after: 5 s}}",
+        "behaviors: {A: {duration: 5 s, duration_factor: 2}}",
         "services: {A: {write: {a: 1}}}",
         "services: {A: {write: [{weight: -1, data: {a: 1}}]}}",
         "services: {A: {write: [{weight: 1}]}}",
@@ -101,6 +102,7 @@ def drawn(file: str, value: Any) -> str:
 
 FILES = {
     "duration": "behaviors: {A: {duration: VALUE}}",
+    "factor": "behaviors: {A: {duration_factor: VALUE}}",
     "speed": "wind: {speed: VALUE}",
     "angle": "wind: {speed: 5, from: VALUE}",
     "battery": "vehicles: {uav1: {battery: VALUE}}",
@@ -123,6 +125,7 @@ VALUES = [
     {"lognormal": {"median": "3 m/s", "sigma": 0}},
     {"weibull": {"scale": "5 m/s", "shape": 2}},
     *({"exponential": "40 s"}, {"exponential": "4 m/s"}, {"exponential": [1]}),
+    *({"lognormal": {"median": 1, "sigma": 0.2}}, {"uniform": [0, 2]}, "0..2", "0.0", "0.01"),
     *({"exponential": 0.4}, {"weibull": {"scale": 0.5, "shape": 1}}),
     {"uniform": [0.1, 0.2], "exponential": 1},
 ]

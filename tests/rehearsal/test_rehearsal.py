@@ -786,3 +786,15 @@ def test_a_behavior_of_which_an_entry_says_nothing_takes_its_own_time(play: Rehe
     assert play(drive, "behaviors: {Drive: [{end: simulated}]}", on=fleet()).records == (
         as_it_is.records
     )
+
+
+def test_a_behavior_takes_so_many_times_as_long_for_the_same_way(play: Rehearse) -> None:
+    drive = sequence(behavior("Drive", "goto", target=NEAR))
+    as_it_is = play(drive, on=fleet())
+    slower = play(drive, "behaviors: {Drive: [{end: simulated, factor: 1.5}]}", on=fleet())
+    assert as_it_is.summary.took_s is not None
+    assert slower.summary.took_s == pytest.approx(1.5 * as_it_is.summary.took_s)
+    with pytest.raises(AnswersError, match="'factor' goes with 'end: simulated', not failed"):
+        play(drive, "behaviors: {Drive: [{after: 1 s, end: failed, factor: 2}]}", on=fleet())
+    with pytest.raises(AnswersError, match="Drive"):
+        play(drive, "behaviors: {Drive: [{end: simulated, factor: 0}]}", on=fleet())

@@ -1,5 +1,7 @@
 import asyncio
 import math
+from itertools import chain
+from typing import Any
 
 import pytest
 
@@ -216,6 +218,59 @@ def test_a_pause_does_not_count_for_a_script(simulate: Simulate) -> None:
         await arbiter.resume(ResourceId("ugv"))
         assert (await bench.ended("r1.b1", 100)).code == "FAILED"
         assert bench.clock.now_us() == START_US + 60 * S
+
+    simulate(UGV, main)
+
+
+@pytest.mark.parametrize(
+    ("behavior", "resource", "parameters"),
+    [
+        ("single_vehicle_routing", "ugv", {"route": EAST_100}),
+        ("hold", "ugv", {"duration": 5.0}),
+        ("takeoff", "uav", {"altitude": 20.0}),
+        ("area_survey", "uav", {"area": area((0, 0), (60, 0), (60, 40), (0, 40))}),
+        ("take_picture", "uav/cam", {"count": 5, "interval": 2.0}),
+        ("record_video", "uav/cam", {"duration": 7.0}),
+    ],
+)
+def test_a_behavior_scaled_in_time_takes_as_many_times_as_long_for_the_same_motion(
+    simulate: Simulate, behavior: str, resource: str, parameters: dict[str, Any]
+) -> None:
+    took_s: list[float] = []
+    ends: list[tuple[list[float], object]] = []
+
+    async def main(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
+        if took_s:
+            arbiter.scale_time("r1.b1", 2.5)
+        await bench.start("r1.b1", behavior, resource, **parameters)
+        report = await bench.ended("r1.b1", 36_000)
+        assert report.state is BehaviorState.SUCCEEDED
+        now_us = bench.clock.now_us()
+        took_s.append((now_us - START_US) / S)
+        ways = [(each.driven_m(now_us), *each.pose(now_us).place) for each in arbiter.vehicles]
+        ends.append(([*chain(*ways)], report.outputs.get("picture.files")))
+
+    for _ in range(2):
+        simulate({**UGV, **UAV, "uav/cam": ("air", {"kind": "camera"})}, main)
+    assert took_s[1] == pytest.approx(2.5 * took_s[0], abs=1e-3)
+    assert took_s[0] > 1
+    (way, files), (scaled_way, scaled_files) = ends
+    assert scaled_way == pytest.approx(way, abs=0.01)
+    assert scaled_files == files
+
+
+def test_a_behavior_scaled_in_time_is_slower_at_an_adjusted_speed_too(simulate: Simulate) -> None:
+    async def main(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
+        arbiter.scale_time("r1.b1", 2.0)
+        await bench.start("r1.b1", "single_vehicle_routing", "ugv", route=EAST_100)
+        await bench.clock.sleep(10)
+        [vehicle] = arbiter.vehicles
+        assert vehicle.pose(bench.clock.now_us()).speed == pytest.approx(2.5)
+        await arbiter.adjust("r1.b1", 1, {"speed": 2.0})
+        await bench.clock.sleep(5)
+        assert vehicle.pose(bench.clock.now_us()).speed == pytest.approx(1.0)
+        await bench.ended("r1.b1", 3600)
+        assert local(state(bench, "ugv").position) == pytest.approx((100, 0), abs=0.01)
 
     simulate(UGV, main)
 
