@@ -117,9 +117,17 @@ class Dispatcher:
         self._starts[command.behavior] = task
         task.add_done_callback(lambda _: self._starts.pop(command.behavior, None))
 
-    def adjust(self, command: AdjustBehavior) -> None:
-        """Let a behavior go on with other parameters, unless it has ended or is being cancelled."""
-        self._enqueue(command.goes_on.resources, lambda: self._adjust(command))
+    def adjust(self, command: AdjustBehavior, failed: Callable[[str], None]) -> None:
+        """Let a behavior go on with other parameters, unless it has ended or is being cancelled.
+
+        `failed` is called with the reason when its arbiter could not be given them.
+        """
+
+        async def adjust() -> None:
+            if wrong := await self._adjust(command):
+                failed(wrong)
+
+        self._enqueue(command.goes_on.resources, adjust)
 
     def may_adjust(self, behavior: str) -> bool:
         """Whether the speed of a behavior that is commanded can be changed while it goes on. Where
@@ -467,25 +475,22 @@ class Dispatcher:
         if wrong and self._active.get(command.behavior) is active:
             self._refuse(command.behavior, "REJECTED", wrong)
 
-    async def _adjust(self, command: AdjustBehavior) -> None:
+    async def _adjust(self, command: AdjustBehavior) -> str:
         goes_on = command.goes_on
         await self._claims.confirmed()
         active = self._active.get(goes_on.behavior)
         if active is None or active.deadline is not None or self._is_barred(goes_on):
-            return
-        kind = BehaviorType(goes_on.type)
-        spec = self.spec(active.resources, goes_on.name, kind)
+            return ""
+        spec = self.spec(active.resources, goes_on.name, BehaviorType(goes_on.type))
         if spec is None or not adjusts(active.arbiter):
-            log.error("%s keeps its speed: its arbiter cannot change it", goes_on.behavior)
-            return
+            return "its arbiter cannot change it"  # any more: the fleet was changed meanwhile
         try:
             parameters = self.request(goes_on, spec).parameters
         except ParameterError as error:
-            log.error("%s keeps its speed: %s", goes_on.behavior, error)
-            return
+            return str(error)
         changed = {name: parameters[name] for name in command.names}
         call = active.arbiter.adjust(goes_on.behavior, command.epoch, changed)
-        await self._call(f"adjust {goes_on.behavior}", call)
+        return await self._call(f"adjust {goes_on.behavior}", call)
 
     def request(self, command: StartBehavior, spec: BehaviorSpec) -> BehaviorRequest:
         """What an arbiter is asked for.

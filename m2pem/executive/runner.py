@@ -10,6 +10,7 @@ import logging
 import time
 from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Protocol
 
 from m2pem.api.alerts import AlertSeverity
@@ -526,7 +527,7 @@ class Runner:
                 self._start(command)
             case c.AdjustBehavior():
                 if not self._is_held:  # else it goes out when the run is resumed
-                    context.dispatcher.adjust(command)
+                    context.dispatcher.adjust(command, partial(self._not_adjusted, command))
             case c.CancelBehavior():
                 if not early_done:
                     self._cancel(command)
@@ -557,6 +558,16 @@ class Runner:
                 context.services.run(self, command)
             case c.CancelService():
                 context.services.cancel(self.id, command.service)
+
+    def _not_adjusted(self, command: c.AdjustBehavior, why: str) -> None:
+        """Say that a behavior goes on with the parameters that it had."""
+        goes_on = command.goes_on
+        text = (
+            f"{', '.join(goes_on.resources)} may keep the {', '.join(command.names)} that "
+            f"{goes_on.name} had before the revision: {why}"
+        )
+        alert = Alert(self.id, "NOT_ADJUSTED", text, AlertSeverity.WARNING, goes_on.resources)
+        self._context.events.publish(alert)
 
     def _start(self, command: c.StartBehavior) -> None:
         """Start it, unless it is unwanted by now; while paused, nothing starts."""

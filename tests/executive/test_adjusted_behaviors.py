@@ -1,6 +1,6 @@
 """A revision of which only a speed differs: simulated vehicles go on at that speed."""
 
-import logging
+import asyncio
 import math
 from collections.abc import Mapping
 from dataclasses import replace
@@ -18,6 +18,7 @@ from m2pem.testing import scenarios
 from m2pem.testing.fake_arbiter import FakeArbiter
 
 from .conftest import Fakes, World, behavior, mission, sequence
+from .test_emergency import alerts
 from .test_recovery import left_behind, resumed
 
 HOMES = {"ugv1": [38.1075, -77.3192], "ugv2": [38.11, -77.31]}
@@ -134,20 +135,24 @@ def adjusting(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("adjusting")
-def test_an_arbiter_that_cannot_change_it_all_the_same_is_logged(play, caplog):
+def test_operators_read_of_a_vehicle_whose_arbiter_fails(play):
     async def story(world: World):
         world.fake.broken = True
         run = await world.executive.control.start(SLOW)
         await world.fake.until_called("start", "r1.b1")
         world.fake.report("r1.b1", BehaviorState.RUNNING)
         await world.clock.sleep(0.1)
+        alert = asyncio.create_task(alerts(world, "NOT_ADJUSTED"))
         assert await revised(world, run, FAST) == "adjusts"
-        await world.fake.until_called("adjust", "r1.b1 1 {'speed': 4.0}")
-        await world.clock.sleep(0.1)
+        return await alert, world.fake.count("adjust", "r1.b1 1 {'speed': 4.0}")
 
-    with caplog.at_level(logging.ERROR):
-        play(story, "ugv1")
-    assert "adjust r1.b1: the arbiter raised" in caplog.text
+    alert, calls = play(story, "ugv1")
+    assert calls == 1
+    assert alert.resources == ("ugv1",)
+    assert alert.text == (
+        "ugv1 may keep the speed that goto had before the revision: the arbiter raised OSError: "
+        "no link"
+    )
 
 
 @pytest.mark.usefixtures("adjusting")
