@@ -108,6 +108,7 @@ if TYPE_CHECKING:
         raw_parameters,
         restored_work,
     )
+    from m2pem.api.requirement_states import RequirementState, RequirementStates, worst_first
     from m2pem.api.revision import (
         RevisionEffect,
         RevisionPreview,
@@ -270,6 +271,7 @@ _MODULES = {
         "RemainingRoute RemainingSurvey RemainingWork raw_parameters restored_work"
     ),
     "m2pem.api.revision": "RevisionEffect RevisionPreview RevisionRefusal RunVersion",
+    "m2pem.api.requirement_states": "RequirementState RequirementStates worst_first",
     "m2pem.api.run_view": "RunView",
     "m2pem.api.runs": (
         "CONTROL_REQUEST NEWS SCHEDULE Alert GeometryVersion HandedOver IncidentPreview"
@@ -477,6 +479,8 @@ __all__ = [
     "RemainingRoute",
     "RemainingSurvey",
     "RemainingWork",
+    "RequirementState",
+    "RequirementStates",
     "ResolvedValue",
     "ResourceId",
     "ResumePolicy",
@@ -558,6 +562,7 @@ __all__ = [
     "simulator_group",
     "strip_width_m",
     "trace_ids",
+    "worst_first",
 ]
 
 

@@ -135,6 +135,11 @@ def _requirement_decided(_: RunView, record: r.RequirementDecided) -> _Sentence:
     return f"{text}{_in_brackets(record.because)}", importance
 
 
+def _requirement_left_open(_: RunView, record: r.RequirementLeftOpen) -> _Sentence:
+    text = f"requirement {record.requirement} stays open: {record.english.rstrip('.')}"
+    return f"{text}{_in_brackets(record.because)}", Importance.WARNING
+
+
 def _condition_changed(_: RunView, record: r.TelemetryConditionChanged) -> _Sentence:
     says = {True: "holds", False: "does not hold", None: "is not known"}[record.holds]
     return f"{record.condition} {says}", Importance.DETAIL
@@ -582,6 +587,7 @@ _SENTENCES: dict[type, Callable[[RunView, Any], _Sentence]] = {
     r.RequirementMonitored: _requirement_monitored,
     r.RequirementDropped: _requirement_dropped,
     r.RequirementDecided: _requirement_decided,
+    r.RequirementLeftOpen: _requirement_left_open,
     r.TelemetryConditionChanged: _condition_changed,
 }
 
@@ -603,6 +609,7 @@ _KINDS: dict[type, Kind] = {
             r.RequirementMonitored,
             r.RequirementDropped,
             r.RequirementDecided,
+            r.RequirementLeftOpen,
             r.MissionRevised,
         ),
         Kind.OPERATORS: (

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import msgspec
 
 from m2pem.api import records as r
+from m2pem.api.requirement_states import RequirementStates
 from m2pem.api.runs import RunId, RunStatus, RunSummary, StampedRecord
 from m2pem.units import US_PER_S
 
@@ -46,24 +47,6 @@ class ElementState(msgspec.Struct):
     asking: bool = False
     waiting: bool = False
     stopped: bool = False
-
-
-class RequirementState(msgspec.Struct):
-    """A requirement that a run is monitored for. `verdict`: "open": it holds so far, or has not
-    come yet; "satisfied" or "violated": whatever follows, since mission time `since_s`. `because`:
-    what made it certain. `elements`: those that it is about. `formula`: see docs/requirements.md.
-    `on_violation`: what a violation does to the mission, "" for nothing. `recorded_s`: mission time
-    of the record of the verdict, which may come after `since_s`."""
-
-    id: str
-    english: str
-    elements: tuple[str, ...] = ()
-    verdict: str = "open"
-    since_s: float | None = None
-    because: str = ""
-    formula: str = ""
-    on_violation: str = ""
-    recorded_s: float | None = None
 
 
 @dataclass(slots=True)
@@ -244,7 +227,7 @@ class RunView:
         """What the run keeps between tasks, by the id of that."""
         self.holders: dict[str, str] = {}
         """Operators who have taken a resource, by resource, as far as the run's records say."""
-        self.requirements: dict[str, RequirementState] = {}
+        self.requirements = RequirementStates()
         """The requirements that the run is monitored for, by id."""
         self.version = ""
         """The version of the mission that the last revision has brought; "": there was none."""
@@ -378,7 +361,8 @@ class RunView:
     def _start(self, record: r.RunStarted) -> None:
         self._update(status=RunStatus.RUNNING, process=record.process, started_us=record.started_us)
 
-    def _claim(self, _: r.RunClaimed) -> None:
+    def _claim(self, record: r.RunClaimed) -> None:
+        self._read_requirement(record)
         self._update(status=RunStatus.PAUSED if self._paused_at_us else RunStatus.RUNNING)
 
     def _pause(self, record: r.RunPaused) -> None:
@@ -432,36 +416,10 @@ class RunView:
 
     # --- requirements ---------------------------------------------------------------------------
 
-    def _monitor(self, record: r.RequirementMonitored) -> None:
-        known = self.requirements.get(record.requirement)
-        if known is None:
-            self.requirements[record.requirement] = RequirementState(
-                record.requirement,
-                record.english,
-                record.elements,
-                formula=record.formula,
-                on_violation=record.on_violation,
-            )
-        else:  # in the words of a new version of the mission
-            known.english, known.elements = record.english, record.elements
-            known.on_violation = record.on_violation
+    def _read_requirement(self, record: r.Record) -> None:
+        changed = self.requirements.take(record, self.t_s)
         if self.changes is not None:
-            self.changes.requirements.add(record.requirement)
-
-    def _drop(self, record: r.RequirementDropped) -> None:
-        self.requirements.pop(record.requirement, None)
-        if self.changes is not None:
-            self.changes.requirements.add(record.requirement)
-
-    def _decide(self, record: r.RequirementDecided) -> None:
-        state = self.requirements.get(record.requirement)
-        if state is not None:
-            state.verdict = record.verdict.value
-            state.since_s = record.decided_us / US_PER_S
-            state.because = record.because
-            state.recorded_s = self.t_s
-        if self.changes is not None:
-            self.changes.requirements.add(record.requirement)
+            self.changes.requirements.update(changed)
 
     # --- tokens and scopes ----------------------------------------------------------------------
 
@@ -760,8 +718,10 @@ _FOLDS: dict[type, Callable[[RunView, Any], None]] = {
     r.KeepingEnded: RunView._end_keeping,
     r.EventAwaited: RunView._await_event,
     r.EventTriggered: RunView._trigger_event,
-    r.RequirementMonitored: RunView._monitor,
-    r.RequirementDropped: RunView._drop,
-    r.RequirementDecided: RunView._decide,
+    r.RequirementMonitored: RunView._read_requirement,
+    r.RequirementDropped: RunView._read_requirement,
+    r.RequirementDecided: RunView._read_requirement,
+    r.RequirementLeftOpen: RunView._read_requirement,
+    r.TelemetryConditionChanged: RunView._read_requirement,
     r.MissionRevised: RunView._revise,
 }

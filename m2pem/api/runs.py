@@ -7,6 +7,7 @@ from itertools import count, repeat
 from typing import NamedTuple, TypeAlias
 
 from m2pem.api.alerts import AlertSeverity
+from m2pem.api.requirement_states import RequirementState
 from m2pem.api.telemetry import PayloadState, VehicleState
 from m2pem.engine.records import Record
 from m2pem.mission.behavior import Decision
@@ -244,10 +245,12 @@ class TelemetrySample:
 class SimulationResult:
     """What a rehearsal did. `telemetry`: at even intervals; long ones have longer intervals.
 
-    `files`: of the mission, its own first.
+    `files`: of the mission, its own first. `requirements`: those that it was monitored for, with
+    their verdicts.
     """
 
     summary: RunSummary
     records: Sequence[StampedRecord] = field(default_factory=tuple)
     telemetry: Sequence[TelemetrySample] = field(default_factory=tuple)
     files: Sequence[MissionFile] = field(default_factory=tuple)
+    requirements: Sequence[RequirementState] = field(default_factory=tuple)

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from m2pem.api import records as r
+from m2pem.api.requirement_states import RequirementState, RequirementStates
 from m2pem.api.run_view import (
     Allocation,
     Behavior,
     ElementState,
     FinishedToken,
     Place,
-    RequirementState,
     RunView,
     Scope,
     Service,
@@ -145,7 +145,7 @@ def view_of(
     view._ended_allocations = {each.id: each for each in read.ended_allocations}
     view._closed_prompts = {each.prompt: each for each in read.closed_prompts}
     view._past_waits = dict(read.past_waits)
-    view.requirements = {each.id: each for each in read.requirements}
+    view.requirements = RequirementStates({each.id: each for each in read.requirements})
     view.version = read.version
     work: dict[str, Behavior | Service | Allocation] = {
         **view.behaviors,

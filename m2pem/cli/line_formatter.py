@@ -54,6 +54,7 @@ SHOWN = frozenset(
         r.TransactionCancelled,
         r.GeometryReceived,
         r.RequirementDecided,
+        r.RequirementLeftOpen,
     )
 )
 """Records that are printed; the others matter to programs only."""

@@ -3,14 +3,16 @@
 import asyncio
 import os
 import sys
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import AsyncIterator, Callable, Collection, Iterator
 from contextlib import contextmanager
 from typing import TextIO
 
 from m2pem.api.description import printable
 from m2pem.api.mission_control.watching import ControlEvent
+from m2pem.api.requirement_states import RequirementState, in_short
 from m2pem.api.runs import LEFT_ARMED, LOGGED, Alert, RunId, StampedRecord
 from m2pem.cli.line_formatter import LineFormatter
+from m2pem.cli.requirement_table import requirement_table
 from m2pem.cli.standard_streams import LineWriter, writer_for
 from m2pem.engine.records import RunEnded
 from m2pem.journal.codec import record_line
@@ -76,6 +78,12 @@ class Output:
             return record_line(stamped.run, stamped.seq, t_us, stamped.record).decode()
         assert self.lines is not None
         return self.lines.format(stamped)
+
+    def summarize(self, run: RunId, requirements: Collection[RequirementState]) -> None:
+        """Print for people what became of the requirements of a run that is over."""
+        if requirements and not self._as_json:
+            self.writer.put(f"\nrequirements of {run}: {in_short(requirements)}")
+            self.writer.put(requirement_table(requirements))
 
     async def follow(self, notices: AsyncIterator[ControlEvent]) -> None:
         """Print every record, until the subscription ends."""

@@ -11,6 +11,7 @@ from m2pem.api.allocation import blocked_by
 from m2pem.api.control import MissionControl
 from m2pem.api.description import printable
 from m2pem.api.foreground import Lines
+from m2pem.api.requirement_states import RequirementStates, worst_first
 from m2pem.api.runs import OpenPrompt, PromptClosed, RunId, RunStatus, StampedRecord
 from m2pem.api.schedule import When
 from m2pem.cli.standard_streams import writer_for
@@ -48,6 +49,7 @@ HELP = """\
   schedule release   release it
   takeover evsg1     take a vehicle or payload from the missions, to steer it by hand
   handback evsg1     give it back; what another operator has who is gone: handback evsg1 REASON
+  requirements       list what a run is monitored for, with the verdicts (requirements r2)
   who                print the holder of each vehicle and payload, and which tasks wait
   runs               list the runs and their states
   quit               leave; missions go on without an operator here
@@ -88,6 +90,7 @@ class PlainOcu:
             "schedule": self._schedule,
             "takeover": self._take,
             "handback": self._give,
+            "requirements": self._requirements,
             "who": self._who,
             "runs": self._runs,
             "help": self._help,
@@ -268,6 +271,19 @@ class PlainOcu:
                 self._say(f"blocked: {tasks}", indent=4)
         if not found:
             self._say("no incident is open")
+
+    async def _requirements(self, words: list[str]) -> None:
+        """List the requirements of a run, what is violated first."""
+        run, last = self._which(words), 0
+        known = RequirementStates()
+        while page := await self._control.records(run, last):
+            for stamped in page:
+                known.take(stamped.record, stamped.t_s)
+            last = page[-1].seq
+        for each in worst_first(known.values()):
+            self._say(str(each))
+        if not known:
+            self._say(f"{run} is monitored for no requirement")
 
     async def _resolve(self, words: list[str], *, even_if_stuck: bool = False) -> None:
         """Decide about an incident, "i1" of the only run that has one of that name, or "r2.i1"."""

@@ -15,6 +15,7 @@ import click
 
 from m2pem.api.clock import SystemClock
 from m2pem.api.estimates import MissionEstimate
+from m2pem.api.requirement_states import requirements_of
 from m2pem.api.runs import FACE, Alert, RunId, RunStatus, SimulationResult
 from m2pem.cli.group import STOPPED, ignore_closed_stdout, log_from_a_thread
 from m2pem.cli.interruption import Interruption
@@ -191,6 +192,9 @@ async def drive_run(
                 await executive.control.wait(others[0])
         finally:
             acting.cancel()
+    judged = requirements_of(executive.runner(run).run.state)
+    output.summarize(run, judged.values())
+    await output.drain()
     return EXIT_STATUS[summary.status]
 
 

@@ -1,10 +1,12 @@
-"""The status of a run by its journal: tokens, behaviors, tasks that wait, prompts, data."""
+"""The status of a run by its journal: tokens, behaviors, tasks that wait, requirements, data."""
 
 from typing import Any
 
 import msgspec
 
 from m2pem.api.description import waiting
+from m2pem.api.requirement_states import requirements_of
+from m2pem.cli.requirement_table import as_data, requirement_table
 from m2pem.cli.table import table
 from m2pem.engine.inputs import Input
 from m2pem.engine.records import DataWritten, Record
@@ -104,6 +106,7 @@ class RunStatusView:
                 }
                 for incident in state.incidents.values()
             ],
+            "requirements": [as_data(each) for each in requirements_of(state).values()],
             "data": self._data,
         }
 
@@ -138,6 +141,8 @@ class RunStatusView:
                 for each in state.incidents.values()
             ]
             parts.append(table(("INCIDENT", "STOPS", "ERROR", "HOLDS"), stopped))
+        if state.requirements:
+            parts.append(requirement_table(requirements_of(state).values()))
         if self._data:
             written = [
                 (key, msgspec.json.encode(value).decode())

@@ -30,7 +30,12 @@ from m2pem.engine.elements.behaviors import (
 from m2pem.engine.elements.subprocesses import begin
 from m2pem.engine.lifecycle import Admission, admission
 from m2pem.engine.records import RunOutcome
-from m2pem.engine.requirements import condition_changed, monitor, requirement_decided
+from m2pem.engine.requirements import (
+    condition_changed,
+    monitor,
+    requirement_decided,
+    requirement_left_open,
+)
 from m2pem.engine.resolving import resolve_incident, why_refused
 from m2pem.engine.revision import revise
 from m2pem.engine.scopes import end_run
@@ -103,7 +108,7 @@ def _start(x: Steps, item: i.StartRun) -> None:
     if item.step:
         x.emit(r.BreakpointsSet(step=True, by=item.by))
         x.look_for_breakpoints()
-    monitor(x, item.requirements)
+    monitor(x, item)
     for resource, holder in item.taken.items():
         x.emit(r.OperatorTookControl(resource, holder))
     x.emit(r.ScopeOpened(1, process.id, process.id))
@@ -334,6 +339,7 @@ _DECIDERS: dict[type, Callable[[Steps, Any], None]] = {
     i.ResourceFault: resource_fault,
     i.GeometrySet: _geometry,
     i.RequirementDecided: requirement_decided,
+    i.RequirementLeftOpen: requirement_left_open,
     i.TelemetryConditionChanged: condition_changed,
     i.Revise: revise,
 }

@@ -52,13 +52,15 @@ class MonitoredRequirement(msgspec.Struct, frozen=True, omit_defaults=True):
     english: str
     elements: tuple[str, ...] = ()
     on_violation: str = ""
+    conditions: tuple[str, ...] = ()
 
 
 class StartRun(_Input, frozen=True):
     """Begin: one token for each start event of the process, and the data given at start.
 
     `taken`: resources that operators have at that moment, and who has each. `step`: the run is
-    paused before its first step. `requirements`: those that the run is monitored for.
+    paused before its first step. `requirements`: those that the run is monitored for. `conditions`:
+    what telemetry says of their conditions, as far as it has said anything.
     """
 
     process: str
@@ -67,6 +69,7 @@ class StartRun(_Input, frozen=True):
     taken: dict[str, str] = msgspec.field(default_factory=dict)
     step: bool = False
     requirements: tuple[MonitoredRequirement, ...] = ()
+    conditions: dict[str, bool] = msgspec.field(default_factory=dict)
 
 
 class ClaimRun(_Input, frozen=True):
@@ -334,7 +337,7 @@ class Revise(_Input, frozen=True):
     at a join, of sequence flows; "": it ends there. `plan`: the digest of the plan that was shown;
     the run is only revised if that is what the revision does now. `requirements`: those that the
     run is monitored for from then on. `adjustable`: behaviors whose speed their arbiters can change
-    while they go on.
+    while they go on. `conditions`: as in `StartRun`.
     """
 
     version: str
@@ -346,6 +349,7 @@ class Revise(_Input, frozen=True):
     by: str = ""
     requirements: tuple[MonitoredRequirement, ...] = ()
     adjustable: tuple[str, ...] = ()
+    conditions: dict[str, bool] = msgspec.field(default_factory=dict)
 
 
 class OperatorNoted(_Input, frozen=True):
@@ -371,6 +375,14 @@ class RequirementDecided(_Input, frozen=True):
     verdict: RequirementVerdict
     decided_us: int
     because: str = ""
+
+
+class RequirementLeftOpen(_Input, frozen=True):
+    """The run has ended, and a monitor has found that its end does not decide a requirement.
+    `because`: why not."""
+
+    requirement: str
+    because: str
 
 
 class TelemetryConditionChanged(_Input, frozen=True):
@@ -413,6 +425,7 @@ Input: TypeAlias = Union[
     OperatorNoted,
     GeometrySet,
     RequirementDecided,
+    RequirementLeftOpen,
     TelemetryConditionChanged,
     Revise,
 ]

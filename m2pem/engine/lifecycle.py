@@ -27,6 +27,7 @@ from m2pem.engine.inputs import (
     OperatorNoted,
     PauseRun,
     RequirementDecided,
+    RequirementLeftOpen,
     ResourceFault,
     ResumeRun,
     Revise,
@@ -78,6 +79,7 @@ _EXCEPTIONS: dict[RunStatus, dict[type, Admission]] = {
         ResourceFault: Admission.DECIDE,
         ClaimRun: Admission.DECIDE,
         RequirementDecided: Admission.DECIDE,
+        RequirementLeftOpen: Admission.DECIDE,
     },
 }
 

@@ -11,11 +11,13 @@ from m2pem.engine.throwing import throw_error_in_process
 from m2pem.engine.triggering import throw_signal
 
 
-def monitor(x: Execution, requirements: tuple[i.MonitoredRequirement, ...]) -> None:
-    """Record which requirements the run is monitored for from now on.
+def monitor(x: Execution, item: i.StartRun | i.Revise) -> None:
+    """Record which requirements the run is monitored for from now on, and what telemetry says of
+    their conditions.
 
     One of the same formula as before goes on, with its verdict; another one begins.
     """
+    requirements = item.requirements
     before = x.state.requirements
     formulas = {each.id: each.formula for each in requirements}
     for number, known in list(before.items()):
@@ -23,20 +25,19 @@ def monitor(x: Execution, requirements: tuple[i.MonitoredRequirement, ...]) -> N
             x.emit(r.RequirementDropped(number))
     for each in requirements:
         record = r.RequirementMonitored(
-            each.id, each.formula, each.english, each.elements, each.on_violation
+            each.id, each.formula, each.english, each.elements, each.on_violation, each.conditions
         )
         if before.get(each.id) != record:
             x.emit(record)
+    for condition, holds in item.conditions.items():
+        if x.state.telemetry_conditions.get(condition) is not holds:
+            x.emit(r.TelemetryConditionChanged(condition, holds))
 
 
 def requirement_decided(x: Execution, item: i.RequirementDecided) -> None:
     """Record a verdict; a violation throws the error or signal that the requirement names."""
-    monitored = x.state.requirements.get(item.requirement)
+    monitored = _open(x, item.requirement)
     if monitored is None:
-        x.ignore(f"the run is not monitored for requirement {item.requirement}")
-        return
-    if monitored.requirement in x.state.verdicts:
-        x.ignore(f"requirement {item.requirement} was decided before")
         return
     x.emit(
         r.RequirementDecided(
@@ -45,6 +46,25 @@ def requirement_decided(x: Execution, item: i.RequirementDecided) -> None:
     )
     if item.verdict is i.RequirementVerdict.VIOLATED and x.state.status is RunStatus.RUNNING:
         _act(x, monitored)
+
+
+def requirement_left_open(x: Execution, item: i.RequirementLeftOpen) -> None:
+    """Record that the end of the run does not decide a requirement."""
+    monitored = _open(x, item.requirement)
+    if monitored is not None:
+        x.emit(r.RequirementLeftOpen(item.requirement, monitored.english, item.because))
+
+
+def _open(x: Execution, requirement: str) -> r.RequirementMonitored | None:
+    """The requirement, if it has no verdict yet; else the input is ignored."""
+    monitored = x.state.requirements.get(requirement)
+    if monitored is None:
+        x.ignore(f"the run is not monitored for requirement {requirement}")
+    elif requirement in x.state.verdicts:
+        x.ignore(f"requirement {requirement} was decided before")
+    else:
+        return monitored
+    return None
 
 
 def _act(x: Execution, monitored: r.RequirementMonitored) -> None:

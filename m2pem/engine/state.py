@@ -10,7 +10,13 @@ from enum import StrEnum
 from typing import TypeAlias
 
 from m2pem.engine.inputs import IncidentChoice, Input
-from m2pem.engine.records import RequirementMonitored, RequirementVerdict, RunOutcome, Trigger
+from m2pem.engine.records import (
+    RequirementDecided,
+    RequirementLeftOpen,
+    RequirementMonitored,
+    RunOutcome,
+    Trigger,
+)
 from m2pem.mission.catalogue import BehaviorState
 from m2pem.mission.elements import (
     Activity,
@@ -439,8 +445,8 @@ class RunState:
     """It is paused before the next step."""
     requirements: dict[str, RequirementMonitored] = field(default_factory=dict)
     """The requirements that the run is monitored for, by id."""
-    verdicts: dict[str, RequirementVerdict] = field(default_factory=dict)
-    """Those that are decided."""
+    verdicts: dict[str, RequirementDecided | RequirementLeftOpen] = field(default_factory=dict)
+    """Of those that are decided, and of those that the end of the run has left open."""
     telemetry_conditions: dict[str, bool | None] = field(default_factory=dict)
     """What telemetry says of conditions in requirements, as far as it has said anything."""
     geometries: dict[str, dict[str, Value]] = field(default_factory=dict)

@@ -79,6 +79,7 @@ class RunRevisions:
             by=by,
             requirements=requirements,
             adjustable=adjustable,
+            conditions=self._supervisor.known_conditions(requirements),
         )
         return Prepared(loaded, plan, tuple(found), item)
 
@@ -121,6 +122,7 @@ class RunRevisions:
                     each.english,
                     each.elements,
                     each.on_violation,
+                    each.conditions,
                 )
                 for each in given
             ),

@@ -304,6 +304,7 @@ class RunStarter:
                 supervisor.handover.by_name(lent),
                 step,
                 requirements or (),
+                supervisor.known_conditions(requirements or ()),
             )
         )
         for geometry in supervisor.geometries_given(loaded):

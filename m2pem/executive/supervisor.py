@@ -21,7 +21,7 @@ from m2pem.api.runs import LEFT_ARMED, Alert, RunId
 from m2pem.api.service import ServiceContext
 from m2pem.api.telemetry import LinkState, TeamState, Telemetry, VehicleState
 from m2pem.bpmn.one_task import is_one_task
-from m2pem.engine.inputs import GeometrySet, Input, ResourceFault
+from m2pem.engine.inputs import GeometrySet, Input, MonitoredRequirement, ResourceFault
 from m2pem.engine.records import (
     Record,
     RequirementDecided,
@@ -536,6 +536,15 @@ class Supervisor:
         """Look at the conditions of requirements on a vehicle."""
         for runner in self.runners.values():
             runner.measure(resource, self._vehicle_state)
+
+    def known_conditions(self, requirements: Sequence[MonitoredRequirement]) -> dict[str, bool]:
+        """Return what telemetry says now of the conditions of requirements."""
+        if not any(each.conditions for each in requirements):
+            return {}
+        # What reads formulas takes time to load, and most runs have no such conditions.
+        from m2pem.monitors.telemetry_conditions import known  # noqa: PLC0415
+
+        return known(requirements, self._vehicle_state)
 
     def _vehicle_state(self, resource: str) -> VehicleState | None:
         """The newest state of a vehicle, as one whose link is lost if it is."""

@@ -3,7 +3,8 @@
     monitors = RunMonitors(run.state, fleet)
     monitors.observe(step.t_us, step.records)       # after each input, also in a replay
     monitors.advance(t_us)                          # at `due_us`, if nothing came before
-    for item in monitors.take(): ...                # inputs for the run: `RequirementDecided`
+    for item in monitors.take(): ...                # inputs for the run: `RequirementDecided`,
+                                                    # `RequirementLeftOpen`
 
 Pure: a verdict depends on the records and their mission times alone, so a replay finds the same.
 
@@ -15,7 +16,11 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from m2pem.engine import records as r
-from m2pem.engine.inputs import RequirementDecided, TelemetryConditionChanged
+from m2pem.engine.inputs import (
+    RequirementDecided,
+    RequirementLeftOpen,
+    TelemetryConditionChanged,
+)
 from m2pem.engine.state import RunState, RunStatus
 from m2pem.fleet.fleet import Fleet
 
@@ -28,6 +33,8 @@ if TYPE_CHECKING:
     from m2pem.verify.ltl.formula import Measured
 
 ENDED = "the run has ended"
+STOPPED = "the run was stopped"
+NOT_CERTAIN = "its end does not decide it"
 BEGINNING = "from the beginning"
 FROM_THE_REVISION = "as the mission was revised"
 TIME_IS_OVER = "its time is over"
@@ -49,11 +56,13 @@ class RunMonitors:
         self._at: State | None = None
         self._names: tuple[str, ...] = ()
         self._recorded: set[str] = set()
-        self._found: dict[str, RequirementDecided] = {}
+        self._found: dict[str, RequirementDecided | RequirementLeftOpen] = {}
         self._conditions: dict[str, tuple[int, Measured]] = {}
         self._measured: dict[str, bool | None] = {}
         self._mission = state.mission
         self._unknown = 0
+        self._was_unknown = 0
+        self._was_known = 0
         self._t_us = 0
 
     # --- records and time -----------------------------------------------------------------------
@@ -62,11 +71,12 @@ class RunMonitors:
         """Read the records of one input. `t_us`: their mission time."""
         state = self._state
         moments = self._moments
-        if moments is None and self._begins(records):
+        begins = moments is None and self._begins(records)
+        if begins:
             self._begin([each for each in records if type(each) is r.RequirementMonitored])
             moments = self._moments
         if moments is not None:
-            if self._conditions:
+            if self._conditions and not begins:
                 self._read_conditions(t_us, records)
             if self._timed:
                 self.advance(t_us)
@@ -74,7 +84,7 @@ class RunMonitors:
             moments.read(records)
         if len(self._recorded) != len(state.verdicts):
             for record in records:
-                if type(record) is r.RequirementDecided:
+                if type(record) is r.RequirementDecided or type(record) is r.RequirementLeftOpen:
                     self._note(record.requirement)
         if state.mission is not self._mission:
             self._mission = state.mission
@@ -115,7 +125,7 @@ class RunMonitors:
                 least = due_us
         return least
 
-    def take(self) -> list[RequirementDecided]:
+    def take(self) -> list[RequirementDecided | RequirementLeftOpen]:
         """Return what has become certain, and is not recorded yet; each once."""
         if not self._found:
             return []
@@ -126,13 +136,14 @@ class RunMonitors:
         if not monitored:
             return
         # What reads formulas takes time to load, and most runs have none.
-        from m2pem.monitors.moments import Moments  # noqa: PLC0415
+        from m2pem.monitors.moments import NO_LETTER, Moments  # noqa: PLC0415
         from m2pem.monitors.monitor import plans, tables  # noqa: PLC0415
 
         made = plans(tuple(each.formula for each in monitored))
         mission = self._state.mission
         self._moments = Moments(made.known, mission, self._fleet, self._read, tables(made, mission))
         self._add(monitored, made)
+        self._moments.letter = NO_LETTER
         self._product, self._at = made.product, made.product.start
 
     def _add(self, monitored: Sequence[r.RequirementMonitored], made: "Plans") -> None:
@@ -151,7 +162,9 @@ class RunMonitors:
                 self._measured[text] = now = self._state.telemetry_conditions.get(text)
                 if now is None:
                     self._unknown |= bit
+                    self._was_unknown |= bit
                 elif self._moments is not None:
+                    self._was_known |= bit
                     self._moments.set_bit(bit, now)
 
     def _read_no_more(self) -> None:
@@ -160,7 +173,7 @@ class RunMonitors:
         self._product = self._at = None
         self._names = ()
         self._conditions.clear()
-        self._unknown = 0
+        self._unknown = self._was_unknown = self._was_known = 0
 
     def _revise(self, records: Iterable[r.Record]) -> None:
         """Follow the requirements of a new version of the mission."""
@@ -286,16 +299,24 @@ class RunMonitors:
         moments, bit = self._moments, self._conditions[text][0]
         before, unknown = moments.letter, self._unknown
         self._measured[text] = now
-        self._unknown = self._unknown | bit if now is None else self._unknown & ~bit
+        if now is None:
+            self._unknown |= bit
+            self._was_unknown |= bit
+        else:
+            self._unknown &= ~bit
+            self._was_known |= bit
         if unknown == self._unknown and bool(before & bit) == bool(now):
             return
         moments.set_bit(bit, bool(now))
+        if unknown & bit and now is not None:  # it becomes known, so it counts as a change
+            before = moments.letter ^ bit
         self._read_moment(moments.letter, before, bit, BEGINNING)
 
     # --- verdicts -------------------------------------------------------------------------------
 
     def _end(self, record: r.RunEnded) -> None:
-        """Decide all, unless operators have stopped the run: it could have gone on."""
+        """Decide all, unless operators have stopped the run: it could have gone on. Say why what
+        stays open does."""
         if record.outcome is not r.RunOutcome.STOPPED:
             certain: list[tuple[str, Verdict]] = []
             moments = self._moments
@@ -309,6 +330,10 @@ class RunMonitors:
             for name, verdict in certain:
                 if name in self._open:
                     self._decide(name, verdict, self._t_us, ENDED)
+        stopped = [STOPPED] if record.outcome is r.RunOutcome.STOPPED else []
+        for name, plan in self._open.items():
+            because = [*stopped, *self._not_known(plan.mask)] or [NOT_CERTAIN]
+            self._found[name] = RequirementLeftOpen(name, ", ".join(because))
         self._open.clear()
         self._timed.clear()
 
@@ -318,6 +343,20 @@ class RunMonitors:
         if name not in self._recorded:
             decided = r.RequirementVerdict(verdict.value)
             self._found[name] = RequirementDecided(name, decided, t_us, because)
+
+    def _not_known(self, mask: int) -> list[str]:
+        """What telemetry did not say, or not all the time, of conditions."""
+        from m2pem.verify.requirements.english import measured_subject  # noqa: PLC0415  # as above
+
+        found: dict[str, bool] = {}
+        for bit, condition in self._conditions.values():
+            if bit & mask & self._was_unknown:
+                subject, known = measured_subject(condition), bool(bit & self._was_known)
+                found[subject] = found.get(subject, False) or known
+        return [
+            f"{subject} was not known all the time" if known else f"nothing was known of {subject}"
+            for subject, known in found.items()
+        ]
 
     def _note(self, requirement: str) -> None:
         """A verdict is recorded, perhaps by an earlier release: it stays."""

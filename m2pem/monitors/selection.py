@@ -5,15 +5,19 @@ from collections.abc import Iterable, Mapping
 from m2pem.engine.inputs import MonitoredRequirement
 from m2pem.engine.records import RequirementMonitored
 from m2pem.verify.ltl import show
-from m2pem.verify.ltl.formula import Active, Completed, needs_steps, walk
+from m2pem.verify.ltl.formula import (
+    Active,
+    Completed,
+    Measured,
+    needs_steps,
+    show_measured,
+    walk,
+)
 from m2pem.verify.requirements import Requirement
 
 
 def monitored(requirements: Iterable[Requirement]) -> tuple[MonitoredRequirement, ...]:
-    """Return those that can be monitored, and do not say that they are not to be.
-
-    A formula about single steps cannot: they are those of the checker's net.
-    """
+    """Return those that can be monitored, and do not say that they are not to be."""
     return tuple(
         MonitoredRequirement(
             each.id,
@@ -27,10 +31,21 @@ def monitored(requirements: Iterable[Requirement]) -> tuple[MonitoredRequirement
                 )
             ),
             each.on_violation,
+            tuple(
+                dict.fromkeys(
+                    show_measured(part) for part in walk(each.formula) if isinstance(part, Measured)
+                )
+            ),
         )
         for each in requirements
-        if each.monitor and not needs_steps(each.formula)
+        if each.monitor and can_be_monitored(each)
     )
+
+
+def can_be_monitored(requirement: Requirement) -> bool:
+    """Whether runs can be monitored for it. For a formula about single steps they cannot: the steps
+    are those of the checker's net."""
+    return not needs_steps(requirement.formula)
 
 
 def carried_over(

@@ -2,10 +2,12 @@
 
 import math
 import operator
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 from m2pem.api.telemetry import LinkState, VehicleState
+from m2pem.engine.inputs import MonitoredRequirement
 from m2pem.geo.local_frame import distance_m
+from m2pem.verify.ltl import parse
 from m2pem.verify.ltl.formula import Measured
 
 Latest = Callable[[str], VehicleState | None]
@@ -19,6 +21,19 @@ _COMPARE: Mapping[str, Callable[[float, float], bool]] = {
     "==": operator.eq,
     "!=": operator.ne,
 }
+
+
+def known(requirements: Iterable[MonitoredRequirement], latest: Latest) -> dict[str, bool]:
+    """Return what telemetry says now of the conditions of requirements, by their texts, as far as
+    it says anything."""
+    found = {}
+    for text in dict.fromkeys(each for one in requirements for each in one.conditions):
+        condition = parse(text)
+        assert isinstance(condition, Measured)
+        now = holds(condition, latest)
+        if now is not None:
+            found[text] = now
+    return found
 
 
 def holds(condition: Measured, latest: Latest) -> bool | None:

@@ -14,7 +14,15 @@ from m2pem.api.runs import OpenPrompt, PromptClosed, RunStatus, RunSummary, Stam
 from m2pem.cli import plain
 from m2pem.cli.plain import PlainOcu
 from m2pem.cli.standard_streams import writer_for
-from m2pem.engine.records import Record, RunEnded, RunOutcome, RunStarted
+from m2pem.engine.records import (
+    Record,
+    RequirementDecided,
+    RequirementMonitored,
+    RequirementVerdict,
+    RunEnded,
+    RunOutcome,
+    RunStarted,
+)
 from m2pem.errors import BusyError, OperatorError
 from m2pem.geo.files import read_geometry
 from m2pem.geo.geojson import parse_geojson
@@ -304,3 +312,31 @@ async def test_empty_lines_mean_nothing(operator: Operator) -> None:
     await operator.type("", "   ")
     assert operator.screen == before
     assert operator.control.calls == []
+
+
+async def test_the_requirements_of_a_run_are_listed_with_their_verdicts(operator: Operator) -> None:
+    stamped = [
+        StampedRecord("r1", seq, 0.0, record)
+        for seq, record in enumerate(
+            (
+                RequirementMonitored("home", "<>ended", "At some point the mission is over."),
+                RequirementMonitored("safe", "[]!active(B)", "Never 'B' is active."),
+                RequirementDecided(
+                    "safe", RequirementVerdict.VIOLATED, "", 2_500_000, "'B' is active"
+                ),
+            ),
+            1,
+        )
+    ]
+
+    async def records(run: str, after: int) -> list[StampedRecord]:
+        return [each for each in stamped if (each.run, each.seq > after) == (run, True)][:2]
+
+    operator.control.records = records  # type: ignore[attr-defined]  # two records a page
+    await operator.hear(RunStarted("A", 0))
+    await operator.type("requirements", "requirements r2")
+    assert operator.screen == (
+        "safe is violated since 2.5 s: Never 'B' is active ('B' is active)\n"
+        "home is open: At some point the mission is over\n"
+        "r2 is monitored for no requirement\n"
+    )

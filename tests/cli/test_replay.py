@@ -57,6 +57,7 @@ def test_the_state_alone(invoke: Invoke, journal: Path, printed: str) -> None:
         "waiting": [],
         "prompts": [],
         "incidents": [],
+        "requirements": [],
         "data": {"mission.speed": 2.5, "user.decision": "abort"},
     }
     assert "begins" not in invoke(*words)[1]

@@ -235,7 +235,7 @@ class Play:
         kinds = [type(record) for record in self.records()]
         after_end = kinds[kinds.index(r.RunEnded) + 1 :] if r.RunEnded in kinds else []
         allowed = {r.BehaviorProgressed, r.BehaviorEnded, r.InputIgnored, r.RunClaimed}
-        allowed.add(r.RequirementDecided)
+        allowed |= {r.RequirementDecided, r.RequirementLeftOpen}
         assert set(after_end) <= allowed
         if state.status is RunStatus.RUNNING and not self.run.wants_continue:
             assert self.awaits(), "the run goes on and waits for nothing"

@@ -83,7 +83,10 @@ def test_what_is_satisfied_throws_nothing() -> None:
 
 def test_the_end_of_a_run_decides_and_throws_nothing() -> None:
     play = violate(begun(ASKING, "error:UNSAFE").answer())
-    assert (play.ended, play.run.state.verdicts) == ("completed", {"safe": VIOLATED})
+    assert play.ended == "completed"
+    assert {key: each.verdict for key, each in play.run.state.verdicts.items()} == {
+        "safe": VIOLATED
+    }
 
 
 def test_a_violation_during_a_pause_throws_when_the_run_goes_on() -> None:
@@ -99,3 +102,28 @@ def test_what_telemetry_says_is_recorded_when_it_changes() -> None:
         recorded = r.TelemetryConditionChanged("battery(uav1) < 20 %", holds)
         assert play.steps[-1].records == [recorded]
     assert "same" in play.give(i.TelemetryConditionChanged("battery(uav1) < 20 %", False)).ignored()
+
+
+def test_what_the_end_of_a_run_leaves_open_is_recorded_once() -> None:
+    left = i.RequirementLeftOpen("safe", "the run was stopped")
+    play = begun(ASKING).give(i.StopRun(by="anna")).give(left)
+    expected = r.RequirementLeftOpen("safe", "Never ended.", "the run was stopped")
+    assert play.steps[-1].records == [expected]
+    assert "decided before" in play.give(left).ignored()
+
+
+def test_what_telemetry_says_at_the_start_comes_before_the_first_token() -> None:
+    play = Play(ASKING)
+    required = i.MonitoredRequirement(
+        "low", "[]battery(a) > 0.2", "", conditions=("battery(a) > 0.2",)
+    )
+    known = {"battery(a) > 0.2": True}
+    play.give(i.StartRun(play.mission.process().id, requirements=(required,), conditions=known))
+    kinds = [type(each).__name__ for each in play.records()][:4]
+    assert kinds == [
+        "RunStarted",
+        "RequirementMonitored",
+        "TelemetryConditionChanged",
+        "ScopeOpened",
+    ]
+    assert play.run.state.telemetry_conditions == known

@@ -15,6 +15,7 @@ from m2pem.engine.records import (
     ErrorThrown,
     Record,
     RequirementDecided,
+    RequirementLeftOpen,
     RequirementMonitored,
     RequirementVerdict,
 )
@@ -46,6 +47,10 @@ def requirement(id_: str, formula: str, more: str = "") -> str:
 
 def decided(records: list[Record]) -> dict[str, RequirementVerdict]:
     return {each.requirement: each.verdict for each in records if type(each) is RequirementDecided}
+
+
+def left_open(records: list[Record]) -> dict[str, str]:
+    return {each.requirement: each.because for each in records if type(each) is RequirementLeftOpen}
 
 
 async def answered(world: World, source: bytes) -> RunStatus:
@@ -126,7 +131,9 @@ def test_a_run_that_an_operator_stops_leaves_open_what_is_not_certain(
         await world.executive.control.wait(run)
         return world.seen
 
-    assert decided(play(story)) == {}
+    seen = play(story)
+    assert decided(seen) == {}
+    assert left_open(seen) == {"ends": "the run was stopped"}
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,16 @@ from m2pem.geo.local_frame import offset
 from m2pem.mission.catalogue import ResourceId
 
 from .conftest import START_US, World
-from .test_run_monitors import SATISFIED, VIOLATED, asking, decided, left_behind, requirement
+from .test_run_monitors import (
+    SATISFIED,
+    VIOLATED,
+    answered,
+    asking,
+    decided,
+    left_behind,
+    left_open,
+    requirement,
+)
 
 CLOSE = "[] ![][0 s, 5 s] distance(uav1, uav2) < 5 m"
 HOME = (38.1, -77.3)
@@ -134,3 +143,46 @@ def test_an_outage_of_the_executive_is_no_evidence(
     assert [(each, verdict) for each, verdict, _ in decisions(seen)] == [
         ("safe", verdict) for _, verdict in expected
     ]
+
+
+CHARGED = asking(requirement("charged", "[] battery(uav1) > 20 %"))
+
+
+def test_what_telemetry_said_before_the_start_counts_from_the_first_moment_on(
+    play: Callable[..., Any],
+) -> None:
+    async def story(world: World) -> list[Record]:
+        at(world, "uav1", 0.0, battery_fraction=0.5)
+        await world.clock.sleep(1)
+        await answered(world, CHARGED)
+        await world.clock.sleep(1)
+        return world.seen
+
+    seen = play(story, "uav1")
+    assert (decided(seen), left_open(seen)) == ({"charged": SATISFIED}, {})
+
+
+@pytest.mark.parametrize(
+    ("battery", "why"),
+    [
+        (None, "nothing was known of uav1's battery"),
+        (0.5, "uav1's battery was not known all the time"),
+    ],
+)
+def test_the_end_says_what_was_not_known(
+    play: Callable[..., Any], battery: float | None, why: str
+) -> None:
+    async def story(world: World) -> list[Record]:
+        control = world.executive.control
+        run = await control.start(CHARGED)
+        await world.clock.sleep(1)
+        at(world, "uav1", 0.0, battery_fraction=battery)
+        await world.clock.sleep(1)
+        for _ in range(2):
+            await control.answer(run, control.prompts()[0].prompt, "yes", by="anna")
+            await world.clock.sleep(1)
+        await control.wait(run)
+        return world.seen
+
+    seen = play(story, "uav1")
+    assert (decided(seen), left_open(seen)) == ({}, {"charged": why})

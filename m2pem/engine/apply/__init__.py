@@ -102,6 +102,7 @@ APPLIERS: dict[type, Callable[[RunState, Any], None]] = {
     r.TransactionCancelled: tokens.transaction_cancelled,
     r.RequirementMonitored: requirements.requirement_monitored,
     r.RequirementDropped: requirements.requirement_dropped,
-    r.RequirementDecided: requirements.requirement_decided,
+    r.RequirementDecided: requirements.requirement_judged,
+    r.RequirementLeftOpen: requirements.requirement_judged,
     r.TelemetryConditionChanged: requirements.telemetry_condition_changed,
 }

@@ -13,8 +13,10 @@ def requirement_dropped(state: RunState, record: r.RequirementDropped) -> None:
     state.verdicts.pop(record.requirement, None)
 
 
-def requirement_decided(state: RunState, record: r.RequirementDecided) -> None:
-    state.verdicts[record.requirement] = record.verdict
+def requirement_judged(
+    state: RunState, record: r.RequirementDecided | r.RequirementLeftOpen
+) -> None:
+    state.verdicts[record.requirement] = record
 
 
 def telemetry_condition_changed(state: RunState, record: r.TelemetryConditionChanged) -> None:

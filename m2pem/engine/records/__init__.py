@@ -39,6 +39,7 @@ from m2pem.engine.records.incidents import (
 from m2pem.engine.records.requirements import (
     RequirementDecided,
     RequirementDropped,
+    RequirementLeftOpen,
     RequirementMonitored,
     TelemetryConditionChanged,
 )
@@ -155,6 +156,7 @@ __all__ = [
     "Record",
     "RequirementDecided",
     "RequirementDropped",
+    "RequirementLeftOpen",
     "RequirementMonitored",
     "RequirementVerdict",
     "ResourceKept",
@@ -263,5 +265,6 @@ Record: TypeAlias = Union[
     RequirementMonitored,
     RequirementDropped,
     RequirementDecided,
+    RequirementLeftOpen,
     TelemetryConditionChanged,
 ]

@@ -9,7 +9,7 @@ class RequirementMonitored(BaseRecord, frozen=True):
 
     `formula`: the requirement (docs/requirements.md), with ids for names. `english`: the same in
     words. `elements`: those that it is about. `on_violation`: what a violation does to the mission,
-    "error:CODE" or "signal:ID"; "": nothing.
+    "error:CODE" or "signal:ID"; "": nothing. `conditions`: those on telemetry in the formula.
     """
 
     requirement: str
@@ -17,6 +17,7 @@ class RequirementMonitored(BaseRecord, frozen=True):
     english: str
     elements: tuple[str, ...] = ()
     on_violation: str = ""
+    conditions: tuple[str, ...] = ()
 
 
 class RequirementDropped(BaseRecord, frozen=True):
@@ -37,6 +38,15 @@ class RequirementDecided(BaseRecord, frozen=True):
     english: str
     decided_us: int
     because: str = ""
+
+
+class RequirementLeftOpen(BaseRecord, frozen=True):
+    """The run has ended, and that does not decide whether it satisfies a requirement. `because`:
+    why not."""
+
+    requirement: str
+    english: str
+    because: str
 
 
 class TelemetryConditionChanged(BaseRecord, frozen=True):

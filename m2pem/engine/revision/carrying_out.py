@@ -60,7 +60,7 @@ def _carry_out(x: Steps, plan: RevisionPlan, item: Revise) -> None:
         )
     )
     x.read_mission()
-    monitor(x, item.requirements)
+    monitor(x, item)
     for move in plan.moves:
         _enter(x, move)
     for adjustment in plan.adjustments:

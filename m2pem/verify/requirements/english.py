@@ -188,6 +188,14 @@ class English:
                 return text if is_ == "is" else f"not ({text})"
 
 
+def measured_subject(condition: Measured) -> str:
+    """What a condition on telemetry compares: "uav1's battery"."""
+    first, *others = condition.resources
+    if others:
+        return f"the {condition.quantity} of {first} and {others[0]}"
+    return f"{first}'s {condition.quantity}"
+
+
 def sentence(clause: str) -> str:
     """A clause as a sentence."""
     if clause.startswith("(") and clause.endswith(")") and clause.count("(") == 1:

@@ -13,6 +13,8 @@ from m2pem_plugin_terminal.alerting import Alerting
 from m2pem_plugin_terminal.dialogs import Choice, Choose, Read, help_text
 from m2pem_plugin_terminal.direct_commands import DirectCommands
 from m2pem_plugin_terminal.people import People
+from m2pem_plugin_terminal.requirements import TITLE as TITLE_REQUIREMENTS
+from m2pem_plugin_terminal.requirements import requirements_text
 from m2pem_plugin_terminal.shared_space import TITLE as TITLE_SPACE
 from m2pem_plugin_terminal.shared_space import space_text
 from m2pem_plugin_terminal.starting import Starting
@@ -43,6 +45,7 @@ class TerminalApp(Starting, Alerting, People, DirectCommands):
         Binding("left_square_bracket", "next_run(-1)"),
         Binding("c", "schedule"),
         Binding("f", "space"),
+        Binding("v", "requirements"),
         Binding("a", "alerts"),
         Binding("b", "toggle_bell"),
         Binding("slash", "filter"),
@@ -181,6 +184,16 @@ class TerminalApp(Starting, Alerting, People, DirectCommands):
             self.say(str(error), alarm=True)
             return
         await self.push_screen(Read(TITLE_SPACE, space_text(spaces, waiting)))
+        self.show()
+
+    async def action_requirements(self) -> None:
+        """Show what the run is monitored for, and what is certain of it."""
+        view = self.view
+        if view is None:
+            self.say("No mission is running here")
+            return
+        shown = requirements_text(view.run, view.requirements.values())
+        await self.push_screen(Read(TITLE_REQUIREMENTS, shown))
         self.show()
 
     def action_filter(self) -> None:

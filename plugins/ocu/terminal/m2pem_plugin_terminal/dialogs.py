@@ -229,6 +229,7 @@ KEYS = (
     (". ,", "map: follow the next vehicle, the one before"),
     ("c", "the schedule: start, hold, release, cancel"),
     ("f", "who is in shared space, and which tasks wait"),
+    ("v", "requirements: what is violated, open, satisfied"),
     ("a", "alerts: acknowledge, take care, see the run"),
     ("b", "the bell, on or off"),
     ("/", "log: only lines with a text; Esc: all"),

@@ -47,6 +47,7 @@ LOGGED = frozenset(
         r.IncidentResolved,
         r.IncidentClosed,
         r.RequirementDecided,
+        r.RequirementLeftOpen,
     )
 )
 """Records that the log shows; the mission pane shows tokens."""

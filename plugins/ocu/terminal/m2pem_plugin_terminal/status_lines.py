@@ -64,14 +64,17 @@ def header(
     left = Text.assemble(
         (f" {view.status.value.upper()} ", STATUS_STYLES.get(view.status, "")), "  "
     )
+    violated = sum(each.verdict == "violated" for each in view.requirements.values())
+    wrong = f"  {violated} violated (v)" if violated else ""
     more = f"  +{others} more (r)" if others else ""
-    room = width - left.cell_len - right.cell_len - len(more) - len(view.run) - 3
+    room = width - left.cell_len - right.cell_len - len(more) - len(wrong) - len(view.run) - 3
     if view.status is RunStatus.PAUSED:
         room -= len(view.paused_by) + 5
     left.append(shortened(view.name, room), "bold #e3e8ee")
     left.append(f"  {view.run}", "#9aa4af")
     if view.status is RunStatus.PAUSED and view.paused_by:
         left.append(f"  by {view.paused_by}", "#9aa4af")
+    left.append(wrong, "bold #e07a6a")
     left.append(more, "#e8c468")
     gap = max(1, width - left.cell_len - right.cell_len)
     return Text.assemble(left, " " * gap, right)

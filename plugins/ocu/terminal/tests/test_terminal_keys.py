@@ -15,6 +15,7 @@ DIALOGS = {
     "n": (["n"], "Note for the log of r1"),
     "c": (["c"], "Nothing is scheduled"),
     "f": (["f"], "Shared space and waiting tasks"),
+    "v": (["v"], "r1 is monitored for no requirement"),
     "a": (["a"], "─ Alerts ─"),
     "?": (["question_mark"], "─ Keys ─"),
     "q": (["q"], "and let the mission go on"),

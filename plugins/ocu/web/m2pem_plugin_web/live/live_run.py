@@ -4,8 +4,8 @@ from typing import Any
 
 import msgspec
 
-from m2pem.api import RunView
-from m2pem.api.run_view import NEWEST, Behavior, Changes, Place, RequirementState
+from m2pem.api import RequirementState, RunView
+from m2pem.api.run_view import NEWEST, Behavior, Changes, Place
 from m2pem_plugin_web.live.messages import record_of
 
 _encode = msgspec.json.Encoder().encode
@@ -76,5 +76,5 @@ def requirement(state: RequirementState) -> dict[str, Any]:
         "verdict": state.verdict,
         "since": state.since_s,
         "recorded": state.recorded_s,
-        "because": state.because,
+        "because": state.reason,
     }

@@ -30,7 +30,7 @@ MOST_BARS = 1500
 NOTABLE = 6
 """Answers and faults that are kept, the last of each."""
 
-FORMAT = f"3 of m2pem {m2pem.__version__}"
+FORMAT = f"4 of m2pem {m2pem.__version__}"
 
 LEVEL = 1
 """Of zlib: the executive waits while a snapshot of a run that goes on is compressed."""

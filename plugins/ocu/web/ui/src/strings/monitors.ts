@@ -11,6 +11,7 @@ export const monitors = {
   openHint: "not decided yet: what comes next may satisfy or violate it",
   neverDecided: "not decided: the run was stopped before that",
   since: "since {time}",
+  openBecause: "Why it is open: {because}",
   because: "What made it certain: {because}",
   throws: { error: "A violation throws error {name} in the mission.", signal: "A violation throws signal {name} in the mission." },
   elements: "Elements",

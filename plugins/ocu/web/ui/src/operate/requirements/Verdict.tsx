@@ -50,7 +50,7 @@ export function Verdict({ name, requirement, status, onShow, hint, children }: V
       {verdict === "open" && (
         <p class="hint">{status === "stopped" ? text.neverDecided : text.openHint}</p>
       )}
-      {because && <p>{fill(text.because, { because })}</p>}
+      {because && <p>{fill(verdict === "open" ? text.openBecause : text.because, { because })}</p>}
       {thrown && <p class="hint">{fill(thrown, { name: rest.join(":") })}</p>}
       {children}
       <details>

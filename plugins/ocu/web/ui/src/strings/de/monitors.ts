@@ -13,6 +13,7 @@ export const monitors: Translation<typeof english.monitors> = {
   openHint: "noch nicht entschieden: was noch kommt, kann sie erfüllen oder verletzen",
   neverDecided: "nicht entschieden: der Lauf wurde vorher gestoppt",
   since: "seit {time}",
+  openBecause: "Warum sie offen ist: {because}",
   because: "Wodurch das feststeht: {because}",
   throws: {
     error: "Eine Verletzung wirft den Fehler {name} in der Mission.",
