@@ -70,6 +70,13 @@ def fleet_option(*, required: bool) -> Callable[[F], F]:
     )
 
 
+spec_option = click.option(
+    "--spec",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Requirements (YAML) beside those in the mission's own file.",
+)
+
 process_option = click.option(
     "--process",
     metavar="ID",

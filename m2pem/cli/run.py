@@ -19,6 +19,7 @@ from m2pem.cli.options import (
     path_option,
     process_option,
     simulate_option,
+    spec_option,
     speed_option,
 )
 
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
 @process_option
 @path_option
 @data_option
+@spec_option
 @journal_option
 @ocu_option
 @face_option
@@ -51,6 +53,7 @@ def run(
     process: str | None,
     search_path: tuple[Path, ...],
     data: "dict[str, Value]",
+    spec: Path | None,
     journal: str | None,
     ocu_names: str | None,
     face_names: str | None,
@@ -76,6 +79,7 @@ def run(
                 process=process,
                 search_path=search_path,
                 data=data,
+                spec=spec,
                 journal_url=journal,
                 ocu_names=ocu_names,
                 face_names=face_names,
@@ -95,6 +99,7 @@ async def _run(
     process: str | None,
     search_path: tuple[Path, ...],
     data: "dict[str, Value]",
+    spec: Path | None,
     journal_url: str | None,
     ocu_names: str | None,
     face_names: str | None,
@@ -111,7 +116,7 @@ async def _run(
     from m2pem.cli.ocus import Operators, chosen
     from m2pem.cli.output import output_of
     from m2pem.cli.session import drive_run, make_executive, refuse_speed
-    from m2pem.executive.loading import load_source
+    from m2pem.executive.loading import known_data, load_source, monitored_requirements
     from m2pem.executive.simulated_state import tidy_up, with_own_state
     from m2pem.findings import lines
     from m2pem.fleet.fleet import simulated_fleet
@@ -143,6 +148,7 @@ async def _run(
         process_id, warnings = executive.admit(mission, process, data)
         for line in lines(warnings):
             note(line)
+        required = monitored_requirements(mission, fleet, plugins, known_data(data), spec)
         with output_of(output) as out:
             status = await drive_run(
                 executive,
@@ -151,7 +157,7 @@ async def _run(
                 answers,
                 file_of(url),
                 interruption,
-                lambda: executive.begin(mission, process_id, data, ""),
+                lambda: executive.begin(mission, process_id, data, "", requirements=required),
                 faces,
             )
         tidy_up(executive, file_of(url))

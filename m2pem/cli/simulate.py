@@ -16,6 +16,7 @@ from m2pem.cli.options import (
     mission_argument,
     path_option,
     process_option,
+    spec_option,
 )
 from m2pem.units import US_PER_S
 
@@ -47,6 +48,7 @@ def _read_start(_: click.Context, __: click.Parameter, text: str | None) -> int 
 @process_option
 @path_option
 @data_option
+@spec_option
 @answers_option
 @click.option(
     "--start",
@@ -72,6 +74,7 @@ def simulate(
     process: str | None,
     search_path: tuple[Path, ...],
     data: "dict[str, Value]",
+    spec: Path | None,
     answers: Path | None,
     start_us: int | None,
     max_steps: int,
@@ -115,11 +118,13 @@ def simulate(
             plugins=PluginManager(),
             process=process,
             data=data,
+            spec=spec,
             answers=script,
             start_us=START_US if start_us is None else start_us,
             max_steps=max_steps,
             on_record=show,
         )
+        out.summarize(result.summary.run, result.requirements)
         out.writer.drain()
     if gantt is not None:
         _draw(gantt, kept, fleet)

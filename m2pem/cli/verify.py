@@ -19,6 +19,7 @@ from m2pem.cli.options import (
     mission_argument,
     path_option,
     process_option,
+    spec_option,
 )
 
 if TYPE_CHECKING:
@@ -41,12 +42,7 @@ if TYPE_CHECKING:
 @process_option
 @path_option
 @data_option
-@click.option(
-    "--spec",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
-    metavar="FILE",
-    help="Requirements (YAML) beside those in the mission's own file.",
-)
+@spec_option
 @click.option(
     "--assume",
     metavar="ASSUMPTION",

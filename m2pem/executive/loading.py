@@ -1,5 +1,6 @@
 """Getting a mission: from a path, a URL or bytes; and checking it against the fleet."""
 
+import logging
 from collections.abc import Collection, Container, Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
@@ -28,6 +29,8 @@ from m2pem.suggestions import suggest_or
 
 if TYPE_CHECKING:
     from m2pem.plugins import Plugins
+
+log = logging.getLogger("m2pem.loading")
 
 FETCH_TIMEOUT_S = 10.0
 
@@ -220,15 +223,21 @@ def monitored_requirements(
     spec: Path | bytes | None = None,
 ) -> tuple[MonitoredRequirement, ...]:
     """Return the requirements that a run of a mission is monitored for: those in its file, and
-    those of a spec file, or of its text.
+    those of a spec file, or of its text. A warning of the log names those of them that cannot be
+    monitored.
 
     Raises:
         RequirementsError: with every finding.
     """
     if spec is None and not has_requirements(mission):
         return ()
-    from m2pem.monitors.selection import monitored  # noqa: PLC0415
+    from m2pem.monitors.selection import can_be_monitored, monitored  # noqa: PLC0415
     from m2pem.verify.requirements import Names, collect  # noqa: PLC0415
 
     names = Names(mission, fleet, plugins.service_writes(), data)
-    return monitored(collect(names, spec))
+    required = collect(names, spec)
+    left_out = [each.id for each in required if each.monitor and not can_be_monitored(each)]
+    if spec is not None and left_out:
+        text = "the run is not monitored for %s: only `m2pem verify` counts single steps"
+        log.warning(text, ", ".join(left_out))
+    return monitored(required)

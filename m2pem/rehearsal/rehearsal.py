@@ -10,6 +10,7 @@ from typing import Protocol, TypeAlias
 
 from m2pem.api.authoring import MissionSource
 from m2pem.api.clock import VirtualClock, run_virtual
+from m2pem.api.requirement_states import RequirementStates
 from m2pem.api.runs import RunStatus, RunSummary, SimulationResult, StampedRecord, TelemetrySample
 from m2pem.api.telemetry import PayloadState, VehicleState
 from m2pem.engine.incidents import incident_holding
@@ -190,6 +191,7 @@ def rehearse(
     plugins: PluginManager,
     process: str | None = None,
     data: Mapping[str, Value] | None = None,
+    spec: Path | bytes | None = None,
     answers: Answers | Path | str | bytes | None = None,
     start_us: int = START_US,
     max_steps: int = MAX_STEPS,
@@ -201,7 +203,8 @@ def rehearse(
     """Run a mission to its end on a virtual clock that begins at `start_us` (since the epoch).
 
     `mission`: a path, a `file:` or `http:` URL, BPMN bytes, or one that was loaded. `fleet` None:
-    for a mission that commands no resource. `answers`: a file, its text as bytes, or one that was
+    for a mission that commands no resource. `spec`: more requirements that it is monitored for, a
+    file or its text. `answers`: a file, its text as bytes, or one that was
     loaded and has not been used. `on_record` gets each record as soon as it is committed; what it
     raises ends the rehearsal. `observed`: whether plugins that observe records are called.
     `search_path`: folders of processes that the mission calls. `telemetry_every_s`: of mission
@@ -209,11 +212,12 @@ def rehearse(
 
     Raises:
         MissionError: the mission cannot be loaded, does not fit the fleet, or needs one.
+        RequirementsError: the requirements cannot be used.
         AnswersError: the answers cannot be used, or do not fit the mission.
         FleetError: the fleet cannot be simulated.
     """
     loaded = mission if isinstance(mission, Mission) else load_source(mission, search_path)
-    return Rehearser(loaded, fleet, plugins, process).rehearse(
+    return Rehearser(loaded, fleet, plugins, process, spec=spec).rehearse(
         data=data,
         answers=answers,
         start_us=start_us,
@@ -248,23 +252,26 @@ class Rehearser:
         plugins: PluginManager,
         process: str | None = None,
         *,
+        spec: Path | bytes | None = None,
         reports_left: bool = True,
     ) -> None:
-        """`reports_left`: vehicles report what is left of a behavior while it goes on. What becomes
-        of a run does not depend on that, unless others may do what is left (`uses_left`)."""
+        """`spec`: more requirements, a file or its text. `reports_left`: vehicles report what is
+        left of a behavior while it goes on. What becomes of a run does not depend on that, unless
+        others may do what is left (`uses_left`)."""
         if fleet is None:
             refuse_commands(mission)
             fleet = NO_FLEET
         self.mission = mission
         # A mission that has such words elsewhere is rehearsed a little slower, and the same.
         asks = has_requirements(mission) and _TELEMETRY.search(mission.source)
-        looks = waits_for_space(fleet) or asks
+        looks = waits_for_space(fleet) or asks or spec is not None
         seen = {"telemetry_hz": SPACE_HZ} if looks else {}
         # A script answers: it may answer what any operator may.
         silent = {} if reports_left else {"reports_left": False}
         self.fleet = simulated_fleet(replace(fleet, operators={}), {**SETTINGS, **seen, **silent})
         self.plugins = plugins
         self._process = process
+        self._spec = spec
         self._admitted: dict[frozenset[str], Admitted] = {}
 
     def rehearse(
@@ -301,6 +308,7 @@ class Rehearser:
             tuple(collected),
             tuple(rehearsal.samples),
             tuple(self.mission.files()),
+            tuple(rehearsal.requirements.values()),
             rehearsal.vehicles,
         )
 
@@ -315,7 +323,7 @@ class Rehearser:
         if names not in self._admitted:
             process, _ = executive.admit(self.mission, self._process, data)
             required = monitored_requirements(
-                self.mission, self.fleet, self.plugins, known_data(data)
+                self.mission, self.fleet, self.plugins, known_data(data), self._spec
             )
             self._admitted[names] = process, required
         return self._admitted[names]
@@ -363,6 +371,7 @@ class Rehearsal:
     ) -> None:
         self.samples: Sequence[TelemetrySample] = ()
         self.vehicles: Mapping[ResourceId, VehicleAtEnd] = {}
+        self.requirements = RequirementStates()
         self._debugger = debugger
         self._holding: list[asyncio.Future[None]] = []
         self._every_s = telemetry_every_s
@@ -375,7 +384,7 @@ class Rehearsal:
         self._quiet_since_us: int | None = None
 
     async def run(self, clock: VirtualClock, data: Mapping[str, Value] | None) -> RunSummary:
-        journal = _NotifyingJournal(self._on_record)
+        journal = _NotifyingJournal(self._read)
         mission = self._rehearser.mission
         executive = Executive(
             self._rehearser.fleet,
@@ -389,6 +398,11 @@ class Rehearsal:
         )
         process_id, required = self._rehearser.admit(executive, data)
         async with executive:
+            if any(each.conditions for each in required):
+                # The first telemetry waits to be read: it counts from the first moment on.
+                for arbiter in self._scripted.simulated:
+                    for vehicle in arbiter.broadcast.all_at(clock.now_us()):
+                        executive.bus.publish(vehicle)
             step = self._debugger is not None
             run = await executive.begin(
                 mission, process_id, data, "", step=step, requirements=required
@@ -432,6 +446,10 @@ class Rehearsal:
             finally:
                 acting.cancel()
                 ending.cancel()
+
+    def _read(self, stamped: StampedRecord) -> None:
+        self.requirements.take(stamped.record, stamped.t_s)
+        self._on_record(stamped)
 
     def _sampler(self, clock: VirtualClock) -> Sampler | None:
         if self._every_s is None:

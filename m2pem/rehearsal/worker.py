@@ -7,6 +7,7 @@ from typing import Any
 import msgspec
 
 from m2pem.api.authoring import MissionSource
+from m2pem.api.requirement_states import RequirementState
 from m2pem.api.runs import RunSummary, SimulationResult, StampedRecord, TelemetrySample
 from m2pem.errors import OperatorError
 from m2pem.executive.subprocess_worker import (
@@ -31,6 +32,7 @@ class Order(msgspec.Struct):
     fleet: bytes
     process: str | None
     data: dict[str, Any]
+    spec: bytes | None
     answers: str | None
     answers_text: bytes | None
     start_us: int | None
@@ -46,6 +48,7 @@ class Done(msgspec.Struct):
     records: list[StampedRecord]
     telemetry: list[TelemetrySample]
     files: list[MissionFile]
+    requirements: list[RequirementState]
 
 
 async def rehearse_in_subprocess(
@@ -56,6 +59,7 @@ async def rehearse_in_subprocess(
     max_steps: int = MAX_STEPS,
     process: str | None = None,
     data: Mapping[str, Value] | None = None,
+    spec: bytes | None = None,
     answers: Path | str | bytes | None = None,
     start_us: int | None = None,
     telemetry_every_s: float | None = None,
@@ -63,7 +67,7 @@ async def rehearse_in_subprocess(
     """As `m2pem.rehearsal.rehearsal.rehearse`, without observers; cancelling ends the process.
 
     Raises:
-        FindingsError: the mission or the answers cannot be used.
+        FindingsError: the mission, the requirements or the answers cannot be used.
         OperatorError: an option has no sense.
     """
     if max_steps < 1 or (telemetry_every_s is not None and not telemetry_every_s > 0):
@@ -73,6 +77,7 @@ async def rehearse_in_subprocess(
         dump(fleet),
         process,
         dict(data or {}),
+        spec,
         None if answers is None or isinstance(answers, bytes) else str(answers),
         answers if isinstance(answers, bytes) else None,
         start_us,
@@ -83,7 +88,11 @@ async def rehearse_in_subprocess(
     answer = await run_in_subprocess(__name__, msgspec.msgpack.encode(order))
     done = msgspec.msgpack.decode(answer, type=Done)
     return SimulationResult(
-        done.summary, tuple(done.records), tuple(done.telemetry), tuple(done.files)
+        done.summary,
+        tuple(done.records),
+        tuple(done.telemetry),
+        tuple(done.files),
+        tuple(done.requirements),
     )
 
 
@@ -98,6 +107,7 @@ def _work(content: bytes, _: SendProgress) -> bytes:
         plugins=PluginManager(),
         process=order.process,
         data=order.data,
+        spec=order.spec,
         answers=order.answers if order.answers_text is None else order.answers_text,
         start_us=START_US if order.start_us is None else order.start_us,
         max_steps=order.max_steps,
@@ -105,7 +115,13 @@ def _work(content: bytes, _: SendProgress) -> bytes:
         search_path=[Path(each) for each in order.search_path],
         telemetry_every_s=order.telemetry_every_s,
     )
-    done = Done(result.summary, list(result.records), list(result.telemetry), list(result.files))
+    done = Done(
+        result.summary,
+        list(result.records),
+        list(result.telemetry),
+        list(result.files),
+        list(result.requirements),
+    )
     return msgspec.msgpack.encode(done)
 
 

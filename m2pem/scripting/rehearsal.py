@@ -27,6 +27,7 @@ def rehearse(
     *,
     process: str | None = None,
     data: Mapping[str, Value] | None = None,
+    requirements: str | Path | bytes | None = None,
     answers: Mapping[str, Any] | str | Path | bytes | None = None,
     start: datetime | None = None,
     max_steps: int = MAX_STEPS,
@@ -36,13 +37,15 @@ def rehearse(
     """Run a mission to its end on simulated vehicles and a virtual clock, as `m2pem simulate`.
 
     The same mission, fleet and answers give the same records. `fleet` None: for a mission that
-    commands no resource. `answers`: an answers file, its text as bytes, or its content as a dict.
+    commands no resource. `requirements`: a file of requirements beside the mission's own, or its
+    text as bytes. `answers`: an answers file, its text as bytes, or its content as a dict.
     `start`: when it begins, 2026-01-01 by default; without a time zone it is UTC. `max_steps`:
     engine steps after which it is given up. `telemetry_every_s`: seconds of mission time between
     the positions in the result's telemetry; None: it has none.
 
     Raises:
         MissionError: the mission cannot be loaded, does not fit the fleet, or needs one.
+        RequirementsError: requirements cannot be read, or do not fit; it lists all findings.
         AnswersError: the answers cannot be used, or do not fit the mission.
         FleetError: the fleet cannot be used.
     """
@@ -54,6 +57,7 @@ def rehearse(
         plugins=PluginManager(),
         process=process,
         data=data,
+        spec=Path(requirements) if isinstance(requirements, str) else requirements,
         answers=json.dumps(answers).encode() if isinstance(answers, Mapping) else answers,
         start_us=START_US if start is None else _us(start),
         max_steps=max_steps,

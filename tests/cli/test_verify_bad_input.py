@@ -14,7 +14,8 @@ PAIR = (
 )
 ATOMS = (
     "a formula can ask for active(E), completed(E), commanded(RESOURCE, BEHAVIOR), ended, "
-    "count(...) >= N, distance(A, B) < 5 m and comparisons of data"
+    "count(...) >= N, distance(A, B) < 5 m, altitude(V) > 10 m, speed(V) > 1 m/s, "
+    "battery(V) < 20 %, link(V) == lost and comparisons of data"
 )
 
 
@@ -39,6 +40,7 @@ def refused(invoke: Invoke, tmp_path: Path, *requirements: str) -> list[str]:
         ("<> completed(SurvyWest)", "SurvyWest", "did you mean 'SurveyWest' or 'SurveyEast'?"),
         ("<> completed('AREA SURVEY WST')", "'AREA", "did you mean 'AREA SURVEY WEST'"),
         ("<> west.surveyd == true", "west.surveyd", "did you mean 'west.surveyed'"),
+        ("[] battery(uav1) > 20", "20", "20 is no charge of a battery; write 20 %, or 0.2"),
     ],
 )
 def test_a_mistake_in_a_formula_is_pointed_at(

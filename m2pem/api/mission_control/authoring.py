@@ -47,12 +47,13 @@ class AuthoringControl(Protocol):
     async def simulate(self, mission: MissionSource, **options: Any) -> SimulationResult:
         """Rehearse a mission with this fleet on a virtual clock. Cancelling ends it.
 
-        Options: `process`, `data`, `answers` (path of an answers file, or its text as bytes),
-        `start_us` (microseconds since the Unix epoch), `max_steps` (100,000: all records are kept
-        in memory), `telemetry_every_s` (None: the result has no telemetry).
+        Options: `process`, `data`, `spec` (the text of a file of requirements, as bytes),
+        `answers` (path of an answers file, or its text as bytes), `start_us` (microseconds since
+        the Unix epoch), `max_steps` (100,000: all records are kept in memory), `telemetry_every_s`
+        (None: the result has no telemetry).
 
         Raises:
-            FindingsError: the mission or the answers cannot be used.
+            FindingsError: the mission, the requirements or the answers cannot be used.
         """
         ...
 

@@ -163,6 +163,10 @@ ATOMS = (
     "ended",
     "count(...) >= N",
     "distance(A, B) < 5 m",
+    "altitude(V) > 10 m",
+    "speed(V) > 1 m/s",
+    "battery(V) < 20 %",
+    "link(V) == lost",
 )
 """Propositions, besides comparisons of data."""
 
@@ -473,7 +477,10 @@ class _Parser:
         if dimension is None:
             if unit not in ("", "%"):
                 self.reader.fail("a battery is compared with a fraction, or with %", at)
-            return float(number) / (100 if unit else 1), text
+            fraction = float(number) / (100 if unit else 1)
+            if not 0 <= fraction <= 1:
+                self.reader.fail(f"{text} is no charge of a battery; write 20 %, or 0.2", at)
+            return fraction, text
         try:
             return quantity(text, dimension), text
         except UnitError as error:
