@@ -270,8 +270,8 @@ _MODULES = {
     "m2pem.api.remaining": (
         "RemainingRoute RemainingSurvey RemainingWork raw_parameters restored_work"
     ),
-    "m2pem.api.revision": "RevisionEffect RevisionPreview RevisionRefusal RunVersion",
     "m2pem.api.requirement_states": "RequirementState RequirementStates worst_first",
+    "m2pem.api.revision": "RevisionEffect RevisionPreview RevisionRefusal RunVersion",
     "m2pem.api.run_view": "RunView",
     "m2pem.api.runs": (
         "CONTROL_REQUEST NEWS SCHEDULE Alert GeometryVersion HandedOver IncidentPreview"
