@@ -88,7 +88,7 @@ class Histogram:
 
 
 @dataclass(frozen=True, slots=True)
-class Interval:
+class Mark:
     """A value, and the interval that it lies in."""
 
     name: str
@@ -104,7 +104,7 @@ class Intervals:
     name: str
     title: str
     label: str
-    intervals: Sequence[Interval]
+    intervals: Sequence[Mark]
 
     def svg(self) -> str:
         """Return the chart as an SVG document."""
@@ -136,7 +136,7 @@ class Intervals:
 Chart = Histogram | Intervals
 
 
-def _said(each: Interval) -> str:
+def _said(each: Mark) -> str:
     return f"{each.name} {each.value:+.4f} ({each.low:+.4f} to {each.high:+.4f})"
 
 

@@ -6,11 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from m2pem.campaign.campaign import CampaignResult
-from m2pem.campaign.charts import Chart, Histogram, Interval, Intervals
+from m2pem.campaign.charts import Chart, Histogram, Intervals, Mark
 from m2pem.campaign.runs import Order, Row, replay_command
 from m2pem.campaign.statistics import (
     CONFIDENCE,
     Estimate,
+    Interval,
     compared,
     effects,
     ends,
@@ -172,12 +173,8 @@ def _effects(rows: Sequence[Row]) -> list[Section]:
         return []
     title = "What failures depend on"
     columns = (
-        "what was drawn",
-        "runs",
-        "change of failure",
-        "interval",
-        "change of time, s",
-        "rank",
+        *("what was drawn", "runs", "change of failure", "interval", "cost"),
+        *("change of time, s", "interval", "rank"),
     )
     listed = [
         (
@@ -185,13 +182,14 @@ def _effects(rows: Sequence[Row]) -> list[Section]:
             each.split,
             f"{each.failure:+.4f}",
             f"{each.low:+.4f} to {each.high:+.4f}" + ("" if each.certain else " (may be 0)"),
-            _number(each.took_s, "+.1f"),
+            f"{each.cost:+.4f}",
+            *_difference_of(each.took_s, "+.1f"),
             _number(each.rank, "+.2f"),
         )
         for each in found
     ]
     intervals = [
-        Interval(f"{each.name}: {each.split}", each.failure, each.low, each.high) for each in found
+        Mark(f"{each.name}: {each.split}", each.failure, each.low, each.high) for each in found
     ]
     chart = Intervals("effects", title, "change of the probability of failure", intervals)
     return [Section(title, (), _table(columns, listed), chart=chart)]
@@ -204,8 +202,7 @@ def _difference(result: CampaignResult, other: CampaignResult) -> Section:
         ("probability of failure", difference.failure, "+.4f"),
         ("time of runs that are good in both, s", difference.took_s, "+.2f"),
     ):
-        mean, low, high = (_number(each, shape) for each in values)
-        listed.append((name, mean, f"{low} to {high}"))
+        listed.append((name, *_difference_of(values, shape)))
     pairs = f"{difference.pairs:,} pairs of runs with the same random numbers; this less that."
     return Section(
         f"Against {other.order.mission.file}",
@@ -225,6 +222,11 @@ def _worst(rows: Sequence[Row], order: Order, folder: Path) -> Section:
     )
     table = _table(("run", "outcome", "end", "time, s"), listed)
     return Section("Worst runs", (), table, after, tuple(commands))
+
+
+def _difference_of(values: Interval, shape: str) -> tuple[str, str]:
+    value, low, high = (_number(each, shape) for each in values)
+    return value, f"{low} to {high}" if low else ""
 
 
 def _number(value: float, shape: str) -> str:

@@ -62,7 +62,10 @@ def test_what_failures_depend_on_comes_first_and_what_they_do_not_is_uncertain()
     assert found[0].low < 0.6 < found[0].high
     assert found[0].certain
     [of_wind] = [each for each in found if each.name == "wind"]
-    assert of_wind.took_s == pytest.approx(10, rel=0.1)
+    took_s, low, high = of_wind.took_s
+    assert took_s == pytest.approx(10, rel=0.1)
+    assert low < 10 < high
+    assert found[0].cost == pytest.approx(0.3 * 0.6, rel=0.2)
     assert abs(of_wind.failure) < 0.1
     assert abs(of_wind.rank) < 0.1
 
