@@ -194,7 +194,7 @@ def test_requirements_of_the_mission_and_beside_it_are_gathered(tmp_path) -> Non
     [
         (
             "pattern: response, args: {whn: Drive, then: Drive}",
-            "response takes no 'whn', and needs 'when'; did you mean 'when'?",
+            "response takes no 'whn', and needs 'when'; did you mean 'when' or 'within'?",
         ),
         (
             "pattern: response, args: {trigger: Drive, then: Drive}",
@@ -203,7 +203,7 @@ def test_requirements_of_the_mission_and_beside_it_are_gathered(tmp_path) -> Non
         (
             "pattern: response, args: {trigger: Drive, effect: Drive}",
             "response takes no 'trigger' and no 'effect', and needs 'when' and 'then'; "
-            "known arguments: when, then, before, after, until",
+            "known arguments: when, then, within, for, before, after, until",
         ),
         (
             "pattern: response, args: {wen: Drive, thn: Drive}",
@@ -212,7 +212,7 @@ def test_requirements_of_the_mission_and_beside_it_are_gathered(tmp_path) -> Non
         ),
         (
             "pattern: existence, args: {what: Drive, times: 2}",
-            "existence takes no 'times'; known arguments: what, before, after, until",
+            "existence takes no 'times'; known arguments: what, within, for, before, after, until",
         ),
     ],
 )

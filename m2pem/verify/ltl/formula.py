@@ -324,6 +324,23 @@ def propositions(formula: Formula) -> tuple[Proposition, ...]:
     return tuple(found)
 
 
+def bounds_misused(formula: Formula) -> str:
+    """Return why a formula cannot stand in an operator with bounds; "" if it can."""
+    if any(isinstance(each, PAST) for each in walk(formula)):
+        return "once, historically, since and count look beyond bounds"
+    if any(isinstance(each, FUTURE) for each in _outside_bounds(formula)):
+        return "in an operator with bounds each [], <> and U has bounds, and there is no W"
+    return ""
+
+
+def _outside_bounds(formula: Formula) -> Iterator[Formula]:
+    """The formula and all below it, but for operators with bounds and what is within them."""
+    if not isinstance(formula, Timed):
+        yield formula
+        for each in children(formula):
+            yield from _outside_bounds(each)
+
+
 def needs_steps(formula: Formula) -> bool:
     """Whether a formula observes single steps, so that a search may leave none out."""
     return any(isinstance(each, Next) for each in walk(formula))

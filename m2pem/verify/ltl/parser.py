@@ -6,7 +6,7 @@ conditions, so they have the same meaning.
 """
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from typing import NoReturn
 
 from m2pem.errors import ExpressionSyntaxError
@@ -321,14 +321,9 @@ class _Parser:
     ) -> f.Formula:
         if bounds is None:
             return formula
-        inner = [part for each in f.children(formula) for part in _without_bounded(each)]
-        if any(isinstance(each, f.PAST) for each in f.walk(formula)):
-            self.reader.fail("once, historically, since and count look beyond bounds", position)
-        if any(isinstance(each, f.FUTURE) for each in inner):
-            self.reader.fail(
-                "in an operator with bounds each [], <> and U has bounds, and there is no W",
-                position,
-            )
+        for each in f.children(formula):
+            if misused := f.bounds_misused(each):
+                self.reader.fail(misused, position)
         return f.Timed(formula, *bounds)
 
     def _next_word(self) -> str:
@@ -507,14 +502,6 @@ class _Parser:
 
     def _looks_like_data(self, start: int) -> bool:
         return bool(re.match(r"[^\W\d][\w.]*\s*(?:[=!<>]=|[<>])", self.reader.text[start:]))
-
-
-def _without_bounded(formula: f.Formula) -> Iterator[f.Formula]:
-    """The formula and all below it, but for operators with bounds and what is within them."""
-    if not isinstance(formula, f.Timed):
-        yield formula
-        for each in f.children(formula):
-            yield from _without_bounded(each)
 
 
 def _listed() -> str:

@@ -7,11 +7,22 @@ from typing import Any
 
 from m2pem.errors import ExpressionSyntaxError, M2pemError
 from m2pem.suggestions import did_you_mean, suggest
+from m2pem.units import US_PER_S, Dimension, UnitError, quantity
 from m2pem.verify.assumptions import AssumptionError, Assumptions, refuse_unknown
 from m2pem.verify.assumptions import parse as parse_assumptions
 from m2pem.verify.ltl import parse
-from m2pem.verify.ltl.formula import Completed, Formula, negated
+from m2pem.verify.ltl.formula import (
+    Always,
+    Completed,
+    Formula,
+    Timed,
+    bounds_misused,
+    children,
+    negated,
+    walk,
+)
 from m2pem.verify.ltl.observer import Observer
+from m2pem.verify.ltl.parser import MAX_BOUND_S
 from m2pem.verify.requirements.english import English, sentence
 from m2pem.verify.requirements.names import Names, UnknownNameError
 from m2pem.verify.requirements.patterns import PATTERNS, Argument, Kind, Pattern
@@ -151,7 +162,7 @@ def _of_pattern(
         chosen = {**values, "resource": vehicle} if each else values
         words = English(names.labels)
         try:
-            formula = within(pattern.build(chosen, names), **scope)
+            formula = _in_part(pattern.build(chosen, names), chosen, scope)
         except ScopeError as error:
             message = f"{pattern.name} cannot be asked for a part of a run: {error}"
             raise UnusableError("args", message) from None
@@ -176,6 +187,40 @@ def _of_pattern(
             ),
             "args",
         )
+
+
+def _in_part(
+    formula: Formula, arguments: Mapping[str, Any], scope: Mapping[str, Formula | None]
+) -> Formula:
+    """A pattern's formula, required of a part of the run.
+
+    Raises:
+        ScopeError: it cannot be.
+        UnusableError: its bounds of time do not fit what it is about.
+    """
+    if arguments.get("for") is not None:
+        _refuse_moments(formula)
+        if scope["before"] is not None or scope["until"] is not None:
+            raise ScopeError("'for' may go beyond its end; only 'after' goes with it")
+    found = within(formula, **scope)
+    for each in walk(found):
+        if isinstance(each, Timed):
+            for part in children(each.operand):
+                if misused := bounds_misused(part):
+                    raise UnusableError("args", misused)
+    return found
+
+
+def _refuse_moments(formula: Formula) -> None:
+    """Refuse to have something go on that is true in single moments only."""
+    for each in walk(formula):
+        match each:
+            case Timed(Always(Completed(element))):
+                raise UnusableError(
+                    "args.for",
+                    f"completed({element}) is true in one moment, and never for a while",
+                    f"write active({element})",
+                )
 
 
 def _checked(requirement: Requirement, where: str) -> Requirement:
@@ -251,6 +296,8 @@ def _value(argument: Argument, value: Any, names: Names, others: Mapping[str, An
                 return names.behavior(_text(value, where))
             case Kind.COUNT:
                 return _count(value, where)
+            case Kind.DURATION:
+                return _duration_us(value, where)
             case Kind.FLAG:
                 if value not in (True, False, "true", "false"):
                     raise UnusableError(where, f"{value!r} is neither true nor false")
@@ -310,6 +357,19 @@ def _count(value: Any, where: str) -> int:
     return number
 
 
+def _duration_us(value: Any, where: str) -> int:
+    text = value.strip() if isinstance(value, str) else f"{value}"
+    if not text[-1:].isalpha():
+        raise UnusableError(where, f"{text!r} is no time with its unit", "write 30 s")
+    try:
+        duration_s = quantity(text, Dimension.DURATION)
+    except UnitError as error:
+        raise UnusableError(where, str(error), "write 30 s") from None
+    if not 0 < duration_s <= MAX_BOUND_S:
+        raise UnusableError(where, f"{text!r} is no time up to 30 days, and more than 0 s")
+    return round(duration_s * US_PER_S)
+
+
 def _example(argument: Argument) -> str:
     examples = {
         Kind.CONDITION: "Survey, or a formula",
@@ -321,5 +381,6 @@ def _example(argument: Argument) -> str:
         Kind.COUNT: "2",
         Kind.FLAG: "true",
         Kind.DECISION: "continue",
+        Kind.DURATION: "30 s",
     }
     return f"write {argument.name}: {examples[argument.kind]}"

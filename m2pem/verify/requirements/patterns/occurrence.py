@@ -15,7 +15,18 @@ from m2pem.verify.ltl.formula import (
     Until,
     WeakUntil,
 )
-from m2pem.verify.requirements.patterns.pattern import TIMES, Argument, Kind, Pattern
+from m2pem.verify.requirements.patterns.pattern import (
+    FOR,
+    TIMES,
+    WITHIN,
+    Argument,
+    Kind,
+    Pattern,
+    lasting,
+    say_lasting,
+    say_soon,
+    soon,
+)
 from m2pem.verify.requirements.patterns.robotic import sequence
 
 _WHAT = Argument("what", Kind.CONDITION)
@@ -48,16 +59,16 @@ OCCURRENCE = (
     Pattern(
         "absence",
         "the condition never holds",
-        (_WHAT,),
-        lambda a, _: Always(Not(a["what"])),
-        lambda a, words: f"never {words.of(a['what'])}",
+        (_WHAT, FOR),
+        lambda a, _: Always(Not(lasting(a, a["what"]))),
+        lambda a, words: f"never {say_lasting(a, words, a['what'])}",
     ),
     Pattern(
         "existence",
         "the condition holds at some point",
-        (_WHAT,),
-        lambda a, _: Eventually(a["what"]),
-        lambda a, words: f"at some point {words.of(a['what'])}",
+        (_WHAT, WITHIN, FOR),
+        lambda a, _: soon(a, lasting(a, a["what"])),
+        lambda a, words: f"{say_soon(a, 'at some point')} {say_lasting(a, words, a['what'])}",
     ),
     Pattern(
         "bounded_existence",
@@ -69,9 +80,9 @@ OCCURRENCE = (
     Pattern(
         "universality",
         "the condition holds all the time",
-        (_WHAT,),
-        lambda a, _: Always(a["what"]),
-        lambda a, words: f"always {words.of(a['what'])}",
+        (_WHAT, FOR),
+        lambda a, _: Always(a["what"]) if a["for"] is None else lasting(a, a["what"]),
+        lambda a, words: words.of(Always(a["what"]) if a["for"] is None else lasting(a, a["what"])),
     ),
     Pattern(
         "precedence",
@@ -83,9 +94,12 @@ OCCURRENCE = (
     Pattern(
         "response",
         "whenever the first condition holds, the second one holds then or later",
-        (_WHEN, _THEN),
-        lambda a, _: Always(Implies(a["when"], Eventually(a["then"]))),
-        lambda a, words: f"whenever {words.of(a['when'])}, then or later {words.of(a['then'])}",
+        (_WHEN, _THEN, WITHIN, FOR),
+        lambda a, _: Always(Implies(a["when"], soon(a, lasting(a, a["then"])))),
+        lambda a, words: (
+            f"whenever {words.of(a['when'])}, {say_soon(a, 'then or later')} "
+            f"{say_lasting(a, words, a['then'])}"
+        ),
     ),
     Pattern(
         "chain_precedence",

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Protocol, TypeAlias
 
-from m2pem.verify.ltl.formula import Formula
+from m2pem.verify.ltl.formula import Always, Eventually, Formula, Timed, Until, show_us
 
 
 class Kind(StrEnum):
@@ -26,6 +26,8 @@ class Kind(StrEnum):
     FLAG = "flag"
     DECISION = "decision"
     """A decision that an operator can take."""
+    DURATION = "duration"
+    """A time with its unit; whole microseconds when it is read."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,3 +101,39 @@ CONDITIONS = Argument("locations", Kind.CONDITIONS)
 AVOIDED = Argument("avoid", Kind.CONDITION)
 WHEN, THEN = Argument("when", Kind.CONDITION), Argument("then", Kind.CONDITION)
 TIMES = Argument("times", Kind.COUNT)
+WITHIN = Argument("within", Kind.DURATION, required=False)
+"""What is to come comes in that time at the latest."""
+FOR = Argument("for", Kind.DURATION, required=False)
+"""A condition counts that goes on for that time."""
+
+
+def soon(a: Arguments, formula: Formula) -> Formula:
+    """Now or later, and within the time that the author says."""
+    later = Eventually(formula)
+    return later if a["within"] is None else Timed(later, 0, a["within"])
+
+
+def lasting(a: Arguments, formula: Formula) -> Formula:
+    """The condition, for the time that the author says."""
+    return formula if a["for"] is None else Timed(Always(formula), 0, a["for"])
+
+
+def bounded(a: Arguments, until: Until) -> Formula:
+    """`until`, within the time that the author says."""
+    return until if a["within"] is None else Timed(until, 0, a["within"])
+
+
+def say_soon(a: Arguments, otherwise: str) -> str:
+    """When it comes."""
+    return otherwise if a["within"] is None else f"within {show_us(a['within'])}"
+
+
+def say_coming(a: Arguments) -> str:
+    """That it comes, and when."""
+    return "which comes" if a["within"] is None else f"which comes within {show_us(a['within'])}"
+
+
+def say_lasting(a: Arguments, words: Words, formula: Formula) -> str:
+    """The condition, for the time that the author says."""
+    said = words.of(formula)
+    return said if a["for"] is None else f"({words.of(lasting(a, formula))})"

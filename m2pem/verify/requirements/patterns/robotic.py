@@ -24,14 +24,22 @@ from m2pem.verify.ltl.formula import (
 from m2pem.verify.requirements.patterns.pattern import (
     AVOIDED,
     CONDITIONS,
+    FOR,
     THEN,
     TIMES,
     WHEN,
+    WITHIN,
     Argument,
     Arguments,
     Kind,
     Pattern,
     Words,
+    bounded,
+    lasting,
+    say_coming,
+    say_lasting,
+    say_soon,
+    soon,
 )
 
 
@@ -190,24 +198,28 @@ AVOIDANCE = (
     Pattern(
         "past_avoidance",
         "the first condition never holds before the second one, which must hold at some point",
-        (AVOIDED, Argument("until", Kind.CONDITION)),
-        lambda a, _: Until(Not(a["avoid"]), a["until"]),
-        lambda a, words: f"never {words.of(a['avoid'])} before {words.of(a['until'])}, which comes",
+        (AVOIDED, Argument("until", Kind.CONDITION), WITHIN),
+        lambda a, _: bounded(a, Until(Not(a["avoid"]), a["until"])),
+        lambda a, words: (
+            f"never {words.of(a['avoid'])} before {words.of(a['until'])}, {say_coming(a)}"
+        ),
         scoped=False,
     ),
     Pattern(
         "global_avoidance",
         "the condition never holds",
-        (AVOIDED,),
-        lambda a, _: Always(Not(a["avoid"])),
-        lambda a, words: f"never {words.of(a['avoid'])}",
+        (AVOIDED, FOR),
+        lambda a, _: Always(Not(lasting(a, a["avoid"]))),
+        lambda a, words: f"never {say_lasting(a, words, a['avoid'])}",
     ),
     Pattern(
         "future_avoidance",
         "the first condition never holds once the second one has held",
-        (AVOIDED, WHEN),
-        lambda a, _: Always(Implies(a["when"], Always(Not(a["avoid"])))),
-        lambda a, words: f"once {words.of(a['when'])}, never again {words.of(a['avoid'])}",
+        (AVOIDED, WHEN, FOR),
+        lambda a, _: Always(Implies(a["when"], Always(Not(lasting(a, a["avoid"]))))),
+        lambda a, words: (
+            f"once {words.of(a['when'])}, never again {say_lasting(a, words, a['avoid'])}"
+        ),
     ),
     Pattern(
         "upper_restricted_avoidance",
@@ -242,16 +254,21 @@ REACTIONS = (
     Pattern(
         "instantaneous_reaction",
         "whenever the first condition holds, the second one holds in the same moment",
-        (WHEN, THEN),
-        lambda a, _: Always(Implies(a["when"], a["then"])),
-        lambda a, words: f"whenever {words.of(a['when'])}, in that moment {words.of(a['then'])}",
+        (WHEN, THEN, FOR),
+        lambda a, _: Always(Implies(a["when"], lasting(a, a["then"]))),
+        lambda a, words: (
+            f"whenever {words.of(a['when'])}, in that moment {say_lasting(a, words, a['then'])}"
+        ),
     ),
     Pattern(
         "delayed_reaction",
         "whenever the first condition holds, the second one holds then or later",
-        (WHEN, THEN),
-        lambda a, _: Always(Implies(a["when"], Eventually(a["then"]))),
-        lambda a, words: f"whenever {words.of(a['when'])}, then or later {words.of(a['then'])}",
+        (WHEN, THEN, WITHIN, FOR),
+        lambda a, _: Always(Implies(a["when"], soon(a, lasting(a, a["then"])))),
+        lambda a, words: (
+            f"whenever {words.of(a['when'])}, {say_soon(a, 'then or later')} "
+            f"{say_lasting(a, words, a['then'])}"
+        ),
     ),
     Pattern(
         "prompt_reaction",
@@ -286,9 +303,9 @@ REACTIONS = (
     Pattern(
         "wait",
         "the first condition holds until the second one holds, which must happen",
-        (Argument("hold", Kind.CONDITION), Argument("until", Kind.CONDITION)),
-        lambda a, _: Until(a["hold"], a["until"]),
-        lambda a, words: f"{words.of(a['hold'])} until {words.of(a['until'])}, which comes",
+        (Argument("hold", Kind.CONDITION), Argument("until", Kind.CONDITION), WITHIN),
+        lambda a, _: bounded(a, Until(a["hold"], a["until"])),
+        lambda a, words: f"{words.of(a['hold'])} until {words.of(a['until'])}, {say_coming(a)}",
         scoped=False,
     ),
 )

@@ -21,6 +21,7 @@ from m2pem.verify.ltl.formula import (
     Next,
     Not,
     Or,
+    Timed,
     Until,
     WeakUntil,
     rebuilt,
@@ -64,6 +65,8 @@ def within(
 def _up_to(formula: Formula, end: Formula) -> Formula:
     """The formula, required of the moments before the first in which `end` holds."""
     match formula:
+        case Timed(Always(operand), low, high):
+            return Not(_up_to(Timed(Eventually(Not(operand)), low, high), end))
         case Always(operand):
             return WeakUntil(_up_to(operand, end), end)
         case Eventually(operand):

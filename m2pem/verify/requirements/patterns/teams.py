@@ -25,12 +25,15 @@ from m2pem.verify.ltl.formula import (
 )
 from m2pem.verify.requirements.patterns.pattern import (
     WHEN,
+    WITHIN,
     Argument,
     Arguments,
     Kind,
     Pattern,
     Surroundings,
     Words,
+    say_soon,
+    soon,
 )
 
 _RESOURCE = Argument("resource", Kind.RESOURCE)
@@ -49,6 +52,11 @@ def _visits_at_least(a: Arguments, around: Surroundings) -> Formula:
 def _say_visits(a: Arguments, words: Words) -> str:
     where = f"{a['times']} times" if a["revisits"] else f"at {a['times']} different places"
     return f"{a['resource']} completes {a['behavior']} {where} at least"
+
+
+def _in_time(a: Arguments) -> str:
+    said = say_soon(a, "")
+    return f" {said}" if said else ""
 
 
 def _mutual_exclusion(a: Arguments, _: Surroundings) -> Formula:
@@ -117,9 +125,9 @@ TEAMS = (
     Pattern(
         "reaches_proper_end",
         "the run comes to an end of the model, not to a failure",
-        (),
-        lambda _a, _: Eventually(Or((Ended("completed"), Ended("terminated")))),
-        lambda _a, _words: "the mission comes to an end that the model means",
+        (WITHIN,),
+        lambda a, _: soon(a, Or((Ended("completed"), Ended("terminated")))),
+        lambda a, _words: f"the mission comes to an end that the model means{_in_time(a)}",
         scoped=False,
         fair=True,
     ),
@@ -133,13 +141,11 @@ TEAMS = (
     Pattern(
         "commanded_again",
         "whenever the condition holds, the resource is commanded then or later, or the run ends",
-        (_RESOURCE, WHEN),
-        lambda a, _: Always(
-            Implies(a["when"], Eventually(Or((Commanded(a["resource"]), Ended()))))
-        ),
+        (_RESOURCE, WHEN, WITHIN),
+        lambda a, _: Always(Implies(a["when"], soon(a, Or((Commanded(a["resource"]), Ended()))))),
         lambda a, words: (
-            f"whenever {words.of(a['when'])}, {a['resource']} is commanded then or later, or the "
-            "mission ends"
+            f"whenever {words.of(a['when'])}, {a['resource']} is commanded "
+            f"{say_soon(a, 'then or later')}, or the mission ends"
         ),
     ),
 )

@@ -118,6 +118,7 @@ export const requirements = {
   part: "{name}, number {number}",
   addToList: "Add one",
   listNeeds: "Two or more are needed.",
+  durationHint: "A time with its unit, such as 30 s. It is checked in runs only.",
   wholeNumber: "Write a whole number.",
   choose: "— choose —",
   eachVehicle: "each vehicle",

@@ -133,6 +133,7 @@ export const requirements: Translation<typeof english.requirements> = {
   part: "{name}, Nummer {number}",
   addToList: "Eintrag hinzufügen",
   listNeeds: "Zwei oder mehr werden gebraucht.",
+  durationHint: "Eine Zeit mit Einheit, etwa 30 s. Sie wird nur in Läufen geprüft.",
   wholeNumber: "Schreiben Sie eine ganze Zahl.",
   choose: "— wählen —",
   eachVehicle: "jedes Fahrzeug",

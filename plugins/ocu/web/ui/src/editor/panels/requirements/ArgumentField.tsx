@@ -106,6 +106,8 @@ function SingleField(props: SingleFieldProps) {
       const error = /^\d+$/.test(value.trim()) ? undefined : words.wholeNumber;
       return <TextField {...common} error={error} />;
     }
+    case "duration":
+      return <TextField {...common} hint={words.durationHint} />;
     case "flag":
       return (
         <CheckField

@@ -10,7 +10,8 @@ export type Kind =
   | "behavior"
   | "count"
   | "flag"
-  | "decision";
+  | "decision"
+  | "duration";
 
 export interface Argument {
   name: string;
