@@ -131,6 +131,7 @@ if TYPE_CHECKING:
         RunId,
         RunStatus,
         RunSummary,
+        ScopeData,
         SimulationResult,
         StampedRecord,
         TelemetrySample,
@@ -276,8 +277,8 @@ _MODULES = {
     "m2pem.api.runs": (
         "CONTROL_REQUEST NEWS SCHEDULE Alert GeometryVersion HandedOver IncidentPreview"
         " IncidentVerdict"
-        " OpenIncident OpenPrompt PromptClosed RunId RunStatus RunSummary SimulationResult"
-        " StampedRecord TelemetrySample"
+        " OpenIncident OpenPrompt PromptClosed RunId RunStatus RunSummary ScopeData"
+        " SimulationResult StampedRecord TelemetrySample"
     ),
     "m2pem.api.statistics": (
         "DurationCounts ExecutiveStatistics LinkStatistics SubscriptionStatistics"
@@ -493,6 +494,7 @@ __all__ = [
     "RunSummary",
     "RunVersion",
     "RunView",
+    "ScopeData",
     "SearchLimits",
     "SearchProgress",
     "Segment",

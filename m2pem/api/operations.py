@@ -38,6 +38,7 @@ from m2pem.api.runs import (
     PromptClosed,
     RunId,
     RunSummary,
+    ScopeData,
     StampedRecord,
 )
 from m2pem.api.schedule import EntryId, Schedule, ScheduleChanged, When
@@ -460,6 +461,7 @@ OPERATIONS: dict[str, Operation] = {
         Operation("set_breakpoints", SetBreakpoints),
         Operation("step", OfRun),
         Operation("set_data", SetData),
+        Operation("data", OfRun, list[ScopeData]),
         Operation("set_geometry", Geometry),
         Operation("delete_geometry", DeleteGeometry),
         Operation("geometry_versions", OfGeometry, list[GeometryVersion]),

@@ -168,13 +168,14 @@ class ActiveElement:
 @dataclass(slots=True)
 class Changes:
     """The elements, behaviors, prompts, resources and requirements that changed since the last
-    `clear`."""
+    `clear`. `debugging`: those of `breakpoints`, `reached` and `stepping` that did."""
 
     elements: set[Place] = field(default_factory=set)
     behaviors: set[str] = field(default_factory=set)
     prompts: set[str] = field(default_factory=set)
     resources: set[str] = field(default_factory=set)
     requirements: set[str] = field(default_factory=set)
+    debugging: set[str] = field(default_factory=set)
 
     def clear(self) -> None:
         self.elements.clear()
@@ -182,6 +183,7 @@ class Changes:
         self.prompts.clear()
         self.resources.clear()
         self.requirements.clear()
+        self.debugging.clear()
 
 
 class RunView:
@@ -211,6 +213,8 @@ class RunView:
         """Where the run is paused to look at it; None: nowhere."""
         self.reached: r.BreakpointReached | None = None
         """The breakpoint at which the run is paused."""
+        self.stepping = False
+        """Whether the run is paused before its next step."""
         self.elements: dict[Place, ElementState] = {}
         self.scopes: dict[int, Scope] = {}
         self.tokens: dict[int, Token] = {}
@@ -368,20 +372,31 @@ class RunView:
     def _pause(self, record: r.RunPaused) -> None:
         self._paused_at_us = record.at_us
         self.paused_by = record.by
+        self._debug("stepping", False)
         self._update(status=RunStatus.PAUSED)
 
     def _resume(self, record: r.RunResumed) -> None:
         self._paused_us += max(0, record.at_us - self._paused_at_us)
         self._paused_at_us = 0
         self.paused_by = ""
-        self.reached = None
+        self._debug("reached", None)
         self._update(status=RunStatus.RUNNING)
 
     def _set_breakpoints(self, record: r.BreakpointsSet) -> None:
-        self.breakpoints = record if record.elements or record.conditions else None
+        self._debug("breakpoints", record if record.elements or record.conditions else None)
+        self._debug("stepping", record.step)
 
     def _reach_breakpoint(self, record: r.BreakpointReached) -> None:
-        self.reached = record
+        self._debug("reached", record)
+
+    def _debug(
+        self, name: str, value: r.BreakpointsSet | r.BreakpointReached | bool | None
+    ) -> None:
+        if getattr(self, name) == value:
+            return
+        setattr(self, name, value)
+        if self.changes is not None:
+            self.changes.debugging.add(name)
 
     def _end(self, record: r.RunEnded) -> None:
         self._update(
@@ -389,6 +404,8 @@ class RunView:
             ended_us=max(self.at_us(self.t_s), self._paused_at_us),
             detail=record.detail,
         )
+        self._debug("reached", None)
+        self._debug("stepping", False)
         for prompt in list(self.prompts):
             self._close_prompt(prompt)
         for place, state in self.elements.items():

@@ -108,6 +108,25 @@ class PromptClosed:
 
 
 @dataclass(frozen=True, slots=True)
+class ScopeData:
+    """The data of an active process, subprocess or task.
+
+    `process`, `element`: ids, the same for a process; both "" for the data stores of the run.
+    `scope`: the number with which `MissionControl.set_data` changes it, None: it cannot.
+    `instance`: of a loop or multi-instance activity, from 0; None: of none. `token`: on the
+    activity whose own data this is, its item variable, data inputs and outputs; None: it is data
+    of a process or subprocess.
+    """
+
+    process: str
+    element: str
+    data: Mapping[str, Value]
+    scope: int | None = None
+    instance: int | None = None
+    token: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class OpenIncident:
     """An error that no event catches, about which an operator decides (docs/incidents.md).
 

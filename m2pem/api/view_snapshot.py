@@ -52,6 +52,7 @@ class _Snapshot(msgspec.Struct, array_like=True):
     paused_by: str
     breakpoints: r.BreakpointsSet | None
     reached: r.BreakpointReached | None
+    stepping: bool
     paused_us: int
     paused_at_us: int
     elements: list[tuple[Place, ElementState]]
@@ -89,6 +90,7 @@ def snapshot_of(view: RunView) -> bytes:
             view.paused_by,
             view.breakpoints,
             view.reached,
+            view.stepping,
             view._paused_us,
             view._paused_at_us,
             list(view.elements.items()),
@@ -128,6 +130,7 @@ def view_of(
     view.seq, view.t_s = read.seq, read.t_s
     view.paused_by = read.paused_by
     view.breakpoints, view.reached = read.breakpoints, read.reached
+    view.stepping = read.stepping
     view._paused_us, view._paused_at_us = read.paused_us, read.paused_at_us
     view.elements = dict(read.elements)
     view.scopes = read.scopes

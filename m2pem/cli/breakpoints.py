@@ -1,13 +1,21 @@
-"""`m2pem break`, `step` and `set`: a run that is debugged while it is running on this host."""
+"""`m2pem break`, `step`, `data`, `set`: a run that is debugged while it goes on on this host."""
 
 from typing import TYPE_CHECKING
 
 import click
 
-from m2pem.cli.options import example, journal_option, read_data, run_argument
-from m2pem.cli.run_control import by_option, steer
+from m2pem.cli.options import (
+    as_json,
+    example,
+    format_option,
+    journal_option,
+    read_data,
+    run_argument,
+)
+from m2pem.cli.run_control import ask_of_run, by_option, steer
 
 if TYPE_CHECKING:
+    from m2pem.api.runs import ScopeData
     from m2pem.mission.values import Value
 
 
@@ -54,6 +62,41 @@ def step(run_id: str, journal: str | None, by: str | None) -> None:
     It is paused again before the next one. Where all its tokens wait, it goes on until one moves.
     """
     steer(journal, run_id, "step", by, f"{run_id} makes one step")
+
+
+@click.command(epilog=example("m2pem data r1"))
+@run_argument
+@format_option
+@journal_option
+@by_option
+def data(run_id: str, output: str, journal: str | None, by: str | None) -> None:
+    """Print the data of a run that is running on this host.
+
+    First that of its data stores, then of each active process, subprocess and task that has some.
+    """
+    import msgspec
+
+    from m2pem.api.runs import ScopeData
+
+    found = ask_of_run(journal, run_id, "data", by)
+    if output == "json":
+        click.echo(as_json({"data": found}))
+        return
+    for each in msgspec.convert(found, list[ScopeData]):
+        click.echo(f"{_title(each)}:")
+        for name, value in each.data.items():
+            click.echo(f"  {name} = {msgspec.json.encode(value).decode()}")
+        if not each.data:
+            click.echo("  nothing")
+
+
+def _title(scope: "ScopeData") -> str:
+    """Whose data it is, and how it is changed."""
+    changed = f"--scope {scope.scope}" if scope.scope is not None else "cannot be changed"
+    if not scope.element:
+        return f"data stores ({changed})"
+    instance = "" if scope.instance is None else f", instance {scope.instance}"
+    return f"{scope.element}{instance} ({changed})"
 
 
 def _data(_: click.Context, __: click.Parameter, words: tuple[str, ...]) -> "dict[str, Value]":

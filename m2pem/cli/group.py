@@ -61,6 +61,7 @@ COMMANDS = {
     "continue": "Let a run on this host go on after a pause.",
     "break": "Set the breakpoints of a run that is running on this host.",
     "step": "Execute one step of a paused run on this host.",
+    "data": "Print the data of a run that is running on this host.",
     "set": "Change data of a paused run on this host.",
     "hand-over": "Give a vehicle or payload to the operator who asks for it, or refuse.",
     "operators": "List the operators who are present, and who asks whom for what.",
@@ -84,7 +85,7 @@ _MODULES = {
     "give-back": "take",
     "acknowledge": "alerts",
     "own": "alerts",
-    **dict.fromkeys(("break", "step", "set"), "breakpoints"),
+    **dict.fromkeys(("break", "step", "data", "set"), "breakpoints"),
     "hand-over": "take",
 }
 

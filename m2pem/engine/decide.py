@@ -39,7 +39,7 @@ from m2pem.engine.requirements import (
 from m2pem.engine.resolving import resolve_incident, why_refused
 from m2pem.engine.revision import revise
 from m2pem.engine.scopes import end_run
-from m2pem.engine.state import BehaviorPhase, RunStatus
+from m2pem.engine.state import RunStatus
 from m2pem.engine.steps import Steps
 from m2pem.engine.throwing import throw_error
 from m2pem.engine.triggering import (
@@ -182,24 +182,8 @@ def _tick(x: Steps, item: i.Tick) -> None:
 
 
 def _give_up(x: Steps, item: i.GiveUp) -> None:
-    state = x.state
-    awaited = [
-        f"{behavior.element} (behavior {behavior.name})"
-        for behavior in state.behaviors.values()
-        if behavior.phase is not BehaviorPhase.CANCELLING
-    ]
-    awaited += [
-        f"{request.token.node.id} (resources: {request.reason or 'not chosen yet'})"
-        for request in state.allocations.values()
-    ]
-    awaited += [f"{prompt.token.node.id} (an answer)" for prompt in state.prompts.values()]
-    awaited += [
-        f"{incident.token.node.id} (a choice about incident {incident.id}: {incident.code})"
-        for incident in state.incidents.values()
-    ]
-    awaited += [f"{service.token.node.id} ({service.name})" for service in state.services.values()]
-    awaited += [f"{wait.node.id} ({wait.trigger.value})" for wait in state.waits.values()]
-    waiting = f"; awaited: {', '.join(dict.fromkeys(awaited))}" if awaited else ""
+    awaited = x.state.awaited()
+    waiting = f"; awaited: {', '.join(awaited)}" if awaited else ""
     end_run(x, RunOutcome.FAILED, item.reason + waiting)
 
 

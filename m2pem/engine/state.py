@@ -468,3 +468,23 @@ class RunState:
         if self.status is RunStatus.PAUSED:
             now_us = self.paused_at_us
         return now_us - self.started_us - self.paused_total_us
+
+    def awaited(self) -> list[str]:
+        """Return what the tokens wait for, each with its element."""
+        found = [
+            f"{behavior.element} (behavior {behavior.name})"
+            for behavior in self.behaviors.values()
+            if behavior.phase is not BehaviorPhase.CANCELLING
+        ]
+        found += [
+            f"{request.token.node.id} (resources: {request.reason or 'not chosen yet'})"
+            for request in self.allocations.values()
+        ]
+        found += [f"{prompt.token.node.id} (an answer)" for prompt in self.prompts.values()]
+        found += [
+            f"{incident.token.node.id} (a choice about incident {incident.id}: {incident.code})"
+            for incident in self.incidents.values()
+        ]
+        found += [f"{service.token.node.id} ({service.name})" for service in self.services.values()]
+        found += [f"{wait.node.id} ({wait.trigger.value})" for wait in self.waits.values()]
+        return list(dict.fromkeys(found))

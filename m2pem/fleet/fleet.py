@@ -232,6 +232,11 @@ class Fleet:
         hosted = any(vehicle.host for vehicle in self.vehicles.values())
         return not hosted and all(each.arbiter == SIMULATED for each in everything)
 
+    @property
+    def may_be_debugged(self) -> bool:
+        """Whether operators may set breakpoints in runs, execute single steps and change data."""
+        return self.simulated or self.debugging
+
 
 def real_resources(fleet: Fleet) -> list[ResourceId]:
     """The vehicles and payloads that are neither simulated nor software in the loop.

@@ -63,6 +63,34 @@ def test_of_a_loop_its_instances_are_counted_and_not_what_waits_around_them() ->
     assert shown(view, "A")[:2] == (0, 2)
 
 
+def test_where_the_run_is_paused_to_look_at_it_is_shown_until_it_goes_on() -> None:
+    at_a = r.BreakpointsSet(("A",), ("n > 3",))
+    reached = r.BreakpointReached(r.StopReason.BREAKPOINT, 1, P, "A", 1)
+    view = folded(at_a)
+    view.changes = Changes()
+    apply(view, [enter(1, "A")])
+    assert not view.changes.debugging
+    apply(view, [reached, r.RunPaused(3)])
+    assert view.changes.debugging == {"reached"}
+    assert (view.breakpoints, view.reached, view.stepping) == (at_a, reached, False)
+    view.changes.clear()
+    apply(view, [r.BreakpointsSet(("A",), ("n > 3",), step=True), r.RunResumed(3)])
+    assert view.changes.debugging == {"breakpoints", "reached", "stepping"}
+    assert (view.reached, view.stepping) == (None, True)
+    apply(view, [reached, r.RunPaused(3)])
+    assert (view.reached, view.stepping) == (reached, False)
+    apply(view, [r.BreakpointsSet()])
+    assert view.breakpoints is None
+
+
+def test_a_run_that_has_ended_is_stopped_nowhere_and_makes_no_step() -> None:
+    reached = r.BreakpointReached(r.StopReason.STEP, 1, P, "A", 1)
+    view = folded(enter(1, "A"), reached, r.RunPaused(3), r.RunEnded(r.RunOutcome.STOPPED, ""))
+    assert view.reached is None
+    view = folded(r.BreakpointsSet(step=True), r.RunEnded(r.RunOutcome.COMPLETED, ""))
+    assert not view.stepping
+
+
 def test_a_subprocess_is_active_while_its_scope_is() -> None:
     opened = r.ScopeOpened(scope=2, process=P, element="Sub", parent=1, token=1)
     view = folded(enter(1, "Sub"), opened, enter(2, "Inner"))

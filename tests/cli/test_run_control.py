@@ -86,6 +86,7 @@ OTHERWISE = {
     "catalogue": "m2pem fleet asks the arbiters of the file",
     "telemetry": "the terminal unit in m2pem attach shows it",
     "journal_file": "--journal names it",
+    "data": "m2pem data, which a test below tries",
     "health": "m2pem doctor --running",
     "standbys": "m2pem doctor --running",
     "statistics": "face prometheus of m2pem serve and m2pem run",
@@ -136,6 +137,32 @@ def test_a_command_asks_the_executive_of_its_journal_and_says_what_was_done(
     assert invoke(*words.split(), "--journal", journal, "--by", "anna") == (0, "", f"{done}\n")
     assert asked == [((journal, "r1", method), {"by": "anna", **params})]
     assert invoke("--quiet", *words.split(), "--journal", journal) == (0, "", "")
+
+
+def test_the_data_of_a_run_is_printed_with_how_it_is_changed(
+    invoke: Invoke, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stores = [
+        {"process": "", "element": "", "data": {"log": [1]}, "scope": 1},
+        {"process": "P", "element": "P", "data": {}, "scope": 1},
+        {"process": "P", "element": "Survey", "data": {"field": "north"}, "instance": 1},
+    ]
+    monkeypatch.setattr(client, "ask_driver", lambda *_, **__: stores)
+    journal = tmp_path / "j.db"
+    status, printed, _ = invoke("data", "r1", "--journal", journal)
+    assert (status, printed.splitlines()) == (
+        0,
+        [
+            "data stores (--scope 1):",
+            "  log = [1]",
+            "P (--scope 1):",
+            "  nothing",
+            "Survey, instance 1 (cannot be changed):",
+            '  field = "north"',
+        ],
+    )
+    status, printed, _ = invoke("data", "r1", "--format", "json", "--journal", journal)
+    assert msgspec.json.decode(printed) == {"data": stores}
 
 
 @pytest.mark.parametrize(("variable", "by"), [("carol", "carol"), ("", "user@host")])

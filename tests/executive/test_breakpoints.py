@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from m2pem.api.runs import RunStatus
+from m2pem.api.runs import RunStatus, ScopeData
 from m2pem.errors import OperatorError
 from tests.executive.conftest import World, behavior, fleet, flow, mission, question, sequence
 
@@ -99,7 +99,89 @@ def test_what_cannot_be_done_is_said(play):
             await control.set_breakpoints(run, ["Driv"])
         with pytest.raises(OperatorError, match="'n >' is no condition"):
             await control.set_breakpoints(run, [], ["n >"])
-        with pytest.raises(OperatorError, match="it is not paused"):
+        with pytest.raises(OperatorError, match="it is not paused: pause it, or set a breakpoint"):
             await control.step(run)
 
     play(story, fleet=DEBUGGED)
+
+
+def test_a_step_that_waits_for_a_token_says_what_it_waits_for(play):
+    async def story(world: World):
+        control = world.executive.control
+        run = await asked(world)
+        await control.pause(run)
+        await control.step(run)
+        with pytest.raises(
+            OperatorError, match=r"a step already.*wait for Ask \(an answer\).*pause it"
+        ):
+            await control.step(run)
+        await control.pause(run)
+        await control.step(run)
+        await control.answer(run, "p1", "yes")
+        await world.clock.sleep(1.0)
+        (summary,) = await control.runs()
+        await control.stop(run)
+        with pytest.raises(OperatorError, match=r"r1 has ended.*there is no step to make"):
+            await control.step(run)
+        return summary.status
+
+    assert play(story, fleet=DEBUGGED) is RunStatus.PAUSED
+
+
+FIELDS = (
+    '<ioSpecification><dataInput id="{0}in" name="fields"/>'
+    "<inputSet><dataInputRefs>{0}in</dataInputRefs></inputSet><outputSet/></ioSpecification>"
+    "<multiInstanceLoopCharacteristics><loopDataInputRef>{0}in</loopDataInputRef>"
+    '<inputDataItem id="{0}item" name="field"/></multiInstanceLoopCharacteristics>'
+)
+"""Of an activity that is done for each field."""
+STORES = mission(
+    '<process id="P" isExecutable="true"><startEvent id="S"/>'
+    '<scriptTask id="Write" scriptFormat="m2pem">'
+    '<script>speed = 2\nfields = ["north", "south"]</script></scriptTask>'
+    f'<subProcess id="Each">{FIELDS.format("a")}{question("Ask")}</subProcess>'
+    f'<task id="Wait">{FIELDS.format("b")}</task>'
+    f"{flow('S', 'Write')}{flow('Write', 'Each')}{flow('Each', 'Wait')}</process>"
+)
+
+
+def test_the_data_of_each_scope_is_read_and_changed_where_it_is(play):
+    async def story(world: World):
+        control = world.executive.control
+        run = await asked(world, STORES)
+        before = await control.data(run)
+        await control.pause(run)
+        await control.set_data(run, {"speed": 5}, scope=1)
+        await control.set_data(run, {"field": "west"}, scope=4)
+        after = await control.data(run)
+        await control.stop(run)
+        with pytest.raises(OperatorError, match=r"r1 has ended.*none of its processes is active"):
+            await control.data(run)
+        return before, after
+
+    before, after = play(story, fleet=DEBUGGED)
+    fields = ["north", "south"]
+    assert before == [
+        ScopeData("P", "P", {"speed": 2, "fields": fields}, scope=1),
+        ScopeData("P", "Each", {"field": "north"}, scope=3, instance=0, token=2),
+        ScopeData("P", "Each", {"field": "south"}, scope=4, instance=1, token=3),
+    ]
+    assert [each.data for each in after] == [
+        {"speed": 5, "fields": fields},
+        {"field": "north"},
+        {"field": "west"},
+    ]
+
+
+def test_the_data_of_a_task_is_read_and_cannot_be_changed(play):
+    async def story(world: World):
+        control = world.executive.control
+        run = await asked(world, STORES)
+        await control.set_breakpoints(run, ["Wait"])
+        for prompt in ("p1", "p2"):
+            await control.answer(run, prompt, "yes")
+        await control.step(run)
+        return await control.data(run)
+
+    own = [each for each in play(story, fleet=DEBUGGED) if each.element == "Wait"]
+    assert [(each.data["field"], each.scope, each.instance) for each in own] == [("north", None, 0)]

@@ -3,15 +3,15 @@
 from collections.abc import Mapping, Sequence
 from typing import Protocol
 
-from m2pem.api.runs import RunId
+from m2pem.api.runs import RunId, ScopeData
 from m2pem.mission.values import Value
 
 
 class DebugControl(Protocol):
     """The operations of `MissionControl` on a run that is debugged (docs/debugging.md).
 
-    All raise OperatorError where the fleet does not allow it: it does where all of it is simulated,
-    or the fleet file says `debugging: true`.
+    All but `data` raise OperatorError where the fleet does not allow it (`Fleet.may_be_debugged`):
+    it does where all of it is simulated, or the fleet file says `debugging: true`.
     """
 
     async def set_breakpoints(
@@ -39,4 +39,9 @@ class DebugControl(Protocol):
         self, run: RunId, data: Mapping[str, Value], *, scope: int = 0, by: str = ""
     ) -> None:
         """Change data of a paused run, where a scope sees it; 0: the process that it began with."""
+        ...
+
+    async def data(self, run: RunId) -> Sequence[ScopeData]:
+        """The data of a run that goes on: of its data stores, then of each active process,
+        subprocess and task that has some, from the outside in."""
         ...

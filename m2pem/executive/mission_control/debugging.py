@@ -2,9 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 
-from m2pem.api.runs import RunId
+from m2pem.api.runs import RunId, ScopeData
 from m2pem.engine import inputs as i
+from m2pem.engine.breakpoints import ROOT
+from m2pem.engine.state import RunState
+from m2pem.engine.state import RunStatus as EngineStatus
 from m2pem.errors import OperatorError
+from m2pem.executive.ended_runs import refuse_ended
 from m2pem.executive.mission_control.parts import ControlParts, bounded
 from m2pem.mission.values import Value
 
@@ -29,6 +33,10 @@ class DebugOperations(ControlParts):
     async def step(self, run: RunId, *, by: str = "") -> None:
         """Execute one token of a paused run."""
         self._refuse_debugging()
+        async with self._explain_end("step", run):
+            state = self._supervisor.runner(run).run.state
+            if state.status is EngineStatus.RUNNING:
+                raise OperatorError(f"{run}: {_why_no_step(state)}")
         await self._ask("step", run, i.StepRun(by))
 
     async def set_data(
@@ -38,10 +46,52 @@ class DebugOperations(ControlParts):
         self._refuse_debugging()
         await self._ask("set_data", run, i.SetData(bounded(data), scope, by))
 
+    async def data(self, run: RunId) -> Sequence[ScopeData]:
+        """The data of each active process, subprocess and task."""
+        async with self._explain_end("data", run):
+            runner = self._supervisor.runner(run)
+            refuse_ended(runner)
+            return _data_of(runner.run.state)
+
     def _refuse_debugging(self) -> None:
         fleet = self._supervisor.fleet
-        if not (fleet.simulated or fleet.debugging):
+        if not fleet.may_be_debugged:
             raise OperatorError(
                 f"fleet {fleet.name} has vehicles that are not simulated, and its file does not "
                 "say 'debugging: true': rehearse the mission with `m2pem debug`"
             )
+
+
+def _data_of(state: RunState) -> list[ScopeData]:
+    """The data of a run from the outside in: what is not empty, and that of its first process."""
+    found: list[ScopeData] = []
+    if state.shared.data:
+        found.append(ScopeData("", "", dict(state.shared.data), ROOT))
+    inside = {scope.owner.id: scope.id for scope in state.scopes.values() if scope.owner}
+    for scope in sorted(state.scopes.values(), key=lambda each: (each.depth, each.id)):
+        container = scope.container
+        instance = scope.owner.instance if scope.owner is not None else None
+        if scope.data or scope.id == ROOT:
+            data = dict(scope.data)
+            place = container.process.id, container.id
+            found.append(ScopeData(*place, data, scope.id, instance))
+        for token in scope.tokens.values():
+            if token.own:
+                place = container.process.id, token.node.id
+                # What is seen in a subprocess is changed as it is seen there.
+                at = inside.get(token.id)
+                found.append(ScopeData(*place, dict(token.own), at, token.instance, token.id))
+    return found
+
+
+def _why_no_step(state: RunState) -> str:
+    """Why a run that goes on makes no step, and what an operator can do."""
+    if not state.stepping:
+        return (
+            "it is not paused: pause it, or set a breakpoint, and make a step when it has stopped"
+        )
+    awaited = f", which wait for {', '.join(waits)}" if (waits := state.awaited()) else ""
+    return (
+        f"it makes a step already, and is paused before the next one as soon as one of its tokens "
+        f"moves{awaited}; pause it to end the step before that"
+    )

@@ -8,7 +8,16 @@ import httpx
 import pytest
 from fastapi import FastAPI
 from m2pem_plugin_web.live.standbys import Standbys
-from m2pem_plugin_web.rest import alerts, incidents, people, revisions, schedule, standbys, steering
+from m2pem_plugin_web.rest import (
+    alerts,
+    debugging,
+    incidents,
+    people,
+    revisions,
+    schedule,
+    standbys,
+    steering,
+)
 from rest_world import As, app_of
 
 from m2pem.api import (
@@ -101,6 +110,7 @@ QUERIES = {
     "scheduled": "/api/schedule",
     "runs": "/api/runs",
     "records": "/api/runs/{run}/records",
+    "data": "/api/runs/{run}/data",
     "mission": "/api/runs/{run}/mission",
     "versions": "/api/runs/{run}/versions",
     "version_files": "/api/runs/{run}/mission",
@@ -175,6 +185,7 @@ def app(control: Mock) -> FastAPI:
         Mock(control=control),
         steering.router(control, Mock()),
         steering.prompt_router(control, Mock()),
+        debugging.router(control),
         steering.resource_router(control),
         schedule.router(control, Mock()),
         incidents.router(control),

@@ -81,7 +81,8 @@ class TeamModel(BaseModel):
 
 class FleetModel(BaseModel):
     """The fleet in use; `fence`: the area (GeoJSON) that no vehicle may leave, null for none.
-    `approval_persons`: how many persons must approve a mission before it starts; 0 for none."""
+    `approval_persons`: how many persons must approve a mission before it starts; 0 for none.
+    `may_be_debugged`: whether its runs may: all of it is simulated, or its file allows that."""
 
     name: str
     origin: OriginModel
@@ -90,6 +91,7 @@ class FleetModel(BaseModel):
     teams: list[TeamModel]
     fence: dict[str, Any] | None
     approval_persons: int
+    may_be_debugged: bool
 
 
 class ParameterModel(BaseModel):
@@ -186,6 +188,7 @@ def _fleet(fleet: Fleet) -> FleetModel:
         ],
         fence=as_geojson(fence)["geometry"] if isinstance(fence, Area) else None,
         approval_persons=fleet.approval_persons,
+        may_be_debugged=fleet.may_be_debugged,
     )
 
 

@@ -1,9 +1,9 @@
 """/api/runs/{run}/..., /api/prompts, /api/resources: what operators do with runs and vehicles."""
 
-from typing import Annotated, Any
+from typing import Any
 
 from fastapi import APIRouter, Request
-from pydantic import BaseModel, Field, StringConstraints
+from pydantic import BaseModel
 
 from m2pem.api import MissionControl
 from m2pem.api.allocation import SharedSpaceState
@@ -17,9 +17,6 @@ from m2pem_plugin_web.live.hub import Hub
 from m2pem_plugin_web.live.messages import prompt_of
 from m2pem_plugin_web.problems import RESPONSES, ProblemError
 from m2pem_plugin_web.rest.models import Body, Data, Name, PromptModel, Reason, known_run
-
-MAX_SCOPE = 2**31 - 1
-Condition = Annotated[str, StringConstraints(min_length=1, max_length=2_000)]
 
 
 class StopModel(Body):
@@ -40,20 +37,6 @@ class MessageModel(Body):
 
     message: Name
     data: Data | None = None
-
-
-class BreakpointsModel(Body):
-    """Ids of elements, and conditions over the data."""
-
-    elements: Annotated[list[Name], Field(default_factory=list)]
-    conditions: Annotated[list[Condition], Field(default_factory=list)]
-
-
-class DataModel(Body):
-    """Values by name, and the number of the scope that sees them; 0: the first process."""
-
-    data: Data
-    scope: Annotated[int, Field(ge=0, le=MAX_SCOPE)] = 0
 
 
 class StoppedModel(BaseModel):
@@ -102,24 +85,6 @@ def router(control: MissionControl, hub: Hub) -> APIRouter:
         """Go on after a pause."""
         async with known_run(control, run):
             await control.resume(run, by=person.name)
-
-    @routes.put("/runs/{run}/breakpoints", status_code=204)
-    async def set_breakpoints(person: Operator, run: str, wanted: BreakpointsModel) -> None:
-        """Pause a run where a token comes to an element, or when a condition becomes true."""
-        async with known_run(control, run):
-            await control.set_breakpoints(run, wanted.elements, wanted.conditions, by=person.name)
-
-    @routes.post("/runs/{run}/step", status_code=204)
-    async def step(person: Operator, run: str) -> None:
-        """Execute one step of a paused run."""
-        async with known_run(control, run):
-            await control.step(run, by=person.name)
-
-    @routes.post("/runs/{run}/data", status_code=204)
-    async def set_data(person: Operator, run: str, wanted: DataModel) -> None:
-        """Change data of a paused run."""
-        async with known_run(control, run):
-            await control.set_data(run, wanted.data, scope=wanted.scope, by=person.name)
 
     @routes.post("/signals", status_code=204)
     async def signal_all(person: Operator, wanted: SignalModel) -> None:
