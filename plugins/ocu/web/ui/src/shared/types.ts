@@ -30,6 +30,7 @@ export interface Finding {
   severity: "error" | "warning";
   rule: string;
   number: string;
+  file: string;
   line: number;
   element: string;
   message: string;

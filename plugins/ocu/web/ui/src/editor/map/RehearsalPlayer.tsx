@@ -35,13 +35,18 @@ export function RehearsalPlayer({ editor, rehearsal, map }: RehearsalPlayerProps
       if (left) return made.dispose();
       made.speed.value = SPEED;
       scene.value = made;
-      made.play();
     });
     return () => {
       left = true;
       scene.peek()?.dispose();
     };
   }, []);
+  useEffect(() => {
+    const { at } = rehearsal;
+    if (at === undefined) return scene.value?.play();
+    scene.value?.pause();
+    scene.value?.seek(at);
+  }, [scene.value, rehearsal]);
   useEffect(() => {
     const [shown, on] = [scene.value, map()];
     if (!shown || !on) return undefined;

@@ -37,6 +37,8 @@ export interface Incoming {
 export interface PlayedRehearsal {
   id: string;
   summary: RunSummary;
+  /** The moment that is shown, in seconds; left out: it is played. */
+  at?: number;
 }
 
 export class MapPlan {

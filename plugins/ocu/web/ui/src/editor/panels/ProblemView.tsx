@@ -12,11 +12,16 @@ export interface ProblemViewProps {
   editor: EditorContext;
   title: string;
   refusal: Refusal;
-  /** The text that findings with a line may be of. */
-  spec?: string;
+  /** What was typed, and what findings call it, so that their lines are shown. */
+  typed?: Typed;
 }
 
-export function ProblemView({ editor, title, refusal, spec = "" }: ProblemViewProps) {
+export interface Typed {
+  file: "answers.yaml" | "requirements.yaml";
+  text: string;
+}
+
+export function ProblemView({ editor, title, refusal, typed }: ProblemViewProps) {
   const heading = useUniqueId();
   return (
     <section class="m2v-problem" role="alert" aria-labelledby={heading}>
@@ -24,7 +29,7 @@ export function ProblemView({ editor, title, refusal, spec = "" }: ProblemViewPr
       <p>{refusal.text}</p>
       <ul>
         {refusal.findings.map((finding, index) => (
-          <FindingLine key={index} editor={editor} finding={finding} spec={spec} />
+          <FindingLine key={index} editor={editor} finding={finding} typed={typed} />
         ))}
       </ul>
     </section>
@@ -34,10 +39,10 @@ export function ProblemView({ editor, title, refusal, spec = "" }: ProblemViewPr
 interface FindingLineProps {
   editor: EditorContext;
   finding: Finding;
-  spec: string;
+  typed: Typed | undefined;
 }
 
-function FindingLine({ editor, finding, spec }: FindingLineProps) {
+function FindingLine({ editor, finding, typed }: FindingLineProps) {
   const { element, message, remedy } = finding;
   const isDrawn = editor.checks.outline.value?.elements.some(({ id }) => id === element);
   return (
@@ -51,21 +56,27 @@ function FindingLine({ editor, finding, spec }: FindingLineProps) {
       )}{" "}
       {message}
       {remedy && <span class="m2v-remedy"> {remedy}</span>}
-      <OfSpec finding={finding} spec={spec} />
+      {typed && <OfTyped finding={finding} typed={typed} />}
     </li>
   );
 }
 
-/** The line of the YAML text that a finding is about, with the character pointed at. */
-function OfSpec({ finding, spec }: { finding: Finding; spec: string }) {
-  const place = /^requirements\[\d+\].*?([\w-]+)$/.exec(finding.element);
-  const line = place && finding.line > 0 ? spec.split("\n")[finding.line - 1] : undefined;
-  if (line === undefined || !place) return null;
-  const formula = scalarIn(line, place[1]!);
+/** The line of the YAML text that a finding is about, with the character of a formula pointed at. */
+function OfTyped({ finding, typed }: { finding: Finding; typed: Typed }) {
+  if (finding.file !== typed.file) return null;
+  const line = typed.text.split("\n")[finding.line - 1];
+  if (line === undefined) return null;
+  const key = /^requirements\[\d+\].*?([\w-]+)$/.exec(finding.element)?.[1];
+  const formula = key ? scalarIn(line, key) : undefined;
   return (
     <>
       <p class="m2v-where">
-        {words.specLine} {finding.line}: <code>{line.trim()}</code>
+        {words.specLine} {finding.line}
+        {line.trim() !== "" && (
+          <>
+            : <code>{line.trim()}</code>
+          </>
+        )}
       </p>
       {formula !== undefined && <Caret message={finding.message} formula={formula} />}
     </>

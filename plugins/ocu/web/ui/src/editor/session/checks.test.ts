@@ -5,7 +5,7 @@ import { Checks } from "./checks";
 const finding = (element: string): Finding => ({
   severity: "error",
   rule: "r",
-  number: "",
+  number: "", file: "",
   line: 1,
   element,
   message: "m",

@@ -20,6 +20,8 @@ export const run: Translation<typeof english.run> = {
   waits: "Warten auf Fahrzeuge",
   services: "Dienste",
   bar: "{label}: {from} bis {to}",
+  requirements: "Anforderungen",
+  begun: "Hier stehen nur die ersten {count} Ereignisse. Was hier offen ist, kann später entschieden sein: Sehen Sie den Probelauf an.",
   explained: {
     unsaid: "Was das Skript nicht sagte",
     firstAnswer: "die erste Antwort wurde genommen, „{decision}“",
@@ -60,6 +62,13 @@ export const run: Translation<typeof english.run> = {
     title: "Was im Probelauf geschieht",
     yaml: "Antwortdatei (YAML)",
     yamlHint: "Wie für m2pem simulate --answers.",
+    choose: "Antwortdatei…",
+    chooseHint:
+      "Eine YAML-Datei wie für m2pem simulate --answers, zum Beispiel ein schlechtester Lauf einer Kampagne. Der Probelauf beginnt sofort.",
+    ofFile: "Aus {file}",
+    noFile: "{file} kann nicht gelesen werden: {reason}",
+    noText: "es ist kein Text in UTF-8",
+    tooLong: "sie ist länger als 1 MB",
     toYaml: "Als YAML schreiben",
     toForm: "Zurück zum Formular",
     unread: {
@@ -72,6 +81,7 @@ export const run: Translation<typeof english.run> = {
       severalWritten: "das Formular schreibt nur einen Wert",
       oneEnd: "ein Dienst schreibt oder scheitert, nicht beides",
       errorOfFailure: "nur was scheitert oder verloren geht, hat einen Fehler",
+      noTime: "was durch die eigene Bewegung endet, hat keine Zeit",
       data: "das Formular kann diese Daten nicht zeigen",
       duration: "schreiben Sie eine Dauer, zum Beispiel 30 s",
     },
@@ -79,6 +89,9 @@ export const run: Translation<typeof english.run> = {
     takesFirst: "Bei jedem Durchgang: {decision}",
     noDecisions: "Sie hat keine Antworten zur Auswahl.",
     visit: "{name}, Durchgang {number}",
+    visitAfter: "{name}: Sekunden bis zur Antwort {number}",
+    visitAfterHint: "So viele Sekunden nach der Frage",
+    atOnce: "sofort",
     addVisit: "+ Durchgang",
     of: " von {name}",
     removeVisit: "Den letzten Durchgang von {name} entfernen",
@@ -111,9 +124,12 @@ export const run: Translation<typeof english.run> = {
       stalled: "endet nie von selbst",
       lost: "sein Fahrzeug geht verloren",
       succeeded: "gelingt",
+      simulated: "durch die Bewegung des Fahrzeugs",
     },
     error: "Mit dem Fehler",
     seconds: "Schreiben Sie eine Anzahl von Sekunden.",
+    more: "Fahrzeuge, Wind, Vorfälle (YAML)",
+    moreHint: "Zum Beispiel wind: {speed: 6 m/s, from: 270 deg}",
   },
 };
 

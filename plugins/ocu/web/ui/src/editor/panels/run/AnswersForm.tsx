@@ -5,7 +5,7 @@ import { TextField } from "../../properties/fields/TextField";
 import { Rows } from "../../properties/forms/Rows";
 import { askingTasks, type AskingTask } from "../drawn";
 import type { EditorContext } from "../panel";
-import { dataOf, yamlOf, type Script } from "./answers";
+import { dataOf, isSeconds, yamlOf, type Script, type ScriptedAnswer } from "./answers";
 import type { Rehearsal } from "./rehearsal";
 import { Behaviors, Services } from "./ScriptedTasks";
 import { Seconds } from "./Seconds";
@@ -21,6 +21,7 @@ export function AnswersForm({ editor, rehearsal }: AnswersFormProps) {
   // Tasks come and go while the mission is drawn.
   editor.changes.value;
   const raw = rehearsal.raw.value;
+  const file = rehearsal.file.value;
   const unread = rehearsal.unread.value;
   const script = rehearsal.script.value;
   const write = (next: Partial<Script>) => {
@@ -32,7 +33,7 @@ export function AnswersForm({ editor, rehearsal }: AnswersFormProps) {
         <TextField
           id="m2r-yaml"
           label={words.yaml}
-          hint={words.yamlHint}
+          hint={file ? fill(words.ofFile, { file }) : words.yamlHint}
           rows={10}
           mono
           value={raw}
@@ -56,6 +57,15 @@ export function AnswersForm({ editor, rehearsal }: AnswersFormProps) {
       <Sends {...part} />
       <Services {...part} />
       <Behaviors {...part} />
+      <TextField
+        id="m2r-more"
+        label={words.more}
+        hint={words.moreHint}
+        rows={3}
+        mono
+        value={script.more}
+        write={(more) => write({ more })}
+      />
       <button
         type="button"
         class="m2-button"
@@ -94,8 +104,8 @@ function Decisions({ editor, script, write }: PartProps) {
 
 interface VisitsProps {
   task: AskingTask;
-  visits: readonly string[];
-  write(visits: readonly string[]): void;
+  visits: readonly ScriptedAnswer[];
+  write(visits: readonly ScriptedAnswer[]): void;
 }
 
 /** The decisions at one user task, visit by visit. */
@@ -112,25 +122,20 @@ function Visits({ task, visits, write }: VisitsProps) {
       )}
       <div>
         {visits.map((visit, index) => (
-          <select
+          <Visit
             key={index}
-            class="m2-input"
-            aria-label={fill(words.visit, { name, number: index + 1 })}
-            value={visit}
-            onChange={(event) => write(visits.with(index, event.currentTarget.value))}
-          >
-            {!task.decisions.some(({ value }) => value === visit) && (
-              <option value={visit}>{visit}</option>
-            )}
-            {task.decisions.map(({ value, label }) => (
-              <option key={value} value={value}>
-                {index + 1}. {label}
-              </option>
-            ))}
-          </select>
+            task={task}
+            number={index + 1}
+            visit={visit}
+            write={(next) => write(visits.with(index, next))}
+          />
         ))}
         {task.decisions.length > 0 && (
-          <button type="button" class="m2-button" onClick={() => write([...visits, first])}>
+          <button
+            type="button"
+            class="m2-button"
+            onClick={() => write([...visits, { decision: first, after: "" }])}
+          >
             {words.addVisit}
             <span class="m2v-hidden">{fill(words.of, { name })}</span>
           </button>
@@ -147,6 +152,50 @@ function Visits({ task, visits, write }: VisitsProps) {
           </button>
         )}
       </div>
+    </div>
+  );
+}
+
+interface VisitProps {
+  task: AskingTask;
+  number: number;
+  visit: ScriptedAnswer;
+  write(visit: ScriptedAnswer): void;
+}
+
+function Visit({ task, number, visit, write }: VisitProps) {
+  const { decision, after } = visit;
+  const name = task.name || task.id;
+  const isTimed = after.trim() === "" || isSeconds(after);
+  return (
+    <div class="m2r-visit">
+      <select
+        class="m2-input"
+        aria-label={fill(words.visit, { name, number })}
+        value={decision}
+        onChange={(event) => write({ ...visit, decision: event.currentTarget.value })}
+      >
+        {!task.decisions.some(({ value }) => value === decision) && (
+          <option value={decision}>{decision}</option>
+        )}
+        {task.decisions.map(({ value, label }) => (
+          <option key={value} value={value}>
+            {number}. {label}
+          </option>
+        ))}
+      </select>
+      <input
+        type="text"
+        class="m2-input"
+        inputMode="decimal"
+        autocomplete="off"
+        aria-label={fill(words.visitAfter, { name, number })}
+        aria-invalid={!isTimed}
+        title={isTimed ? words.visitAfterHint : words.seconds}
+        placeholder={words.atOnce}
+        value={after}
+        onInput={(event) => write({ ...visit, after: event.currentTarget.value })}
+      />
     </div>
   );
 }

@@ -1,10 +1,12 @@
 // What a rehearsal came to: how it ended, who did what when, and where to watch it.
-import { fill, strings } from "../../../strings";
+import { counted, fill, strings } from "../../../strings";
 import type { RunSummary } from "../../../shared/types";
+import { isViolated } from "../../../operate/requirements/violations";
 import { PROMPTS, SERVICES, WAITS, type Span } from "../../../records/spans";
 import type { EditorContext } from "../panel";
 import { Explained } from "./Explained";
-import type { Unsaid } from "./unsaid";
+import type { Read } from "./rehearsal";
+import { Verdicts } from "./Verdicts";
 import { locale } from "../../../strings/language";
 
 const words = strings.run;
@@ -14,14 +16,15 @@ export interface OutcomeProps {
   editor: EditorContext;
   id: string;
   summary: RunSummary;
-  spans: readonly Span[];
-  unsaid: Unsaid;
+  read: Read;
 }
 
-export function Outcome({ editor, id, summary, spans, unsaid }: OutcomeProps) {
+export function Outcome({ editor, id, summary, read }: OutcomeProps) {
+  const { spans, unsaid, requirements, count } = read;
   const { status, detail, records, started_us, ended_us } = summary;
   const seconds = ended_us === null ? 0 : (ended_us - started_us) / 1e6;
-  const good = status === "completed" || status === "terminated";
+  const violated = Object.values(requirements).filter(isViolated).length;
+  const good = (status === "completed" || status === "terminated") && violated === 0;
   return (
     <section class="m2r-outcome" aria-label={words.outcome}>
       <div class={`m2v-summary ${good ? "m2v-holds" : "m2v-violated"}`}>
@@ -32,6 +35,7 @@ export function Outcome({ editor, id, summary, spans, unsaid }: OutcomeProps) {
           {STATUS[status]}
         </h2>
         {detail && <p>{detail}</p>}
+        {violated > 0 && <p>{counted(strings.monitors.violated, violated)}</p>}
         <p class="m2v-faint">{fill(words.took, { duration: duration(seconds), records })}</p>
         <a class="m2r-watch" href={`/rehearsals/${encodeURIComponent(id)}`} target="_blank">
           {words.watch}
@@ -44,6 +48,10 @@ export function Outcome({ editor, id, summary, spans, unsaid }: OutcomeProps) {
           {strings.plan.play}
         </button>
       </div>
+      <Verdicts editor={editor} id={id} summary={summary} requirements={requirements} />
+      {count > 0 && count < records && (
+        <p class="m2-note">{fill(words.begun, { count })}</p>
+      )}
       <Explained editor={editor} summary={summary} unsaid={unsaid} />
       {spans.length > 0 && <Bars editor={editor} spans={spans} end={seconds} />}
     </section>

@@ -1,5 +1,5 @@
 // Run: the mission is rehearsed as it is drawn, or saved and started.
-import { useState } from "preact/hooks";
+import { useRef, useState } from "preact/hooks";
 import { Approval } from "../../../people/Approval";
 import { Dialog } from "../../../shared/Dialog";
 import { go } from "../../../shared/router";
@@ -45,16 +45,22 @@ function RunPanel({ editor }: { editor: EditorContext }) {
 function Rehearse({ editor }: { editor: EditorContext }) {
   const rehearsal = rehearsalOf(editor);
   const { job } = rehearsal;
+  const file = useRef<HTMLInputElement>(null);
   const busy = job.isBusy.value;
   const allowed = may("operator");
-  const ready = beginningOf(editor).isReadable() && rehearsal.isReady.value;
+  const begins = beginningOf(editor).isReadable();
+  const ready = begins && rehearsal.isReady.value;
   const told = job.told.value;
   const refusal = job.refusal.value;
   return (
     <section class="m2r-part" aria-label={words.rehearse}>
       <h2>{words.rehearse}</h2>
       <p class="m2-field-hint">{words.rehearseHint}</p>
-      <details class="m2v-options">
+      <details
+        class="m2v-options"
+        open={rehearsal.isUnfolded.value}
+        onToggle={(event) => (rehearsal.isUnfolded.value = event.currentTarget.open)}
+      >
         <summary>{words.answers.title}</summary>
         <AnswersForm editor={editor} rehearsal={rehearsal} />
       </details>
@@ -68,6 +74,31 @@ function Rehearse({ editor }: { editor: EditorContext }) {
           >
             {words.rehearse}
           </button>
+        )}
+        {allowed && (
+          <>
+            <button
+              type="button"
+              class="secondary"
+              title={words.answers.chooseHint}
+              disabled={busy || !begins || !editor.isOpen.value}
+              onClick={() => file.current?.click()}
+            >
+              {words.answers.choose}
+            </button>
+            <input
+              ref={file}
+              type="file"
+              accept=".yaml,.yml"
+              hidden
+              aria-label={words.answers.choose}
+              onChange={({ currentTarget: input }) => {
+                const [chosen] = input.files ?? [];
+                if (chosen) void rehearsal.open(editor, chosen);
+                input.value = "";
+              }}
+            />
+          </>
         )}
         {busy && (
           <button type="button" class="secondary" onClick={() => void job.cancel()}>
@@ -90,12 +121,18 @@ function Rehearse({ editor }: { editor: EditorContext }) {
             editor={editor}
             id={job.id.value}
             summary={told.summary}
-            spans={rehearsal.spans.value}
-            unsaid={rehearsal.unsaid.value}
+            read={rehearsal.read.value}
           />
         )}
       </div>
-      {refusal && <ProblemView editor={editor} title={words.failed} refusal={refusal} />}
+      {refusal && (
+        <ProblemView
+          editor={editor}
+          title={words.failed}
+          refusal={refusal}
+          typed={{ file: "answers.yaml", text: rehearsal.sent.value }}
+        />
+      )}
     </section>
   );
 }

@@ -4,7 +4,7 @@ import { SelectField } from "../../properties/fields/SelectField";
 import { TextField } from "../../properties/fields/TextField";
 import { Rows } from "../../properties/forms/Rows";
 import { commandingTasks, servingTasks, type Task } from "../drawn";
-import { carriesError, ENDS, isGiven } from "./answers";
+import { carriesError, ENDS, hasTime, isGiven } from "./answers";
 import type { PartProps } from "./AnswersForm";
 import { Seconds } from "./Seconds";
 
@@ -116,13 +116,15 @@ export function Behaviors({ editor, script, write }: PartProps) {
                 options={ENDS.map((end) => ({ value: end, label: words.ends[end] }))}
                 write={(end) => change({ end: ENDS.find((each) => each === end) ?? row.end })}
               />
-              <Seconds
-                id={`${id}-after`}
-                label={words.after}
-                value={row.after}
-                required
-                write={(after) => change({ after })}
-              />
+              {hasTime(row.end) && (
+                <Seconds
+                  id={`${id}-after`}
+                  label={words.after}
+                  value={row.after}
+                  required
+                  write={(after) => change({ after })}
+                />
+              )}
               {carriesError(row.end) && (
                 <TextField
                   id={`${id}-error`}

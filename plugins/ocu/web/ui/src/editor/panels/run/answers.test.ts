@@ -2,7 +2,13 @@ import { describe, expect, it } from "vitest";
 import { dataOf, EMPTY, isComplete, yamlOf, type Script } from "./answers";
 
 const script: Script = {
-  answers: { UserSendRoute: ["continue", "no way"], Unused: [] },
+  answers: {
+    UserSendRoute: [
+      { decision: "continue", after: "" },
+      { decision: "no way", after: "2.5" },
+    ],
+    Unused: [],
+  },
   services: [
     { element: "Detector", after: "5", name: "detection.type", value: "gpr", error: "" },
     { element: "Detector", after: "", name: "", value: "", error: "SENSOR_BROKEN" },
@@ -10,17 +16,19 @@ const script: Script = {
   behaviors: [
     { element: "DriveRoute", after: "30", end: "failed", error: "ROUTE_BLOCKED" },
     { element: "DriveStop", after: "9", end: "stalled", error: "ignored" },
+    { element: "DriveStop", after: "left", end: "simulated", error: "" },
   ],
   sends: [
     { kind: "signal", id: "dc45ff2b-ef6b", at: "12.5", data: "reason = dust, depth = 2" },
     { kind: "message", id: "7c1e4a90-2f53", at: "0", data: "" },
   ],
+  more: "wind: {speed: 6 m/s}\n",
 };
 
 describe("an answers file", () => {
   it("says what the rows say", () => {
     expect(yamlOf(script)).toBe(`answers:
-  UserSendRoute: [continue, "no way"]
+  UserSendRoute: [continue, {decision: "no way", after: 2.5 s}]
 services:
   Detector:
     - {after: 5 s, write: {detection.type: gpr}}
@@ -30,10 +38,12 @@ behaviors:
     - {after: 30 s, end: failed, error: ROUTE_BLOCKED}
   DriveStop:
     - {after: 9 s, end: stalled}
+    - {end: simulated}
 signals:
   - {at: 12.5 s, id: dc45ff2b-ef6b, data: {reason: dust, depth: 2}}
 messages:
   - {at: 0 s, id: "7c1e4a90-2f53"}
+wind: {speed: 6 m/s}
 `);
   });
 
@@ -50,6 +60,8 @@ messages:
       const behaviors = [{ ...script.behaviors[0]!, after }];
       expect(isComplete({ ...script, behaviors })).toBe(false);
     }
+    const answers = { Ask: [{ decision: "go", after: "soon" }] };
+    expect(isComplete({ ...script, answers })).toBe(false);
   });
 });
 

@@ -1,12 +1,21 @@
 // What the world does in a rehearsal: the form's rows, written as an answers file (docs/rehearsal.md).
 import { readValue, writtenValue, type Value } from "../begin/values";
 
-export type End = "failed" | "stalled" | "lost" | "succeeded";
+export type End = "failed" | "stalled" | "lost" | "succeeded" | "simulated";
 
-export const ENDS: readonly End[] = ["failed", "stalled", "lost", "succeeded"];
+export const ENDS: readonly End[] = ["failed", "stalled", "lost", "succeeded", "simulated"];
+
+/** Whether it is scripted when a behavior ends in this way; else the simulated vehicle's motion says. */
+export const hasTime = (end: End): boolean => end !== "simulated";
 
 /** Whether a behavior that ends in this way does so with an error. */
 export const carriesError = (end: End): boolean => end === "failed" || end === "lost";
+
+/** What an operator decides, how many seconds after the question; "": at once. */
+export interface ScriptedAnswer {
+  decision: string;
+  after: string;
+}
 
 /** Of a behavior: after how many seconds it ends, how, and with what error. */
 export interface ScriptedBehavior {
@@ -33,14 +42,16 @@ export interface ScriptedSend {
 }
 
 export interface Script {
-  /** By user task: the decision at the first visit, at the second, ... */
-  answers: Readonly<Record<string, readonly string[]>>;
+  /** By user task: the answer at the first visit, at the second, ... */
+  answers: Readonly<Record<string, readonly ScriptedAnswer[]>>;
   behaviors: readonly ScriptedBehavior[];
   services: readonly ScriptedService[];
   sends: readonly ScriptedSend[];
+  /** Sections that have no rows, such as `vehicles` and `wind`, as they are written in the file. */
+  more: string;
 }
 
-export const EMPTY: Script = { answers: {}, behaviors: [], services: [], sends: [] };
+export const EMPTY: Script = { answers: {}, behaviors: [], services: [], sends: [], more: "" };
 
 export const isSeconds = (text: string): boolean => /^\d+(\.\d+)?$/.test(text.trim());
 
@@ -48,7 +59,8 @@ export const isSeconds = (text: string): boolean => /^\d+(\.\d+)?$/.test(text.tr
 export function isComplete(script: Script): boolean {
   const timed = (text: string) => text.trim() === "" || isSeconds(text);
   return (
-    script.behaviors.every(({ element, after }) => element && isSeconds(after)) &&
+    Object.values(script.answers).every((visits) => visits.every(({ after }) => timed(after))) &&
+    script.behaviors.every((row) => row.element && (isSeconds(row.after) || !hasTime(row.end))) &&
     script.services.every((row) => row.element && timed(row.after) && isGiven(row)) &&
     script.sends.every(({ id, at, data }) => id && isSeconds(at) && dataOf(data) !== undefined)
   );
@@ -67,7 +79,7 @@ export function yamlOf(script: Script): string {
   if (answers.length) {
     parts.push(
       "answers:",
-      ...answers.map(([id, visits]) => `  ${key(id)}: [${visits.map(written).join(", ")}]`),
+      ...answers.map(([id, visits]) => `  ${key(id)}: [${visits.map(answerEntry).join(", ")}]`),
     );
   }
   parts.push(...grouped("services", script.services, serviceEntry));
@@ -76,6 +88,7 @@ export function yamlOf(script: Script): string {
     const sends = script.sends.filter((each) => each.kind === kind);
     if (sends.length) parts.push(`${kind}s:`, ...sends.map((each) => `  - ${sendEntry(each)}`));
   }
+  if (script.more.trim()) parts.push(script.more.trimEnd());
   return parts.length ? `${parts.join("\n")}\n` : "";
 }
 
@@ -101,9 +114,17 @@ function flow(pairs: readonly (readonly [name: string, text: string])[]): string
   return `{${pairs.map(([name, text]) => `${name}: ${text}`).join(", ")}}`;
 }
 
+function answerEntry({ decision, after }: ScriptedAnswer): string {
+  if (!after.trim()) return written(decision);
+  return flow([
+    ["decision", written(decision)],
+    ["after", seconds(after)],
+  ]);
+}
+
 function behaviorEntry({ after, end, error }: ScriptedBehavior): string {
   return flow([
-    ["after", seconds(after)],
+    ...(hasTime(end) ? [["after", seconds(after)] as const] : []),
     ["end", end],
     ...(carriesError(end) && error.trim() ? [["error", written(error.trim())] as const] : []),
   ]);

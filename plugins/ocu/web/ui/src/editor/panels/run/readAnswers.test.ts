@@ -1,6 +1,7 @@
 import { describe, expect, it } from "vitest";
 import { parse } from "yaml";
-import { EMPTY, yamlOf, type Script } from "./answers";
+import { EMPTY, ENDS, yamlOf, type Script } from "./answers";
+import keys from "./answersFile.json";
 import { scriptOf } from "./readAnswers";
 
 const FILES = import.meta.glob<string>("../../../../../../../../missions/answers/*.yaml", {
@@ -32,20 +33,47 @@ it.each(Object.entries(FILES))("shows all of %s in the form", (_, text) => {
 
 it("reads what the form writes", () => {
   const script: Script = {
-    answers: { Ask: ["continue", "no way", "true"] },
+    answers: {
+      Ask: [
+        { decision: "continue", after: "" },
+        { decision: "no way", after: "12.345678901234567" },
+        { decision: "true", after: "0.000000500" },
+      ],
+    },
     services: [
       { element: "Detector", after: "5", name: "detection.type", value: "gpr", error: "" },
       { element: "Detector", after: "", name: "", value: "", error: "SENSOR_BROKEN" },
       { element: "Detector", after: "0.5", name: "at", value: '[1,{"x":null}]', error: "" },
     ],
-    behaviors: [{ element: "Drive", after: "30", end: "failed", error: "ROUTE_BLOCKED" }],
+    behaviors: [
+      { element: "Drive", after: "", end: "simulated", error: "" },
+      { element: "Drive", after: "30", end: "failed", error: "ROUTE_BLOCKED" },
+    ],
     sends: [
       { kind: "signal", id: "dc45ff2b", at: "12.5", data: "reason = dust, depth = 2" },
       { kind: "message", id: "7c1e4a90", at: "0", data: "" },
     ],
+    more: "vehicles:\n  uav1:\n    battery: 40 %",
   };
   expect(read(yamlOf(script))).toEqual(script);
   expect(read(yamlOf(EMPTY))).toEqual(EMPTY);
+});
+
+it("keeps what has no rows as it is", () => {
+  const text = `incidents: {Drive: [{choice: retry_with, roles: {scout: [uav2]}}]}
+vehicles: {evsg1: {battery: 0.4, link_lost: [{at: 30 s, for: 2 s}], state: "007"}}
+wind: {speed: 6.123456789012345, from: 1.5 rad}
+`;
+  expect(parse(yamlOf(read(text)))).toEqual(parse(text));
+});
+
+it.each(keys.sections)("knows the section %s", (section) => {
+  const nothing = section === "signals" || section === "messages" ? "[]" : "{}";
+  expect(() => read(`${section}: ${nothing}`)).not.toThrow();
+});
+
+it("knows all ends of behaviors", () => {
+  expect([...ENDS].sort()).toEqual([...keys.ends].sort());
 });
 
 it("takes durations in the units that files use", () => {
@@ -61,7 +89,10 @@ describe("what the form cannot show stays as YAML, with the reason", () => {
     ["answers: {Ask: [continue]", /at line 1, column/],
     ["answers: {Ask: [a], Ask: [b]}", /unique/],
     ["[1]", /^write names with values/],
-    ["answer: {}", /^answer: write one of answers, services, behaviors, signals, messages$/],
+    ["answer: {}", /^answer: write one of answers, signals, .*, incidents, vehicles, wind$/],
+    ["answers: {Ask: [{after: 3}]}", /^answers\.Ask\[0\]\.decision: write a text$/],
+    ["answers: {Ask: [{decision: a, at: 3}]}", /^answers\.Ask\[0\]\.at: write one of decision/],
+    ["behaviors: {D: [{after: 3, end: simulated}]}", /\.after: what ends by its own motion/],
     ["answers: {Ask: continue}", /^answers\.Ask: write a list/],
     ["answers: {Ask: [true]}", /^answers\.Ask\[0\]: write a text$/],
     ["services: {S: [{write: {a: 1, b: 2}}]}", /^services\.S\[0\]\.write: the form writes one/],

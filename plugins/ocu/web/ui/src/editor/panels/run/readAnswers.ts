@@ -1,8 +1,17 @@
 // An answers file, read back into the rows of the form. Nothing is left out: what has no row, is said.
-import { parseDocument } from "yaml";
+import { parseDocument, stringify } from "yaml";
 import { fill, strings } from "../../../strings";
 import { writtenValue, type Value } from "../begin/values";
-import { carriesError, dataOf, ENDS, type Script, type ScriptedSend } from "./answers";
+import {
+  carriesError,
+  dataOf,
+  ENDS,
+  hasTime,
+  type Script,
+  type ScriptedAnswer,
+  type ScriptedSend,
+} from "./answers";
+import keys from "./answersFile.json";
 
 const words = strings.run.answers.unread;
 
@@ -19,7 +28,7 @@ export class Unread extends Error {}
 type Entry = Readonly<Record<string, Value>>;
 
 const SECONDS = { s: 1, ms: 0.001, min: 60, h: 3600 };
-const SECTIONS = ["answers", "services", "behaviors", "signals", "messages"];
+const WITH_ROWS = ["answers", "services", "behaviors", "signals", "messages"];
 // As yaml_source.py: a few lines of nested aliases must not fill the memory.
 const MOST_ALIASES = 100;
 
@@ -30,12 +39,12 @@ const MOST_ALIASES = 100;
  */
 export function scriptOf(text: string, rows: Rows): Script {
   const file = mapOf(parsed(text) ?? {}, "");
-  only(file, SECTIONS, "");
+  only(file, keys.sections, "");
   return {
     answers: Object.fromEntries(
       lists(file, "answers", rows.asking).map(([id, visits]) => [
         id,
-        visits.map(([place, visit]) => textOf(visit, place)),
+        visits.map(([place, visit]) => answerOf(visit, place)),
       ]),
     ),
     services: lists(file, "services", rows.serving).flatMap(([element, visits]) =>
@@ -45,6 +54,7 @@ export function scriptOf(text: string, rows: Rows): Script {
       visits.map(([place, visit]) => ({ element, ...behaviorOf(mapOf(visit, place), place) })),
     ),
     sends: [...sendsOf(file, "signal"), ...sendsOf(file, "message")],
+    more: moreOf(file),
   };
 }
 
@@ -74,8 +84,26 @@ function placed(values: Value, place: string): (readonly [place: string, value: 
   return values.map((value, index) => [`${place}[${index}]`, value] as const);
 }
 
+/** The sections that have no rows. */
+function moreOf(file: Entry): string {
+  const more = Object.entries(file).filter(([section]) => !WITH_ROWS.includes(section));
+  return more.length ? stringify(Object.fromEntries(more), { lineWidth: 0 }).trimEnd() : "";
+}
+
+function answerOf(visit: Value, place: string): ScriptedAnswer {
+  if (typeof visit === "string" || visit === null || typeof visit !== "object") {
+    return { decision: textOf(visit, place), after: "" };
+  }
+  const entry = mapOf(visit, place);
+  only(entry, keys.answers, place);
+  return {
+    decision: textOf(entry["decision"] ?? null, `${place}.decision`),
+    after: entry["after"] === undefined ? "" : secondsOf(entry["after"], `${place}.after`),
+  };
+}
+
 function serviceOf(entry: Entry, place: string) {
-  only(entry, ["after", "write", "error"], place);
+  only(entry, keys.services, place);
   const written = Object.entries(mapOf(entry["write"] ?? {}, `${place}.write`));
   if (written.length > 1) throw unread(words.severalWritten, `${place}.write`);
   const [name, value] = written[0] ?? ["", undefined];
@@ -90,18 +118,22 @@ function serviceOf(entry: Entry, place: string) {
 }
 
 function behaviorOf(entry: Entry, place: string) {
-  only(entry, ["after", "end", "error"], place);
+  only(entry, keys.behaviors, place);
   const end = ENDS.find((each) => each === entry["end"]);
   if (!end) throw unread(fill(words.oneOf, { values: ENDS.join(", ") }), `${place}.end`);
   const error = optionalText(entry, "error", place);
   if (error && !carriesError(end)) throw unread(words.errorOfFailure, `${place}.error`);
+  if (!hasTime(end)) {
+    if (entry["after"] !== undefined) throw unread(words.noTime, `${place}.after`);
+    return { after: "", end, error };
+  }
   return { after: secondsOf(entry["after"] ?? null, `${place}.after`), end, error };
 }
 
 function sendsOf(file: Entry, kind: ScriptedSend["kind"]): ScriptedSend[] {
   return placed(file[`${kind}s`] ?? [], `${kind}s`).map(([place, value]) => {
     const entry = mapOf(value, place);
-    only(entry, ["at", "id", "data"], place);
+    only(entry, keys.sends, place);
     const data = mapOf(entry["data"] ?? {}, `${place}.data`);
     const shown = Object.entries(data)
       .map(([name, each]) => `${name} = ${writtenValue(each)}`)
@@ -121,10 +153,13 @@ function sendsOf(file: Entry, kind: ScriptedSend["kind"]): ScriptedSend[] {
 /** A duration as a number of seconds. */
 function secondsOf(value: Value, place: string): string {
   const [, number, unit = "s"] =
-    /^\s*(\d+(?:\.\d+)?)\s*(s|ms|min|h)?\s*$/.exec(String(value)) ?? [];
+    /^\s*(\d+(?:\.\d+)?(?:[eE][-+]?\d+)?)\s*(s|ms|min|h)?\s*$/.exec(String(value)) ?? [];
   if (number === undefined) throw unread(words.duration, place);
   const factor = SECONDS[unit as keyof typeof SECONDS];
-  return String(Number((Number(number) * factor).toPrecision(12)));
+  // What was drawn in a campaign is kept to the last digit: the rehearsal shall be the same.
+  const seconds = factor === 1 ? Number(number) : Number((Number(number) * factor).toPrecision(12));
+  const text = String(seconds);
+  return text.includes("e") ? seconds.toFixed(9) : text;
 }
 
 function mapOf(value: Value, place: string): Entry {

@@ -1,7 +1,10 @@
 // The rehearsal of one mission: what is scripted, and what came of it.
 import { computed, signal } from "@preact/signals";
 import { get } from "../../../shared/api";
-import type { RunRecord, RunSummary } from "../../../shared/types";
+import { toast } from "../../../shared/Toasts";
+import type { Requirement, RunRecord, RunSummary } from "../../../shared/types";
+import { fill, strings } from "../../../strings";
+import { apply, emptyView } from "../../../records/runView";
 import { Spans, type Span } from "../../../records/spans";
 import { beginningOf } from "../begin/beginning";
 import { Job, type JobTold } from "../job";
@@ -15,9 +18,24 @@ export interface RehearsalTold extends JobTold {
   summary: RunSummary | null;
 }
 
+const words = strings.run.answers;
+
 const PAGE = 5000;
 /** More is seen on the page of the rehearsal. */
 const MOST_RECORDS = 50_000;
+/** The server takes no longer text. */
+const LONGEST = 1_000_000;
+
+/** What was read of the records of a rehearsal. */
+export interface Read {
+  spans: readonly Span[];
+  unsaid: Unsaid;
+  requirements: Readonly<Record<string, Requirement>>;
+  /** How many records; less than all if there are very many. */
+  count: number;
+}
+
+const NOTHING: Read = { spans: [], unsaid: new Unsaid(), requirements: {}, count: 0 };
 
 interface RecordPage {
   records: RunRecord[];
@@ -28,11 +46,16 @@ export class Rehearsal {
   readonly script = signal<Script>(EMPTY);
   /** The text of an answers file in place of the form; null: what the form says. */
   readonly raw = signal<string | null>(null);
+  /** The name of the file that the text is of; "": it was typed. */
+  readonly file = signal("");
+  /** Whether the form, or the text, is unfolded. */
+  readonly isUnfolded = signal(false);
   /** Why the form cannot show that text; null: it was not asked for, or it can. */
   readonly unread = signal<string | null>(null);
   readonly job = new Job<RehearsalTold>("/rehearsals");
-  readonly spans = signal<readonly Span[]>([]);
-  readonly unsaid = signal(new Unsaid());
+  /** The text that it began with. */
+  readonly sent = signal("");
+  readonly read = signal(NOTHING);
   readonly isReady = computed(() => this.raw.value !== null || isComplete(this.script.value));
 
   text(): string {
@@ -40,9 +63,29 @@ export class Rehearsal {
   }
 
   /** From now on the text counts. */
-  write(text: string): void {
+  write(text: string, file = ""): void {
     this.raw.value = text;
+    this.file.value = file;
     this.unread.value = null;
+  }
+
+  /** Rehearses with an answers file. */
+  async open(editor: EditorContext, file: File): Promise<void> {
+    let text;
+    try {
+      text = new TextDecoder("utf-8", { fatal: true }).decode(await file.arrayBuffer());
+    } catch (error) {
+      const reason = error instanceof TypeError ? words.noText : String(error);
+      toast(fill(words.noFile, { file: file.name, reason }), "bad");
+      return;
+    }
+    if (text.length > LONGEST) {
+      toast(fill(words.noFile, { file: file.name, reason: words.tooLong }), "bad");
+      return;
+    }
+    this.write(text, file.name);
+    this.isUnfolded.value = true;
+    await this.begin(editor);
   }
 
   /** Reads the text back into the form; it stays where the form cannot show all of it. */
@@ -57,6 +100,7 @@ export class Rehearsal {
         commanding: ids(commandingTasks(editor)),
       });
       this.raw.value = null;
+      this.file.value = "";
       this.unread.value = null;
     } catch (error) {
       if (!(error instanceof Unread)) throw error;
@@ -65,20 +109,23 @@ export class Rehearsal {
   }
 
   async begin(editor: EditorContext): Promise<void> {
-    this.spans.value = this.job.isBusy.value ? this.spans.value : [];
+    if (this.job.isBusy.value) return;
+    this.read.value = NOTHING;
     const answers = this.text();
+    this.sent.value = answers;
     const told = await this.job.run(async () => ({
       xml: await editor.xml(),
       mission: editor.mission,
       ...beginningOf(editor).request(),
       ...(answers.trim() ? { answers } : {}),
     }));
-    if (told?.state === "done") await this.readSpans(this.job.id.value);
+    if (told?.state === "done") await this.readRecords(this.job.id.value);
   }
 
-  private async readSpans(id: string): Promise<void> {
+  private async readRecords(id: string): Promise<void> {
     const spans = new Spans();
     const unsaid = new Unsaid();
+    const view = emptyView();
     let after: number | null = 0;
     for (let count = 0; after !== null && count < MOST_RECORDS; count += PAGE) {
       const path = `/rehearsals/${encodeURIComponent(id)}/records?after=${after}&limit=${PAGE}`;
@@ -86,12 +133,13 @@ export class Rehearsal {
       page.records.forEach((record) => {
         spans.add(record);
         unsaid.add(record);
+        apply(view, record);
       });
       after = page.next;
     }
     if (this.job.id.value !== id) return;
-    this.spans.value = spans.all;
-    this.unsaid.value = unsaid;
+    const requirements = Object.fromEntries(view.requirements);
+    this.read.value = { spans: spans.all, unsaid, requirements, count: view.seq };
   }
 }
 

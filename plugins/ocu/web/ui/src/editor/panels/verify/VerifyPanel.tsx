@@ -189,7 +189,12 @@ function Progress({ editor, verification }: PartProps) {
       </div>
       {job.isBusy.value && <Decided decided={told?.progress.decided ?? {}} />}
       {refusal && (
-        <ProblemView editor={editor} title={words.failed} refusal={refusal} spec={spec.value} />
+        <ProblemView
+          editor={editor}
+          title={words.failed}
+          refusal={refusal}
+          typed={{ file: "requirements.yaml", text: spec.value }}
+        />
       )}
     </>
   );
