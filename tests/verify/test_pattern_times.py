@@ -58,7 +58,13 @@ WHEN = "when: Drive, then: active(Back)"
     ("pattern", "arguments", "satisfying", "violating", "violated_s"),
     [
         ("existence", "what: Drive, within: 30 s", "0 -, 30 d, 30 -", "0 -, 31 d, 31 -", 30),
-        ("existence", "what: active(Back), for: 5 s", "0 -, 9 b, 14.1 -", "0 b, 4 -, 9 b, 13 -", 50),
+        (
+            "existence",
+            "what: active(Back), for: 5 s",
+            "0 -, 9 b, 14.1 -",
+            "0 b, 4 -, 9 b, 13 -",
+            50,
+        ),
         (
             "existence",
             "what: active(Back), within: 10 s, for: 5 s",
