@@ -142,6 +142,11 @@ def test_a_run_that_an_operator_stops_leaves_open_what_is_not_certain(
         (requirement("r", "[] !active(Secnd)"), "did you mean 'Second'"),
         (requirement("r", "[] true", 'onViolation="signal:S"'), "the mission has no signal 'S'"),
         (requirement("r", "[] true", 'onViolation="stop"'), "write error:CODE or signal:ID"),
+        (requirement("r", "[] true", 'onViolation="error:"'), "onViolation: 'error:' is neither"),
+        (
+            requirement("r", "[] true", 'monitor="false" onViolation="error:E"'),
+            "onViolation: runs are not monitored for it (monitor is false), so a violation throws",
+        ),
         (requirement("r", "[] true", 'monitor="no"'), "monitor='no' is neither true nor false"),
     ],
 )

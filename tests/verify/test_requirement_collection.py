@@ -220,3 +220,22 @@ def test_wrong_arguments_are_named_with_those_that_were_meant(written: str, said
     with pytest.raises(RequirementsError) as caught:
         spec(f"requirements: [{{id: a, {written}}}]\n")
     assert said in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("entry", "message"),
+    [
+        ("ltl: '[] true', monitor: false", "not monitored for it (monitor is false)"),
+        (
+            "pattern: bound_delay, args: {when: active(Drive), then: ended}",
+            "not monitored for single steps",
+        ),
+    ],
+)
+def test_what_runs_are_not_monitored_for_throws_nothing(entry: str, message: str) -> None:
+    with pytest.raises(RequirementsError) as raised:
+        spec(f"requirements: [{{id: safe, {entry}, on_violation: 'error:UNSAFE'}}]")
+    (found,) = raised.value.findings
+    assert message in found.message
+    assert found.element == "requirements[0].on_violation"
+    assert spec(f"requirements: [{{id: safe, {entry}}}]")

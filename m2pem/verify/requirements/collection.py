@@ -70,7 +70,8 @@ def read_mission_requirements(names: Names) -> list[Requirement]:
         except UnusableError as unusable:
             wrong = unusable.misread
             if wrong is None:
-                error(unusable.message, unusable.remedy)
+                attribute = "onViolation: " if unusable.where == "on_violation" else ""
+                error(attribute + unusable.message, unusable.remedy)
                 continue
             line = document.line(element)
             findings.append(

@@ -18,6 +18,7 @@ from m2pem.verify.ltl.formula import (
     Timed,
     bounds_misused,
     children,
+    needs_steps,
     negated,
     walk,
 )
@@ -83,7 +84,22 @@ def requirements_of(written: WrittenRequirement, names: Names) -> Iterator[Requi
     """
     on_violation = _on_violation(written.on_violation, names)
     for each in _read(written, names):
+        if on_violation:
+            _refuse_unmonitored(each, monitor=written.monitor)
         yield replace(each, monitor=written.monitor, on_violation=on_violation)
+
+
+def _refuse_unmonitored(requirement: Requirement, *, monitor: bool) -> None:
+    """Refuse what is to be thrown by a requirement for which no run is monitored."""
+    if not monitor:
+        message = "runs are not monitored for it (monitor is false), so a violation throws nothing"
+        remedy = "leave out one of the two"
+    elif needs_steps(requirement.formula):
+        message = "runs are not monitored for single steps, so a violation throws nothing"
+        remedy = "leave it out"
+    else:
+        return
+    raise UnusableError("on_violation", message, remedy)
 
 
 def _on_violation(text: str, names: Names) -> str:

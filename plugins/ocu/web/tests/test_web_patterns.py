@@ -16,6 +16,7 @@ def test_the_editor_offers_the_patterns_that_there_are() -> None:
             "meaning": pattern.meaning,
             "scoped": pattern.scoped,
             "fair": pattern.fair,
+            "steps": pattern.steps,
             "arguments": [
                 {"name": each.name, "kind": each.kind.value, "required": each.required}
                 for each in pattern.arguments

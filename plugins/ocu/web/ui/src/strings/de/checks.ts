@@ -145,4 +145,32 @@ export const requirements: Translation<typeof english.requirements> = {
   fairUsual: "Wie üblich: {fair}",
   fairs: { true: "nur faire Läufe", false: "alle Läufe" },
   assumeHint: "Es zählen nur Läufe, in denen das so ist. Die Antwort wird auch ohne das gegeben.",
+  runs: {
+    monitor: "In Läufen und Probeläufen",
+    monitored: "überwacht",
+    unmonitored: "nicht überwacht",
+    monitorHint:
+      "Ein Lauf meldet, sobald feststeht, dass die Anforderung verletzt oder erfüllt ist.",
+    steps:
+      "Läufe werden auf dieses Muster nicht überwacht: Es handelt von einzelnen Schritten, die nur eine Verifikation hat.",
+    violation: "Eine Verletzung in einem Lauf",
+    violationHint:
+      "Sie ist in jedem Fall ein Alarm. Die Mission kann auf das reagieren, was sie wirft.",
+    nothing: "wirft nichts",
+    kinds: { error: "wirft einen Fehler", signal: "wirft ein Signal" },
+    code: "Fehlercode",
+    codeHint:
+      "Ein Ereignis-Teilprozess des Prozesses, mit dem der Lauf beginnt, fängt ihn; sonst schlägt der Lauf fehl.",
+    signal: "Signal",
+    signalHint: "Alles, was darauf wartet, geht weiter.",
+    faults: {
+      neither: "„{name}“ ist weder ein Fehler noch ein Signal.",
+      noCode: "Schreiben Sie den Code des Fehlers.",
+      noSignals: "Die Mission hat keine Signale: Zeichnen Sie ein Ereignis, das auf eines wartet.",
+      noSignal: "Wählen Sie ein Signal.",
+      unknownSignal: "Die Mission hat kein Signal „{name}“, oder mehr als eines.",
+      unmonitored: "Läufe werden nicht darauf überwacht, also wirft eine Verletzung nichts.",
+      steps: "Läufe werden auf dieses Muster nicht überwacht, also wirft eine Verletzung nichts.",
+    },
+  },
 };

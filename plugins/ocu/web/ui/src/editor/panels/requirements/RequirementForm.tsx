@@ -8,7 +8,9 @@ import type { EditorContext } from "../panel";
 import { ArgumentField } from "./ArgumentField";
 import type { Vocabulary } from "./completion";
 import { FormulaField } from "./FormulaField";
+import { InRuns } from "./InRuns";
 import { PATTERNS, patternNamed, scopesOf, spaced, type Argument } from "./patterns";
+import { isAboutThrown } from "./violation";
 import { ofPattern } from "./written";
 
 const words = strings.requirements;
@@ -27,7 +29,9 @@ export function RequirementForm(props: RequirementFormProps) {
   const { prefix, requirement, findings, write } = props;
   const { ltl, pattern } = requirement;
   const known = patternNamed(pattern);
-  const wrong = findings.map(({ message, remedy }) => [message, remedy].filter(Boolean).join(" "));
+  const wrong = findings
+    .filter((each) => !isAboutThrown(each))
+    .map(({ message, remedy }) => [message, remedy].filter(Boolean).join(" "));
   return (
     <div class="m2v-requirement-form">
       <TextField
@@ -99,6 +103,13 @@ export function RequirementForm(props: RequirementFormProps) {
         placeholder={strings.verify.assumeExample}
         value={requirement.assume}
         write={(assume) => write({ ...requirement, assume: assume.trim() })}
+      />
+      <InRuns
+        prefix={prefix}
+        requirement={requirement}
+        signals={props.editor.checks.outline.value?.signals ?? []}
+        findings={findings.filter(isAboutThrown)}
+        write={write}
       />
     </div>
   );

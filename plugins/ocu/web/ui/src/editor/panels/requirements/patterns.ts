@@ -27,6 +27,8 @@ export interface Pattern {
   scoped: boolean;
   /** Whether only fair runs count, unless it says otherwise. */
   fair: boolean;
+  /** Whether it is about single steps of a run. */
+  steps: boolean;
   arguments: Argument[];
 }
 
