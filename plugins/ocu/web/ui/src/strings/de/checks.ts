@@ -154,8 +154,9 @@ export const requirements: Translation<typeof english.requirements> = {
     steps:
       "Läufe werden auf dieses Muster nicht überwacht: Es handelt von einzelnen Schritten, die nur eine Verifikation hat.",
     violation: "Eine Verletzung in einem Lauf",
+    unmonitoredHint: "Nur eine Verifikation sieht sie an.",
     violationHint:
-      "Sie ist in jedem Fall ein Alarm. Die Mission kann auf das reagieren, was sie wirft.",
+      "Worauf die Mission reagieren kann. Operatoren bekommen in jedem Fall einen Alarm.",
     nothing: "wirft nichts",
     kinds: { error: "wirft einen Fehler", signal: "wirft ein Signal" },
     code: "Fehlercode",

@@ -24,6 +24,7 @@ export function InRuns({ prefix, requirement, signals, findings, write }: InRuns
   const error = fault
     ? fill(words.faults[fault], { name })
     : found && [found.message, found.remedy].filter(Boolean).join(" ");
+  const monitored = requirement.monitor !== "false" && !needsSteps(requirement);
   const isOfName = fault === "noCode" || fault === "noSignal" || fault === "unknownSignal";
   const throwing = (onViolation: string) => write({ ...requirement, onViolation });
   return (
@@ -31,7 +32,7 @@ export function InRuns({ prefix, requirement, signals, findings, write }: InRuns
       <SelectField
         id={`${prefix}-monitor`}
         label={words.monitor}
-        hint={needsSteps(requirement) ? words.steps : words.monitorHint}
+        hint={hintOf(requirement)}
         value={requirement.monitor === "false" ? "false" : ""}
         options={[
           { value: "", label: words.monitored },
@@ -44,7 +45,7 @@ export function InRuns({ prefix, requirement, signals, findings, write }: InRuns
       <SelectField
         id={`${prefix}-thrown`}
         label={words.violation}
-        hint={words.violationHint}
+        hint={monitored ? words.violationHint : undefined}
         value={kind ?? requirement.onViolation}
         error={isOfName ? undefined : error}
         options={[
@@ -83,4 +84,9 @@ export function InRuns({ prefix, requirement, signals, findings, write }: InRuns
       )}
     </>
   );
+}
+
+function hintOf(requirement: Requirement): string {
+  if (requirement.monitor === "false") return words.unmonitoredHint;
+  return needsSteps(requirement) ? words.steps : words.monitorHint;
 }
