@@ -72,7 +72,8 @@ def step(run_id: str, journal: str | None, by: str | None) -> None:
 def data(run_id: str, output: str, journal: str | None, by: str | None) -> None:
     """Print the data of a run that is running on this host.
 
-    First that of its data stores, then of each active process, subprocess and task that has some.
+    First that of its data stores, then of each active process, and of subprocesses and tasks that
+    have some.
     """
     import msgspec
 

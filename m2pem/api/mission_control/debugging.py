@@ -43,5 +43,5 @@ class DebugControl(Protocol):
 
     async def data(self, run: RunId) -> Sequence[ScopeData]:
         """The data of a run that goes on: of its data stores, then of each active process,
-        subprocess and task that has some, from the outside in."""
+        and of each active subprocess and task that has some, from the outside in."""
         ...

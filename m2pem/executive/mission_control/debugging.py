@@ -10,6 +10,7 @@ from m2pem.engine.state import RunStatus as EngineStatus
 from m2pem.errors import OperatorError
 from m2pem.executive.ended_runs import refuse_ended
 from m2pem.executive.mission_control.parts import ControlParts, bounded
+from m2pem.mission.elements import Process
 from m2pem.mission.values import Value
 
 
@@ -63,7 +64,7 @@ class DebugOperations(ControlParts):
 
 
 def _data_of(state: RunState) -> list[ScopeData]:
-    """The data of a run from the outside in: what is not empty, and that of its first process."""
+    """The data of a run from the outside in: what is not empty, and that of each process."""
     found: list[ScopeData] = []
     if state.shared.data:
         found.append(ScopeData("", "", dict(state.shared.data), ROOT))
@@ -71,7 +72,7 @@ def _data_of(state: RunState) -> list[ScopeData]:
     for scope in sorted(state.scopes.values(), key=lambda each: (each.depth, each.id)):
         container = scope.container
         instance = scope.owner.instance if scope.owner is not None else None
-        if scope.data or scope.id == ROOT:
+        if scope.data or (scope.loop is None and isinstance(container, Process)):
             data = dict(scope.data)
             place = container.process.id, container.id
             found.append(ScopeData(*place, data, scope.id, instance))

@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 import pytest
 from m2pem_plugin_web.replay.files import IndexFiles
-from m2pem_plugin_web.replay.index import Index, IndexBuilder, bars, with_overview
+from m2pem_plugin_web.replay.index import Index, IndexBuilder, Stop, bars, with_overview
 from m2pem_plugin_web.replay.replay import Replay, state_of
 from m2pem_plugin_web.replay.replays import Making, Recordings, Replays
 from m2pem_plugin_web.replay.source import JournalSource, ListSource
@@ -21,7 +21,15 @@ from test_web_telemetry import begun
 from web_replayed import FIXTURE, RUNS, fixture, looping, rehearsed, run_of
 from web_world import MakeWorld
 
-from m2pem.api import MissionControl, RunSummary, RunView, SimulationResult, StampedRecord
+from m2pem.api import (
+    MissionControl,
+    RunStatus,
+    RunSummary,
+    RunView,
+    SimulationResult,
+    StampedRecord,
+)
+from m2pem.api import records as r
 
 PAGE = 7
 """Records of a page: short runs have many, too."""
@@ -50,6 +58,29 @@ def pages_through_all(result: SimulationResult) -> list[dict[str, Any]]:
     content = page_of(result.records, new_view(result.summary), len(result.records))
     found: list[dict[str, Any]] = json.loads(content)["records"]
     return found
+
+
+async def test_stops_of_a_debugged_run_are_kept_with_their_records() -> None:
+    at_a = r.BreakpointsSet(("A",))
+    stop = r.BreakpointReached(r.StopReason.BREAKPOINT, 1, "P", "A", 1)
+    facts = [at_a, stop, r.RunPaused(5, "anna"), r.RunResumed(9), *[stop, r.RunResumed(9)] * 300]
+    records = [StampedRecord("r1", seq, seq / 2, each) for seq, each in enumerate(facts, 1)]
+    summary = RunSummary("r1", "m.bpmn", "P", RunStatus.STOPPED, 0, records=len(records))
+    result = SimulationResult(summary, records, (), None)
+    replay = await replay_of(result)
+    expected = Stop(2, 1.0, r.StopReason.BREAKPOINT, "P", "A", "")
+    assert replay.head()["stops"][0] == expected
+    assert len(replay.head()["stops"]) == 301
+    known, _ = builder_of(result, 100)
+    half = known.index(new_view(summary))
+    builder, _view = IndexBuilder.resumed(half, None)
+    assert builder.index(new_view(summary)).stops == [each for each in half.stops if each.seq <= 84]
+    page = json.loads(await replay.page(0))
+    assert page["view"]["debugging"] is None
+    changes = [each.get("changes", {}).get("debugging", "same") for each in page["records"]]
+    assert changes[0]["elements"] == ["A"]
+    assert changes[1]["reached"]["element"] == "A"
+    assert (changes[2], changes[3]["reached"]) == ("same", None)
 
 
 @pytest.mark.parametrize("name", RUNS)

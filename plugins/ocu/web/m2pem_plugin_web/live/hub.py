@@ -41,7 +41,7 @@ from m2pem_plugin_web.access.requests import now_s
 from m2pem_plugin_web.access.roles import Role
 from m2pem_plugin_web.live import messages
 from m2pem_plugin_web.live.latest_states import FleetStates, LatestStates
-from m2pem_plugin_web.live.live_run import LiveRun, command, requirement
+from m2pem_plugin_web.live.live_run import LiveRun, command, debugging, requirement
 from m2pem_plugin_web.live.messages import Message
 from m2pem_plugin_web.live.standbys import Standbys
 from m2pem_plugin_web.live.viewer import Unsent, Viewer
@@ -295,9 +295,11 @@ class Hub(Listener):
         for run, live in self._watched().items():
             if (changes := live.view.changes) is not None:
                 elements, behaviors = frozenset(changes.elements), frozenset(changes.behaviors)
-                requirements = frozenset(changes.requirements)
                 unsent = Unsent(elements, behaviors, *names)
-                of_runs[run] = unsent._replace(requirements=requirements)
+                of_runs[run] = unsent._replace(
+                    requirements=frozenset(changes.requirements),
+                    debugging=frozenset(changes.debugging),
+                )
                 for behavior in behaviors - live.view.behaviors.keys():
                     self.fleet.teams.forget(behavior)
                 live.clear_changes()
@@ -363,6 +365,7 @@ class Hub(Listener):
             holders=self._holders,
             commands={key: command(each) for key, each in behaviors.items()},
             requirements={key: requirement(each) for key, each in requirements.items()},
+            debugging=debugging(live.view) if live is not None else None,
         )
 
     def _frame(self, live: LiveRun | None, changed: Unsent) -> Message:
@@ -381,6 +384,8 @@ class Hub(Listener):
                 key: requirement(known[key]) if key in known else None
                 for key in changed.requirements
             }
+        if live is not None and changed.debugging:
+            frame["debugging"] = debugging(live.view)
         for name, latest, names in (
             ("vehicles", self.fleet.vehicles, changed.vehicles),
             ("payloads", self.fleet.payloads, changed.payloads),

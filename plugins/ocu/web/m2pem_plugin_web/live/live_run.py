@@ -5,6 +5,7 @@ from typing import Any
 import msgspec
 
 from m2pem.api import RequirementState, RunView
+from m2pem.api import records as r
 from m2pem.api.run_view import NEWEST, Behavior, Changes, Place
 from m2pem_plugin_web.live.messages import record_of
 
@@ -78,3 +79,48 @@ def requirement(state: RequirementState) -> dict[str, Any]:
         "recorded": state.recorded_s,
         "because": state.reason,
     }
+
+
+def debugging(view: RunView) -> dict[str, Any] | None:
+    """Return where the run is paused to look at it, for JSON; None: nowhere."""
+    if view.breakpoints is None and view.reached is None and not view.stepping:
+        return None
+    there = view.breakpoints or r.BreakpointsSet()
+    return {
+        "elements": there.elements,
+        "conditions": there.conditions,
+        "stepping": view.stepping,
+        "reached": _stop(view, view.reached) if view.reached is not None else None,
+    }
+
+
+def _stop(view: RunView, reached: r.BreakpointReached) -> dict[str, Any]:
+    """A stop. `within`: the subprocesses and calls around what is next, from the outside in."""
+    token = view.tokens.get(reached.token)
+    node = view.mission.elements.get(reached.element) if view.mission is not None else None
+    behavior = getattr(node, "behavior", None)  # of the kinds of tasks that command
+    return {
+        "reason": reached.reason,
+        "condition": reached.condition,
+        "process": reached.process,
+        "element": reached.element,
+        "scope": reached.scope,
+        "instance": token.instance if token is not None else None,
+        "within": _around(view, reached.scope),
+        "resources": [each.resource for each in behavior.roles if each.resource]
+        if behavior is not None
+        else [],
+    }
+
+
+def _around(view: RunView, number: int) -> list[dict[str, Any]]:
+    found: list[dict[str, Any]] = []
+    scope = view.scopes.get(number)
+    while scope is not None and scope.token is not None and scope.parent is not None:
+        owner = view.tokens.get(scope.token)
+        # A token that waits around the instances of its activity is none of them.
+        if owner is not None and not owner.is_around:
+            place = {"process": owner.process, "element": owner.element}
+            found.insert(0, {**place, "instance": owner.instance})
+        scope = view.scopes.get(scope.parent)
+    return found

@@ -42,6 +42,7 @@ class Unsent(NamedTuple):
     teams: frozenset[str] = _NOTHING
     holders: frozenset[str] = _NOTHING
     requirements: frozenset[str] = _NOTHING
+    debugging: frozenset[str] = _NOTHING
 
     def __bool__(self) -> bool:
         return any(self)
@@ -58,6 +59,7 @@ class Unsent(NamedTuple):
             self.teams | later.teams,
             self.holders | later.holders,
             self.requirements | later.requirements,
+            self.debugging | later.debugging,
         )
 
 

@@ -30,7 +30,10 @@ MOST_BARS = 1500
 NOTABLE = 6
 """Answers and faults that are kept, the last of each."""
 
-FORMAT = f"4 of m2pem {m2pem.__version__}"
+STOPS = 500
+"""Stops at breakpoints that are kept, the last ones."""
+
+FORMAT = f"5 of m2pem {m2pem.__version__}"
 
 LEVEL = 1
 """Of zlib: the executive waits while a snapshot of a run that goes on is compressed."""
@@ -47,6 +50,17 @@ class Noted(msgspec.Struct, array_like=True, frozen=True):
     seq: int
     is_fault: bool
     line: bytes
+
+
+class Stop(msgspec.Struct, frozen=True):
+    """A stop of a run that was debugged, at record `seq`. Fields as in `BreakpointReached`."""
+
+    seq: int
+    t: float
+    reason: r.StopReason
+    process: str
+    element: str
+    condition: str
 
 
 class Block(msgspec.Struct, array_like=True, frozen=True):
@@ -88,6 +102,8 @@ class Index(msgspec.Struct, array_like=True):
     rows: list[str] = []
     notable: list[Noted] = []
     """The last answers and the last faults."""
+    stops: list[Stop] = []
+    """The last stops."""
     overview: list[Span] = []
     """The bars of the whole run, thinned."""
     is_thinned: bool = False
@@ -132,6 +148,7 @@ class IndexBuilder:
         self._noted: dict[bool, deque[Noted]] = {
             is_fault: deque(maxlen=NOTABLE) for is_fault in (False, True)
         }
+        self._stops: deque[Stop] = deque(maxlen=STOPS)
 
     @classmethod
     def resumed(
@@ -153,6 +170,7 @@ class IndexBuilder:
         for noted in index.notable:
             if noted.seq <= last.seq:
                 builder._noted[noted.is_fault].append(noted)
+        builder._stops.extend(stop for stop in index.stops if stop.seq <= last.seq)
         return builder, view_of(zlib.decompress(last.view), mission)
 
     @property
@@ -169,6 +187,8 @@ class IndexBuilder:
         self._folder.add(stamped)
         if type(stamped.record) in _NOTABLE:
             self._note(view, stamped)
+        if isinstance(stamped.record, r.BreakpointReached):
+            self._stops.append(_stop(stamped, stamped.record))
         if stamped.seq % index.page == 0:
             index.times.append(stamped.t_s)
             if stamped.seq % self._block_records == 0:
@@ -192,6 +212,7 @@ class IndexBuilder:
             self._block(view) if index.seq % self._block_records else None,
             sorted(self._folder.rows),
             sorted((*self._noted[False], *self._noted[True]), key=lambda each: each.seq),
+            list(self._stops),
         )
 
     def _block(self, view: RunView) -> Block:
@@ -210,6 +231,11 @@ class IndexBuilder:
         if not is_fault or _is_fault(stamped.record):
             noted = Noted(stamped.seq, is_fault, record_of(stamped, view))
             self._noted[is_fault].append(noted)
+
+
+def _stop(stamped: StampedRecord, record: r.BreakpointReached) -> Stop:
+    place = record.process, record.element
+    return Stop(stamped.seq, stamped.t_s, record.reason, *place, record.condition)
 
 
 def _is_fault(record: r.Record) -> bool:

@@ -10,7 +10,7 @@ from typing import Any
 import msgspec
 
 from m2pem.api import Mission, RunView, StampedRecord
-from m2pem_plugin_web.live.live_run import command, requirement
+from m2pem_plugin_web.live.live_run import command, debugging, requirement
 from m2pem_plugin_web.live.messages import nested, prompt_record_of
 from m2pem_plugin_web.replay.index import Index, IndexBuilder, bars, with_overview
 from m2pem_plugin_web.replay.source import RecordSource
@@ -64,6 +64,7 @@ class Replay:
             "spans": index.overview,
             "thinned": index.is_thinned,
             "notable": [msgspec.Raw(each.line) for each in index.notable],
+            "stops": index.stops,
         }
 
     async def page(self, number: int) -> bytes:
@@ -141,4 +142,5 @@ def state_of(view: RunView) -> dict[str, Any]:
         "prompts": {key: prompt_record_of(view.run, each) for key, each in view.prompts.items()},
         "holders": view.holders,
         "requirements": {key: requirement(each) for key, each in view.requirements.items()},
+        "debugging": debugging(view),
     }

@@ -66,7 +66,7 @@ def router(control: MissionControl) -> APIRouter:
     @routes.get("/runs/{run}/data")
     async def data(_: Viewer, run: str) -> list[ScopeDataModel]:
         """Return the data of a run that goes on: of its data stores, then of each active process,
-        subprocess and task that has some."""
+        and of subprocesses and tasks that have some."""
         async with known_run(control, run):
             found = await control.data(run)
         return [ScopeDataModel.model_validate(each, from_attributes=True) for each in found]

@@ -16,7 +16,7 @@ from m2pem.api import Mission, MissionControl, RunId, RunStatus, RunSummary, Run
 from m2pem.api.records import MissionRevised
 from m2pem.api.run_view import Changes
 from m2pem.errors import M2pemError
-from m2pem_plugin_web.live.live_run import command, requirement
+from m2pem_plugin_web.live.live_run import command, debugging, requirement
 from m2pem_plugin_web.live.messages import nested, prompt_record_of, record_of
 
 KEPT_VIEWS = 8
@@ -132,6 +132,8 @@ def with_changes(page: Iterable[StampedRecord], view: RunView) -> Iterable[bytes
                 each: requirement(view.requirements[each]) if each in view.requirements else None
                 for each in changes.requirements
             }
+        if changes.debugging:
+            more["debugging"] = debugging(view)
         if changes.resources:
             more["holders"] = {each: view.holders.get(each) for each in changes.resources}
         if view.status is not status:

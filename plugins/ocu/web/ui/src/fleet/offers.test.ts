@@ -36,6 +36,7 @@ describe("behaviors that can be commanded", () => {
       teams: [],
       fence: null,
       approval_persons: 0,
+      may_be_debugged: true,
     };
     const offers = offersOf(fleet, [
       behavior("goto", ["v1", "m"]),

@@ -62,6 +62,7 @@ export function rows({ vehicles, states = [], payloads = {}, status = {}, silent
     teams: [],
     fence: null,
     approval_persons: 0,
+    may_be_debugged: true,
   };
   const known = Object.fromEntries(states.map((each) => [each.resource, each]));
   return rowsOf({

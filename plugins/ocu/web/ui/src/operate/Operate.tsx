@@ -8,7 +8,8 @@ import { connection, isOver, listen } from "../shared/executive";
 import { loaded } from "../shared/loaded";
 import { fill, strings } from "../strings";
 import type { RunSummary, ServerMessage } from "../shared/types";
-import { operateContext, OperatingProvider, type OperateContext } from "./context";
+import { operateContext, OperatingProvider, useOperating, type OperateContext } from "./context";
+import { elementMenu, useBreakpointKey } from "./debug/menu";
 import { Layout } from "./layout/Layout";
 import { loadReplay, loadStage, pathOf, type Progress, type Source, type Stage } from "./loading";
 import { Player } from "./player/Player";
@@ -26,6 +27,8 @@ import { grouped } from "../shared/format";
 
 const text = strings.operate;
 
+const StopBanner = loaded(() => import("./debug/StopBanner"));
+const ElementMenu = loaded(() => import("./debug/ElementMenu"));
 const ReviseDialog = loaded(() => import("../revise/ReviseDialog"));
 
 export default function Operate({ source }: { source: Source }) {
@@ -96,6 +99,7 @@ function Shown({ source }: { source: Source }) {
       <div class={`operate${stale}`}>
         <h1 class="for-readers">{scene.run || text.run.rehearsal}</h1>
         <RunBar />
+        <Debugged />
         {!isReplay && <PromptPanel />}
         {!isReplay && <IncidentPanel />}
         <Layout key={scene.mode} onSeek={isReplay ? (t) => scene.seek(t) : undefined} />
@@ -104,6 +108,20 @@ function Shown({ source }: { source: Source }) {
         {ended.value && <RunEnd onClose={() => (ended.value = false)} />}
       </div>
     </OperatingProvider>
+  );
+}
+
+/** Where it is stopped to look at it, and the menu at an element. */
+function Debugged() {
+  const { scene } = useOperating();
+  useBreakpointKey();
+  useEffect(() => () => void (elementMenu.value = null), []);
+  const { reached, stepping } = scene.debugging.value ?? {};
+  return (
+    <>
+      {(reached || (stepping && scene.mode === "live")) && <StopBanner />}
+      {elementMenu.value && <ElementMenu />}
+    </>
   );
 }
 

@@ -2,6 +2,7 @@
 // come with each record are merged, so that a replay shows the same as a live run.
 import type {
   Command,
+  Debugging,
   Elements,
   ElementState,
   Prompt,
@@ -21,6 +22,7 @@ export interface RunView {
   commands: Map<string, Command>;
   holders: Map<string, string>;
   requirements: Map<string, Requirement>;
+  debugging: Debugging | null;
 }
 
 /** A view as the server sends it. */
@@ -34,6 +36,7 @@ export interface PageView {
   commands: Record<string, Command>;
   holders: Record<string, string>;
   requirements: Record<string, Requirement>;
+  debugging: Debugging | null;
 }
 
 export const viewOf = ({
@@ -61,6 +64,7 @@ export function emptyView(): RunView {
     commands: new Map(),
     holders: new Map(),
     requirements: new Map(),
+    debugging: null,
   };
 }
 
@@ -95,6 +99,7 @@ export function apply(view: RunView, record: RunRecord): void {
   merge(view.prompts, changes.prompts);
   merge(view.holders, changes.holders);
   merge(view.requirements, changes.requirements);
+  if (changes.debugging !== undefined) view.debugging = changes.debugging;
   view.status = changes.status ?? view.status;
   view.detail = changes.detail ?? view.detail;
 }

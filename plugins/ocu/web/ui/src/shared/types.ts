@@ -95,6 +95,8 @@ export interface Fleet {
   fence: GeoJSON.Geometry | null;
   /** How many persons must approve a mission before it starts. */
   approval_persons: number;
+  /** Whether its runs may be: all of it is simulated, or its file allows that. */
+  may_be_debugged: boolean;
 }
 
 /** What altitudes are above: home, the sea, or the ground. */
@@ -251,6 +253,7 @@ export interface RecordChanges {
   prompts?: Record<string, Prompt | null>;
   holders?: Record<string, string | null>;
   requirements?: Record<string, Requirement | null>;
+  debugging?: Debugging | null;
   status?: RunStatus;
   detail?: string;
 }
@@ -319,6 +322,37 @@ export interface Requirement {
   since: number | null;
   recorded: number | null;
   because: string;
+}
+
+/** Why and where a run was paused that is debugged; "": no element is next. */
+export interface Stop {
+  reason: "breakpoint" | "condition" | "step";
+  condition: string;
+  process: string;
+  element: string;
+}
+
+/** What is around what is next; `instance`: of a loop or multi-instance activity, from 0. */
+export interface Around {
+  process: string;
+  element: string;
+  instance: number | null;
+}
+
+/** `scope`: what sees the data of what is next; 0: nothing is. `within`: from the outside in. */
+export interface Reached extends Stop {
+  scope: number;
+  instance: number | null;
+  within: Around[];
+  resources: string[];
+}
+
+/** Where a run is paused to look at it. `stepping`: it is paused before its next step. */
+export interface Debugging {
+  elements: string[];
+  conditions: string[];
+  stepping: boolean;
+  reached: Reached | null;
 }
 
 export interface GeoPosition {
@@ -399,6 +433,7 @@ export interface Live {
   teams: Record<string, TeamState>;
   commands: Record<string, Command | null>;
   requirements: Record<string, Requirement | null>;
+  debugging: Debugging | null;
   holders: Record<string, string>;
   runs: RunSummary[];
 }

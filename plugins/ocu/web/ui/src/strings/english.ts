@@ -6,6 +6,7 @@ import { requirements, verify } from "./checks";
 import { comments } from "./comments";
 import { compare } from "./compare";
 import { control } from "./control";
+import { debug } from "./debug";
 import { editor } from "./editor";
 import { fleet } from "./fleet";
 import { home } from "./home";
@@ -48,6 +49,7 @@ export const english = {
   begin,
   operate,
   monitors,
+  debug,
   plots,
   fleet,
   cameras,

@@ -6,6 +6,7 @@ import { remember, remembered } from "../../shared/memory";
 import { TabList } from "../../shared/Tabs";
 import { useUniqueId } from "../../shared/uniqueId";
 import { useOperating } from "../context";
+import { openMenu } from "../debug/menu";
 import { Pane } from "../layout/Pane";
 import { DiagramTools } from "./DiagramTools";
 import { Drawings } from "./drawings";
@@ -18,7 +19,8 @@ import "./diagram.css";
 const text = strings.operate.diagram;
 
 export function DiagramPane() {
-  const { scene, mission, selected, surrounded } = useOperating();
+  const context = useOperating();
+  const { scene, mission, selected, surrounded } = context;
   const host = useRef<HTMLDivElement>(null);
   const drawings = useRef<Drawings>();
   const panel = useUniqueId();
@@ -33,6 +35,10 @@ export function DiagramPane() {
     const made = new Drawings(host.current!, mission, scene, {
       chosen: (process, element) => {
         selected.value = { process, element, show: false };
+      },
+      menu: (process, element, x, y) => {
+        selected.value = { process, element, show: false };
+        openMenu(context, { process, element }, x, y);
       },
       wentTo: (view) => {
         if (view.key === shown.value) return;

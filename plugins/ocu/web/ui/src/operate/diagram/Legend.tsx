@@ -1,6 +1,7 @@
 // What the colours mean.
 import { strings } from "../../strings";
 import { useOperating } from "../context";
+import { BREAKPOINT, NEXT } from "../debug/breakpoints";
 import { isViolated, VIOLATION } from "../requirements/violations";
 import { css, palette, SIGNS } from "./colours";
 
@@ -9,6 +10,7 @@ const text = strings.operate.diagram;
 export function Legend() {
   const { scene } = useOperating();
   const violates = Object.values(scene.requirements.value).some(isViolated);
+  const { elements = [], reached } = scene.debugging.value ?? {};
   const colours = palette.value;
   return (
     <ul class="legend" aria-label={text.legend}>
@@ -34,6 +36,20 @@ export function Legend() {
           {strings.monitors.legend}
         </li>
       )}
+      {elements.length > 0 && <Sign sign={BREAKPOINT} means={strings.debug.legend} />}
+      {reached?.element && <Sign sign={NEXT} means={strings.debug.legendNext} />}
     </ul>
+  );
+}
+
+/** Of a run that is debugged. */
+function Sign({ sign, means }: { sign: string; means: string }) {
+  return (
+    <li>
+      <i class="legend-breakpoint" aria-hidden="true">
+        {sign}
+      </i>
+      {means}
+    </li>
   );
 }

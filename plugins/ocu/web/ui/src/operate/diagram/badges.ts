@@ -3,6 +3,7 @@
 // second: people read no faster.
 import { nameSymbol } from "../../shared/elementNames";
 import type { ElementState } from "../../shared/types";
+import { markInWords, signOf, type Marks } from "../debug/breakpoints";
 import { lookOf, SIGNS } from "./colours";
 import type { Outline } from "./painter";
 import { VIOLATION, type Violations } from "../requirements/violations";
@@ -24,7 +25,16 @@ interface Badge {
   shown: string;
 }
 
-type Corner = "hits" | "tokens" | "sign" | "requirement";
+type Corner = "hits" | "tokens" | "sign" | "requirement" | "breakpoint";
+
+/** Where it is, in widths and heights of the element. */
+const AT: Record<Corner, readonly [number, number]> = {
+  hits: [1, 0],
+  tokens: [1, 1],
+  sign: [0, 0],
+  requirement: [0, 1],
+  breakpoint: [0, 0.5],
+};
 
 export interface Badged {
   key: string;
@@ -45,6 +55,7 @@ export class Badges {
   private readonly states = new Map<string, ElementState>();
   /** The violated requirements that elements are in. */
   private violations: Violations = new Map();
+  private marks: Marks = new Map();
   private wrote = 0;
   private size = "";
   private timer: ReturnType<typeof setTimeout> | undefined;
@@ -56,9 +67,20 @@ export class Badges {
 
   /** `all`: what may have badges. */
   violate(all: ReadonlyMap<string, Badged>, violations: Violations): void {
-    const changed = new Set([...this.violations.keys(), ...violations.keys()]);
+    const changed = [...this.violations.keys(), ...violations.keys()];
     this.violations = violations;
-    for (const key of changed) {
+    this.renewAll(all, changed);
+  }
+
+  /** `all`: what may have badges. */
+  mark(all: ReadonlyMap<string, Badged>, marks: Marks): void {
+    const changed = [...this.marks.keys(), ...marks.keys()];
+    this.marks = marks;
+    this.renewAll(all, changed);
+  }
+
+  private renewAll(all: ReadonlyMap<string, Badged>, keys: readonly string[]): void {
+    for (const key of new Set(keys)) {
       const badged = all.get(key);
       if (badged) this.soon(badged);
     }
@@ -87,7 +109,8 @@ export class Badges {
     for (const { badged, state } of this.waiting.values()) {
       const { key, name, gfx, outline } = badged;
       const violated = this.violations.get(key) ?? [];
-      const said = [name, ...statesOf(state), violationOf(violated)];
+      const mark = this.marks.get(key);
+      const said = [name, ...statesOf(state), violationOf(violated), markInWords(mark)];
       nameSymbol(gfx, said.filter(Boolean).join(", "));
       const { hits = 0, active = 0 } = state ?? {};
       this.write(`${key}\nhits`, gfx, outline, "hits", hits > 1 ? short(hits) : "");
@@ -95,6 +118,7 @@ export class Badges {
       this.write(`${key}\nsign`, gfx, outline, "sign", state ? SIGNS[lookOf(state)] : "");
       const sign = violated.length > 0 ? VIOLATION : "";
       this.write(`${key}\nrequirement`, gfx, outline, "requirement", sign);
+      this.write(`${key}\nbreakpoint`, gfx, outline, "breakpoint", signOf(mark));
     }
     this.waiting.clear();
   }
@@ -114,8 +138,9 @@ export class Badges {
     badge.group.setAttribute("display", text === "" ? "none" : "inline");
     if (text === "") return;
     const width = Math.max(HEIGHT, text.length * DIGIT + 9);
-    const x = corner === "sign" || corner === "requirement" ? 0 : outline.width;
-    const y = corner === "tokens" || corner === "requirement" ? outline.height : 0;
+    const [right, down] = AT[corner];
+    const x = right * outline.width;
+    const y = down * outline.height;
     badge.group.setAttribute("transform", `translate(${x} ${y})`);
     badge.box.setAttribute("x", String(-width / 2));
     badge.box.setAttribute("width", String(width));

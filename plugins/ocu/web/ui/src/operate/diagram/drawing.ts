@@ -10,6 +10,7 @@ import type { ElementState } from "../../shared/types";
 import { strings } from "../../strings";
 import { processOf, type Element } from "../mission/moddle";
 import { keyIn, keyOf, qualified } from "../mission/names";
+import type { Marks } from "../debug/breakpoints";
 import type { Violations } from "../requirements/violations";
 import { Badges, type Badged } from "./badges";
 import { lookOf, type Look, type Palette } from "./colours";
@@ -25,6 +26,8 @@ interface Figure extends Badged {
 
 export interface DrawingListener {
   chosen(process: string, element: string): void;
+  /** The user asked for the menu at an element, at a place in the window. */
+  menu(process: string, element: string, x: number, y: number): void;
   /** The user went into or out of a collapsed subprocess. */
   wentTo(root: string): void;
 }
@@ -71,6 +74,17 @@ export class Drawing {
       if (!about?.$instanceOf("bpmn:FlowNode")) return;
       listener.chosen(qualified(qualifier, processOf(about)), qualified(qualifier, about.id));
     });
+    bus.on<{ element: ElementLike; originalEvent: MouseEvent }>(
+      "element.contextmenu",
+      ({ element, originalEvent }) => {
+        const about = element.businessObject as Element | undefined;
+        if (!about?.$instanceOf("bpmn:FlowNode")) return;
+        originalEvent.preventDefault();
+        const { clientX, clientY } = originalEvent;
+        const process = qualified(qualifier, processOf(about));
+        listener.menu(process, qualified(qualifier, about.id), clientX, clientY);
+      },
+    );
     this.observer = new ResizeObserver(() => this.resized());
     this.observer.observe(host);
   }
@@ -161,6 +175,11 @@ export class Drawing {
   /** Mark the elements of requirements that are violated. */
   violate(violations: Violations): void {
     this.badges.violate(this.figures, violations);
+  }
+
+  /** Mark the elements with breakpoints, and the one before which the run is stopped. */
+  debug(marks: Marks): void {
+    this.badges.mark(this.figures, marks);
   }
 
   /** Draw a line around elements, beside that around the one that is selected. */

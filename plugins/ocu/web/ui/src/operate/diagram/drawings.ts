@@ -3,6 +3,7 @@ import type { MissionModel } from "../mission/missionModel";
 import type { View } from "../mission/views";
 import type { Place } from "../context";
 import { keyOf } from "../mission/names";
+import { marksIn, type Marks } from "../debug/breakpoints";
 import { violationsIn, type Violations } from "../requirements/violations";
 import type { ElementChange } from "../scene/elementBoard";
 import type { Scene } from "../scene/scene";
@@ -11,6 +12,7 @@ import { Drawing } from "./drawing";
 
 export interface DrawingsListener {
   chosen(process: string, element: string): void;
+  menu(process: string, element: string, x: number, y: number): void;
   wentTo(view: View): void;
 }
 
@@ -19,6 +21,7 @@ export class Drawings {
   private readonly made = new Map<string, Drawing>();
   private readonly stops: (() => void)[] = [];
   private violations: Violations = new Map();
+  private marks: Marks = new Map();
   private surrounded: readonly string[] = [];
   private shown: View | undefined;
   private over = false;
@@ -39,6 +42,10 @@ export class Drawings {
       scene.requirements.subscribe((requirements) => {
         this.violations = violationsIn(requirements, mission);
         for (const drawing of this.made.values()) drawing.violate(this.violations);
+      }),
+      scene.debugging.subscribe((debugging) => {
+        this.marks = marksIn(debugging, mission);
+        for (const drawing of this.made.values()) drawing.debug(this.marks);
       }),
     );
   }
@@ -101,6 +108,7 @@ export class Drawings {
     const file = this.mission.files[view.file]!;
     const drawing = await Drawing.open(box, file, view.diagram, palette.value, fading_ms.value, {
       chosen: this.listener.chosen,
+      menu: this.listener.menu,
       wentTo: (root) => {
         const found = this.mission.views.find((each) => each.root === root && idOf(each) === id);
         if (found) this.listener.wentTo(found);
@@ -112,6 +120,7 @@ export class Drawings {
       drawing.set(process, element, state, false, this.age_ms(state.last));
     }
     drawing.violate(this.violations);
+    drawing.debug(this.marks);
     drawing.surround(this.surrounded);
     return drawing;
   }

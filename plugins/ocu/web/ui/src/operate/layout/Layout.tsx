@@ -14,7 +14,7 @@ import { MapPane } from "../map/MapPane";
 import { OutlinePane } from "../outline/OutlinePane";
 import { plotsShown } from "../plots/shown";
 import { RequirementsTitle } from "../requirements/RequirementsTitle";
-import { lowerTab, narrowTab, REQUIREMENTS } from "./chosenTabs";
+import { DEBUGGING, lowerTab, narrowTab, REQUIREMENTS } from "./chosenTabs";
 import { Pane } from "./Pane";
 import { TimelinePane } from "../timeline/TimelinePane";
 import { VehiclesPane } from "../vehicles/VehiclesPane";
@@ -26,6 +26,7 @@ const kinds = strings.operate.map.kinds;
 const Cameras = loaded(() => import("../cameras/CamerasPane"));
 const Detections = loaded(() => import("../detections/DetectionsPane"));
 const Requirements = loaded(() => import("../requirements/RequirementsPane"));
+const Debugging = loaded(() => import("../debug/DebugPane"));
 const Plots = loaded(() => import("../plots/PlotsPane"));
 
 const WIDE = "(width >= 1180px)";
@@ -77,11 +78,11 @@ function Wide({ onSeek }: Parts) {
   );
 }
 
-/** The log; beside it what the run is monitored for, if there is anything. */
+/** The log; beside it what the run is monitored for, and its breakpoints, if there is anything. */
 function LogPanes() {
-  const requirements = useRequirements();
-  if (!requirements) return <LogPane />;
-  return <Tabs label={text.log} tabs={[LOG, requirements]} chosen={lowerTab} />;
+  const others = [useRequirements(), useDebugging()].filter((tab) => tab !== undefined);
+  if (others.length === 0) return <LogPane />;
+  return <Tabs label={text.log} tabs={[LOG, ...others]} chosen={lowerTab} />;
 }
 
 const LOG: Tab = { id: "log", title: text.log, render: () => <LogPane /> };
@@ -92,6 +93,24 @@ function useRequirements(): Tab | undefined {
   const all = Object.values(scene.requirements.value);
   if (all.length === 0) return undefined;
   return { id: REQUIREMENTS, title: <RequirementsTitle />, render: () => <Requirements /> };
+}
+
+/** The tab of breakpoints and data; undefined: the fleet allows none, or the run was not stopped. */
+function useDebugging(): Tab | undefined {
+  const { scene, fleet } = useOperating();
+  const counted = useComputed(() => {
+    const { elements = [], conditions = [] } = scene.debugging.value ?? {};
+    return elements.length + conditions.length;
+  });
+  const there = scene.mode === "live" ? fleet.may_be_debugged : scene.stops.length > 0;
+  if (!there) return undefined;
+  const { stops, title, titleCount } = strings.debug;
+  const count = scene.mode === "live" ? counted.value : scene.stops.length;
+  return {
+    id: DEBUGGING,
+    title: count === 0 ? title : fill(scene.mode === "live" ? titleCount : stops, { count }),
+    render: () => <Debugging />,
+  };
 }
 
 /** The list of detections is beside the time line, which has the button that shows it. */
@@ -140,6 +159,7 @@ function Narrow({ onSeek }: Parts) {
   const cameras = useCameras();
   const count = useDetectionCount();
   const requirements = useRequirements();
+  const debugging = useDebugging();
   const detections: Tab = {
     id: "detections",
     title: fill(strings.operate.detections.title, { count }),
@@ -165,6 +185,7 @@ function Narrow({ onSeek }: Parts) {
           ...(count > 0 ? [detections] : []),
           { id: "plots", title: text.plots, render: () => <Plots onSeek={onSeek} /> },
           ...(requirements ? [requirements] : []),
+          ...(debugging ? [debugging] : []),
           LOG,
         ]}
       />

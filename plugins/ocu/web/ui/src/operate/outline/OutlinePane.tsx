@@ -7,6 +7,9 @@ import type { ElementState } from "../../shared/types";
 import { lookOf, SIGNS, type Look } from "../diagram/colours";
 import { statesOf, violationOf, visitsOf } from "../diagram/spoken";
 import { useOperating } from "../context";
+import { markInWords, marksIn, signOf, type Mark } from "../debug/breakpoints";
+import { isBreakpointKey, openMenu } from "../debug/menu";
+import { turn as turnBreakpoint } from "../debug/setting";
 import { Pane } from "../layout/Pane";
 import type { MissionNode } from "../mission/missionModel";
 import { keyOf } from "../mission/names";
@@ -20,7 +23,8 @@ const text = strings.operate.outline;
 const ROW_SIGNS: Record<Look, string> = { ...SIGNS, active: "●", done: "✓" };
 
 export function OutlinePane() {
-  const { scene, mission, selected } = useOperating();
+  const shown = useOperating();
+  const { scene, mission, selected } = shown;
   const folded = useSignal<ReadonlySet<string>>(new Set());
   const wanted = useSignal("");
   const current = useSignal("");
@@ -28,6 +32,7 @@ export function OutlinePane() {
   scene.elements.slow.value;
 
   const violations = violationsIn(scene.requirements.value, mission);
+  const marks = marksIn(scene.debugging.value, mission);
   const rows = rowsOf(mission.trees, folded.value, wanted.value);
   const chosen = selected.value ? keyOf(selected.value.process, selected.value.element) : "";
   const reached = rows.some(({ key }) => key === current.value) ? current.value : rows[0]?.key;
@@ -59,11 +64,26 @@ export function OutlinePane() {
       choose(row.node);
       return;
     }
+    if (isBreakpointKey(event) && row.node.type !== "Process") {
+      event.stopPropagation();
+      turnBreakpoint(shown, row.node.id);
+      return;
+    }
     const move = moved(rows, row.key, event.key);
     if (!move) return;
     event.preventDefault();
     if (move.fold !== undefined) turn(row.key, move.fold);
     else focus(move.to);
+  };
+
+  const showMenu = (event: MouseEvent, { node, key }: Row) => {
+    if (scene.mode !== "live" || node.type === "Process") return;
+    event.preventDefault();
+    current.value = key;
+    const { left, bottom } = (event.currentTarget as HTMLElement).getBoundingClientRect();
+    // A key has no place.
+    const [x, y] = event.button === 2 ? [event.clientX, event.clientY] : [left + 24, bottom];
+    openMenu(shown, { process: node.process, element: node.id }, x, y);
   };
 
   return (
@@ -86,6 +106,7 @@ export function OutlinePane() {
             row={row}
             state={scene.elements.get(row.node.process, row.node.id)}
             violated={violations.get(keyOf(row.node.process, row.node.id)) ?? []}
+            mark={marks.get(keyOf(row.node.process, row.node.id))}
             selected={row.key === chosen}
             reached={row.key === reached}
             onKeyDown={(event) => press(event, row)}
@@ -93,6 +114,7 @@ export function OutlinePane() {
               current.value = row.key;
               choose(row.node);
             }}
+            onMenu={(event) => showMenu(event, row)}
             onTurn={() => turn(row.key, row.open === true)}
           />
         ))}
@@ -106,14 +128,17 @@ interface ItemProps {
   state: ElementState | undefined;
   /** The requirements that are violated, and about it. */
   violated: readonly string[];
+  mark: Mark | undefined;
   selected: boolean;
   reached: boolean;
   onKeyDown: (event: KeyboardEvent) => void;
   onClick: () => void;
+  onMenu: (event: MouseEvent) => void;
   onTurn: () => void;
 }
 
-function Item({ row, state, violated, selected, reached, onKeyDown, onClick, onTurn }: ItemProps) {
+function Item(props: ItemProps) {
+  const { row, state, violated, mark, selected, reached, onKeyDown, onClick, onMenu, onTurn } = props;
   const { node, level, open } = row;
   const look: Look = state ? lookOf(state) : "idle";
   const isProcess = node.type === "Process";
@@ -123,6 +148,7 @@ function Item({ row, state, violated, selected, reached, onKeyDown, onClick, onT
     node.calls && fill(text.calls, { process: node.calls }),
     ...(isProcess ? visitsOf(state) : statesOf(state)),
     violationOf(violated),
+    markInWords(mark),
   ];
   return (
     <li
@@ -136,6 +162,7 @@ function Item({ row, state, violated, selected, reached, onKeyDown, onClick, onT
       tabIndex={reached ? 0 : -1}
       onKeyDown={onKeyDown}
       onClick={onClick}
+      onContextMenu={onMenu}
     >
       <span
         class="fold"
@@ -157,6 +184,11 @@ function Item({ row, state, violated, selected, reached, onKeyDown, onClick, onT
       {violated.length > 0 && (
         <i class="violates" aria-hidden="true" title={violationOf(violated)}>
           {VIOLATION}
+        </i>
+      )}
+      {mark && (
+        <i class="marked" aria-hidden="true" title={markInWords(mark)}>
+          {signOf(mark)}
         </i>
       )}
       {state && state.hits > 0 && <span class="hits" data-hits={state.hits} />}

@@ -4,6 +4,7 @@ import { get } from "../../shared/api";
 import * as executive from "../../shared/executive";
 import type {
   Command,
+  Debugging,
   GeoPosition,
   RunRecord,
   RunStatus,
@@ -44,6 +45,8 @@ export class LiveScene implements Scene {
   readonly events = signal(0);
   readonly commands = signal<Record<string, Command>>({});
   readonly requirements = signal<Requirements>({});
+  readonly debugging = signal<Debugging | null>(null);
+  readonly stops = [];
   readonly prompts = executive.prompts;
   readonly holders = executive.holders;
   readonly vehicles = executive.vehicles;
@@ -182,6 +185,7 @@ export class LiveScene implements Scene {
       this.pace.value = snapshot.speed || 1;
       this.commands.value = present(snapshot.commands);
       this.requirements.value = present(snapshot.requirements);
+      this.debugging.value = snapshot.debugging;
       this.elements.replace(snapshot.elements);
     });
     // After a break, what was missed comes with the next records that are pushed.
@@ -195,6 +199,7 @@ export class LiveScene implements Scene {
     if (frame.requirements) {
       this.requirements.value = present({ ...this.requirements.value, ...frame.requirements });
     }
+    if (frame.debugging !== undefined) this.debugging.value = frame.debugging;
     if (!frame.commands) return;
     this.commands.value = present({ ...this.commands.value, ...frame.commands });
     this.feed.settle(this.commands.value, frame.t);

@@ -27,7 +27,7 @@ function replay(page = async (number: number) => pageOf(number)) {
     rows: [],
     spans: [],
     thinned: true,
-    notable: [],
+    notable: [], stops: [],
   };
   const spans = vi.fn(async () => []);
   const scene = new ReplayScene("r1", {} as RunSummary, head, { page, spans });
@@ -65,6 +65,19 @@ describe("replay scene", () => {
       await Promise.resolve();
     }
     expect(scene.events.value).toBe(RECORDS.filter(({ t }) => t <= 1000).length);
+    scene.dispose();
+  });
+
+  it("shows the run as it was after a record of any page", async () => {
+    const { scene } = replay();
+    scene.seek(0);
+    scene.play();
+    for (const count of [3 * PAGE + 5, 2]) {
+      scene.seekRecord(count);
+      await settle(scene);
+      expect(scene.events.value).toBe(count);
+      expect(scene.playing.value).toBe(false);
+    }
     scene.dispose();
   });
 

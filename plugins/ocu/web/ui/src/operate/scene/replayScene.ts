@@ -6,6 +6,7 @@ import type { Bars, Span } from "../../records/spans";
 import type { RunView } from "../../records/runView";
 import type {
   Command,
+  Debugging,
   GeoPosition,
   PayloadState,
   Prompt,
@@ -19,7 +20,7 @@ import { historyOf, type TelemetryHistory } from "../plots/history";
 import type { Range } from "../plots/series";
 import { detectionsOf, NO_DETECTIONS, type Detections } from "./detections";
 import { ElementBoard } from "./elementBoard";
-import { TRAIL_POINTS, type LogPage, type Requirements, type Scene } from "./scene";
+import { TRAIL_POINTS, type LogPage, type RecordedStop, type Requirements, type Scene } from "./scene";
 import { NO_TELEMETRY, TelemetryTrack, type Telemetry } from "./telemetryTrack";
 
 export const SLOWEST = 0.25;
@@ -42,6 +43,7 @@ export interface ReplayHead extends ReelHead {
   spans: readonly Span[];
   thinned: boolean;
   notable: readonly RunRecord[];
+  stops: readonly RecordedStop[];
 }
 
 export interface ReplayReader {
@@ -66,6 +68,7 @@ export class ReplayScene implements Scene {
   readonly prompts = signal<Prompt[]>([]);
   readonly holders = signal<Record<string, string>>({});
   readonly requirements = signal<Requirements>({});
+  readonly debugging = signal<Debugging | null>(null);
   readonly vehicles = signal<Record<string, VehicleState>>({});
   readonly payloads = signal<Record<string, PayloadState>>({});
   readonly teams = signal<Record<string, TeamState>>({});
@@ -165,6 +168,10 @@ export class ReplayScene implements Scene {
     return this.head.notable;
   }
 
+  get stops(): readonly RecordedStop[] {
+    return this.head.stops;
+  }
+
   /** All that happened up to and at this time; shown at once if its records are here. */
   seek(t: number): void {
     this.position_s = Math.max(0, Math.min(t, this.end.value));
@@ -181,9 +188,12 @@ export class ReplayScene implements Scene {
 
   /** One record on, or back. */
   step(by: 1 | -1): void {
+    this.seekRecord((this.target.count ?? this.shown?.count ?? 0) + by);
+  }
+
+  seekRecord(wanted: number): void {
     this.pause();
-    const from = this.target.count ?? this.shown?.count ?? 0;
-    const count = Math.max(0, Math.min(from + by, this.reel.length));
+    const count = Math.max(0, Math.min(wanted, this.reel.length));
     this.show({ page: this.reel.pageOf(count), count });
     this.tick();
     this.jumps.value += 1;
@@ -320,6 +330,7 @@ export class ReplayScene implements Scene {
         before.length === view.requirements.size &&
         before.every(([id, each]) => view.requirements.get(id) === each);
       if (!same) this.requirements.value = Object.fromEntries(view.requirements);
+      this.debugging.value = view.debugging;
       this.status.value = view.status;
     });
   }

@@ -6,6 +6,7 @@ import type { Range } from "../plots/series";
 import type { TelemetryHistory } from "../plots/history";
 import type {
   Command,
+  Debugging,
   GeoPosition,
   PayloadState,
   Prompt,
@@ -13,6 +14,7 @@ import type {
   RunRecord,
   RunStatus,
   RunSummary,
+  Stop,
   TeamState,
   VehicleState,
 } from "../../shared/types";
@@ -23,6 +25,12 @@ import type { ElementBoard } from "./elementBoard";
 export const TRAIL_POINTS = 2000;
 
 export type Requirements = Readonly<Record<string, Requirement>>;
+
+/** A stop of a run that is over. `seq`: its record; `t`: mission time in seconds. */
+export interface RecordedStop extends Stop {
+  seq: number;
+  t: number;
+}
 
 export interface LogPage {
   records: readonly RunRecord[];
@@ -53,6 +61,10 @@ export interface Scene {
   readonly holders: ReadonlySignal<Record<string, string>>;
   /** What the run is monitored for, as it is known now, by id. */
   readonly requirements: ReadonlySignal<Requirements>;
+  /** Where the run is paused to look at it; null: nowhere. */
+  readonly debugging: ReadonlySignal<Debugging | null>;
+  /** Where it was, of what is over. */
+  readonly stops: readonly RecordedStop[];
   readonly vehicles: ReadonlySignal<Record<string, VehicleState>>;
   readonly payloads: ReadonlySignal<Record<string, PayloadState>>;
   readonly teams: ReadonlySignal<Record<string, TeamState>>;
@@ -85,5 +97,7 @@ export interface Scene {
   readonly end: ReadonlySignal<number>;
   /** Show another moment, of what is over. */
   seek?(t: number): void;
+  /** Show it as it was after so many records, of what is over. */
+  seekRecord?(count: number): void;
   dispose(): void;
 }

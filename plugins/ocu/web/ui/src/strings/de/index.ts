@@ -22,6 +22,7 @@ import { requirements, verify } from "./checks";
 import { comments } from "./comments";
 import { compare } from "./compare";
 import { control } from "./control";
+import { debug } from "./debug";
 import { editor } from "./editor";
 import { fleet } from "./fleet";
 import { home } from "./home";
@@ -64,6 +65,7 @@ export const german: Translation<English> = {
   begin,
   operate,
   monitors,
+  debug,
   plots,
   fleet,
   cameras,
