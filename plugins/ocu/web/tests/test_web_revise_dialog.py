@@ -13,6 +13,24 @@ FIRST = scenarios.question()
 NAMED = FIRST.replace(b'id="Question"', b'id="Question" name="Shall it go on?"')
 ASKED_AGAIN = scenarios.question("Really go on?", ("continue", "abort", "later"))
 GONE = FIRST.replace(b'"Question"', b'"Another"')
+TWO = scenarios.two_questions()
+ONE = TWO.replace(b'"Question2"', b'"Another"')
+
+HANDLER = FIRST.partition(b"<userTask")[2].partition(b"</userTask>")[0]
+"""What is in the question of the mission."""
+
+HANDLED = FIRST.replace(
+    b'<endEvent id="End"/>',
+    b"""<endEvent id="End"/><subProcess id="Handler" triggeredByEvent="true">
+    <startEvent id="Soon" isInterrupting="false"><timerEventDefinition id="After">
+    <timeDuration>PT0.1S</timeDuration></timerEventDefinition></startEvent>
+    <userTask"""
+    + HANDLER.replace(b"Question", b"Handle").replace(b"Go on?", b"What now?")
+    + b"""</userTask><endEvent id="Handled"/>
+    <sequenceFlow id="h1" sourceRef="Soon" targetRef="Handle"/>
+    <sequenceFlow id="h2" sourceRef="Handle" targetRef="Handled"/></subProcess>""",
+)
+"""An event subprocess asks, too: a token in it has no place without it."""
 
 
 async def asked(desk: Desk, page: Page | None = None) -> tuple[Page, str]:
@@ -82,6 +100,97 @@ async def test_a_token_without_a_place_is_moved_by_a_choice(desk: Desk) -> None:
     await expect(dialog).to_have_count(0)
     await expect(page.locator('[data-element-id="Another"]').first).to_be_visible()
     assert '"Another"' in await version_of(desk, run)
+
+
+async def test_a_token_without_a_place_ends_by_a_choice(desk: Desk) -> None:
+    page, run = await asked(desk)
+    await page.get_by_role("button", name="Revise…").click()
+    dialog = page.get_by_role("dialog", name=f"Revise {run}")
+    await dialog.get_by_label("Mission").select_option("gone")
+    await dialog.get_by_label("Token on Question").select_option("ends")
+    becomes = dialog.get_by_role("region", name="What becomes of the run")
+    await expect(becomes).to_contain_text("the token on user task Question ends")
+    await expect(becomes).to_contain_text("cancelled: prompt")
+    await dialog.get_by_role("button", name=f"Revise {run}").click()
+    await expect(dialog).to_have_count(0)
+    await desk.until(f"/api/runs/{run}", lambda said: said["status"] == "completed")
+
+
+async def test_a_token_that_can_only_end_is_offered_that_alone(desk: Desk) -> None:
+    (desk.executive.missions / "handled.bpmn").write_bytes(HANDLED)
+    (desk.executive.missions / "unhandled.bpmn").write_bytes(FIRST)
+    page = desk.page
+    run = str((await desk.ask("POST", "/api/runs", {"mission": "handled"}))["run"])
+    await page.goto(f"{desk.executive.origin}/runs/{run}")
+    await expect(page.get_by_role("log")).to_contain_text("Handle asks: What now?")
+    await page.get_by_role("button", name="Revise…").click()
+    dialog = page.get_by_role("dialog", name=f"Revise {run}")
+    await dialog.get_by_label("Mission").select_option("unhandled")
+    await expect(dialog.get_by_role("region", name="Refused")).to_contain_text("it can end")
+    choice = dialog.get_by_label("Token on Handler")
+    await expect(choice.locator("option")).to_have_text(["stays: no choice yet", "ends"])
+    await choice.select_option("ends")
+    await dialog.get_by_role("button", name=f"Revise {run}").click()
+    await expect(dialog).to_have_count(0)
+    prompts = [each for each in await desk.ask("GET", "/api/prompts") if each["run"] == run]
+    assert [each["element"] for each in prompts] == ["Question"]
+    assert '"Handler"' not in await version_of(desk, run)
+
+
+async def test_a_version_with_which_the_mission_cannot_complete_is_confirmed(desk: Desk) -> None:
+    for name, source in (("two", TWO), ("one", ONE)):
+        (desk.executive.missions / f"{name}.bpmn").write_bytes(source)
+    page = desk.page
+    run = str((await desk.ask("POST", "/api/runs", {"mission": "two"}))["run"])
+    await page.goto(f"{desk.executive.origin}/runs/{run}")
+    await page.get_by_role("button", name="Revise…").click()
+    dialog = page.get_by_role("dialog", name=f"Revise {run}")
+    await dialog.get_by_label("Mission").select_option("one")
+    await dialog.get_by_label("Token on Question2").select_option("ends")
+    follows = dialog.get_by_role("region", name="What follows")
+    await expect(follows).to_contain_text("cannot complete")
+    await expect(follows).to_contain_text("Join")
+    act = dialog.get_by_role("button", name=f"Revise {run}")
+    await expect(act).to_be_disabled()
+    confirmed = dialog.get_by_label("After it the mission cannot complete.")
+    await confirmed.check()
+    # Another plan is confirmed for itself.
+    await dialog.get_by_label("Token on Question2").select_option("Another")
+    await expect(follows).to_contain_text("completes")
+    await dialog.get_by_label("Token on Question2").select_option("ends")
+    await expect(confirmed).not_to_be_checked()
+    await expect(act).to_be_disabled()
+    await confirmed.check()
+    await act.click()
+    await expect(dialog).to_have_count(0)
+    assert '"Another"' in await version_of(desk, run)
+
+
+async def test_the_dialog_is_german_for_a_browser_that_is(desk: Desk) -> None:
+    _, run = await asked(desk)
+    browser = desk.page.context.browser
+    assert browser is not None
+    async with signed_in(browser, desk.executive, "anna", language="de-DE") as there:
+        page = there.page
+        await page.goto(f"{desk.executive.origin}/runs/{run}")
+        await page.get_by_role("button", name="Ändern…").click()
+        dialog = page.get_by_role("dialog", name=f"{run} ändern")
+        await dialog.get_by_label("Mission").select_option("gone")
+        await expect(dialog.get_by_role("region", name="Abgelehnt")).to_be_visible()
+        await dialog.get_by_label("Token auf Question").select_option("endet")
+        await expect(dialog.get_by_role("region", name="Was folgt")).to_be_visible()
+        becomes = dialog.get_by_role("region", name="Was aus dem Lauf wird")
+        await expect(becomes.locator(".rev-kind")).to_have_text(["endet"])
+        await dialog.get_by_role("button", name="Beide Diagramme zeigen…").click()
+        diagrams = page.get_by_role("dialog", name=f"{run}: jetzt, und nach der Änderung")
+        await expect(diagrams.get_by_role("status")).to_contain_text("entfernt")
+        await page.keyboard.press("Escape")
+        found = Accessibility(page)
+        await found.look("a plan in German", ".dialog")
+        found.assert_well()
+        await dialog.get_by_role("button", name=f"{run} ändern").click()
+        await expect(dialog).to_have_count(0)
+        await desk.until(f"/api/runs/{run}", lambda said: said["status"] == "completed")
 
 
 async def test_a_plan_fits_on_a_phone(desk: Desk) -> None:

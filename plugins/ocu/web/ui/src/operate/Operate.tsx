@@ -2,16 +2,24 @@
 import { useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { ConfirmOrder } from "../fleet/ConfirmOrder";
-import { revising } from "../revise/revising";
+import { listingVersions, revising } from "../revise/revising";
 import { ApiError, get } from "../shared/api";
-import { connection, isOver, listen } from "../shared/executive";
+import { activeRuns, connection, isOver, listen } from "../shared/executive";
 import { loaded } from "../shared/loaded";
 import { fill, strings } from "../strings";
 import type { RunSummary, ServerMessage } from "../shared/types";
 import { operateContext, OperatingProvider, useOperating, type OperateContext } from "./context";
 import { elementMenu, useBreakpointKey } from "./debug/menu";
 import { Layout } from "./layout/Layout";
-import { loadReplay, loadStage, pathOf, type Progress, type Source, type Stage } from "./loading";
+import {
+  isOutdated,
+  loadReplay,
+  loadStage,
+  pathOf,
+  type Progress,
+  type Source,
+  type Stage,
+} from "./loading";
 import { Player } from "./player/Player";
 import { positionInAddress } from "./player/address";
 import { IncidentPanel } from "./prompts/IncidentPanel";
@@ -30,14 +38,29 @@ const text = strings.operate;
 const StopBanner = loaded(() => import("./debug/StopBanner"));
 const ElementMenu = loaded(() => import("./debug/ElementMenu"));
 const ReviseDialog = loaded(() => import("../revise/ReviseDialog"));
+const RunVersions = loaded(() => import("../revise/RunVersions"));
 
 export default function Operate({ source }: { source: Source }) {
-  useEffect(() => () => void (revising.value = ""), []);
+  useEffect(
+    () => () => {
+      revising.value = null;
+      listingVersions.value = "";
+    },
+    [],
+  );
+  const listed = listingVersions.value;
   return (
     <>
       <Shown source={source} />
       {revising.value && (
-        <ReviseDialog run={revising.value} onClose={() => (revising.value = "")} />
+        <ReviseDialog {...revising.value} onClose={() => (revising.value = null)} />
+      )}
+      {listed && (
+        <RunVersions
+          run={listed}
+          isLive={activeRuns.value.some(({ run }) => run === listed)}
+          onClose={() => (listingVersions.value = "")}
+        />
       )}
     </>
   );
@@ -50,6 +73,9 @@ function Shown({ source }: { source: Source }) {
   const opened = useSignal<Opened | null>(null);
   const ended = useSignal(false);
   const opening = useRef<Opening>();
+  const stage = useRef<Stage | null>(null);
+  /** The record of the last revision that is known here. */
+  const revisedAt = useRef(0);
 
   const open = (known?: Stage) => {
     opening.current?.close();
@@ -58,10 +84,18 @@ function Shown({ source }: { source: Source }) {
     opening.current = new Opening(source, (found) => (opened.value = found), known);
     opening.current
       .open((parts, hasEnded) => {
+        stage.current = parts;
         context.value = operateContext({ ...parts, replay: () => open(parts) });
         ended.value = hasEnded;
       })
       .catch((error: unknown) => (problem.value = problemOf(error, source)));
+  };
+
+  /** The diagram is that of the version which holds now, and so are the names. */
+  const renew = async () => {
+    const [before, known] = [opening.current, stage.current];
+    if (known && !(await isOutdated(source, known))) return;
+    if (opening.current === before) open();
   };
 
   useEffect(() => {
@@ -71,12 +105,17 @@ function Shown({ source }: { source: Source }) {
         source.kind === "run" && message.type === "run" && message.run.run === source.run;
       const live = context.peek()?.scene.mode === "live";
       if (here && isOver(message.run) && live) ended.value = true;
-      // The diagram is that of the version which holds now, and so are the names.
-      if (live && source.kind === "run" && isRevised(message, source.run)) open();
+      if (!live || source.kind !== "run") return;
+      // What comes first is the newest of what was before, revisions that the page shows, too.
+      const seq = lastRevision(message, source.run);
+      if (seq <= revisedAt.current) return;
+      revisedAt.current = seq;
+      renew().catch((error: unknown) => console.warn(error));
     });
     return () => {
       stop();
       opening.current?.close();
+      opening.current = undefined;
     };
   }, []);
 
@@ -162,12 +201,13 @@ function Loading({ summary, made }: Opened) {
   );
 }
 
-/** Whether a message says that a run goes on with a new version of its mission. */
-function isRevised(message: ServerMessage, run: string): boolean {
-  return (
-    message.type === "log" &&
-    message.records.some((each) => each.run === run && each.record === "MissionRevised")
+/** The last record by which a message says that a run goes on with a new version; 0: none. */
+function lastRevision(message: ServerMessage, run: string): number {
+  if (message.type !== "log") return 0;
+  const found = message.records.filter(
+    (each) => each.run === run && each.record === "MissionRevised",
   );
+  return found.at(-1)?.seq ?? 0;
 }
 
 /** Reads what there is to show, unless the page is left meanwhile. */

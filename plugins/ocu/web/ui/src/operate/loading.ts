@@ -15,6 +15,8 @@ export type Source = { kind: "run"; run: string } | { kind: "rehearsal"; id: str
 
 export interface Stage {
   mission: MissionModel;
+  /** What distinguishes its files from those of another version. */
+  files: string;
   fleet: Fleet;
   geometries: Signal<Geometry[]>;
 }
@@ -46,8 +48,16 @@ export async function loadStage(source: Source): Promise<Stage> {
     .map(({ xml }) => geometriesInFile(xml))
     .reduceRight((others, these) => withOwn(these, others), []);
   const mission = missionModel(sources, answer.process);
-  return { mission, fleet, geometries: signal(withOwn(own, geometries)) };
+  const files = filesOf(answer);
+  return { mission, files, fleet, geometries: signal(withOwn(own, geometries)) };
 }
+
+const filesOf = ({ files }: MissionAnswer): string =>
+  JSON.stringify(files.map(({ name, xml }) => [name, xml]));
+
+/** Whether a run has another version of its mission by now. */
+export const isOutdated = async (source: Source, { files }: Stage): Promise<boolean> =>
+  filesOf(await get<MissionAnswer>(`${pathOf(source)}/mission`)) !== files;
 
 /** Of how many records of a long run the index is made by now. */
 export interface Progress {

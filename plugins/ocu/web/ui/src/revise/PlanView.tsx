@@ -16,9 +16,11 @@ export interface PlanViewProps {
   moves: Moves;
   /** `target` undefined: the token is not moved. */
   move(element: string, target: string | undefined): void;
+  /** Show both diagrams. */
+  compare(): void;
 }
 
-export function PlanView({ plan, choices, moves, move }: PlanViewProps) {
+export function PlanView({ plan, choices, moves, move, compare }: PlanViewProps) {
   const from = { previous: plan.previous.slice(0, SHORT), version: plan.version.slice(0, SHORT) };
   return (
     <>
@@ -88,6 +90,9 @@ export function PlanView({ plan, choices, moves, move }: PlanViewProps) {
                 <li key={each}>{each}</li>
               ))}
             </ul>
+            <button type="button" class="secondary" onClick={compare}>
+              {words.compare}
+            </button>
           </section>
         </div>
       </div>

@@ -1,9 +1,10 @@
 // A run goes on with a new version of its mission: the plan is shown before anything is done, and
 // only what was shown is done.
 import { useSignal } from "@preact/signals";
-import { useRef } from "preact/hooks";
+import { useEffect, useRef } from "preact/hooks";
 import { ApiError } from "../shared/api";
 import { Dialog } from "../shared/Dialog";
+import { loaded } from "../shared/loaded";
 import { may } from "../shared/session";
 import { toast } from "../shared/Toasts";
 import type { Finding } from "../shared/types";
@@ -23,6 +24,9 @@ import "./revise.css";
 
 const words = strings.revise;
 
+/** The viewer of diagrams and the differ: for those who look at both diagrams. */
+const RevisionDiagrams = loaded(() => import("./RevisionDiagrams"));
+
 interface Problem {
   title: string;
   text: string;
@@ -31,10 +35,12 @@ interface Problem {
 
 export interface ReviseDialogProps {
   run: string;
+  /** What is chosen at first. */
+  version: NewVersion | null;
   onClose(): void;
 }
 
-export default function ReviseDialog({ run, onClose }: ReviseDialogProps) {
+export default function ReviseDialog({ run, version, onClose }: ReviseDialogProps) {
   const chosen = useSignal<NewVersion | null>(null);
   const moves = useSignal<Moves>({});
   const choices = useSignal<readonly Choice[]>([]);
@@ -43,6 +49,7 @@ export default function ReviseDialog({ run, onClose }: ReviseDialogProps) {
   const problem = useSignal<Problem | null>(null);
   const isOther = useSignal(false);
   const evenIfStuck = useSignal(false);
+  const showsDiagrams = useSignal(false);
   /** Which request for a plan was the last: an answer to an earlier one is dropped. */
   const asked = useRef(0);
 
@@ -105,6 +112,10 @@ export default function ReviseDialog({ run, onClose }: ReviseDialogProps) {
     else fail(words.notDone, error);
   };
 
+  useEffect(() => {
+    if (version) choose(version);
+  }, []);
+
   const shown = plan.value;
   const isStuck = shown !== null && needsConfirmation(shown);
   const isReady = shown !== null && shown.possible && (!isStuck || evenIfStuck.value);
@@ -134,6 +145,7 @@ export default function ReviseDialog({ run, onClose }: ReviseDialogProps) {
     >
       <div class="rev" tabIndex={-1}>
         <VersionChoice
+          run={run}
           chosen={chosen.value}
           choose={choose}
           fail={(error) => fail(words.failed, error)}
@@ -149,7 +161,20 @@ export default function ReviseDialog({ run, onClose }: ReviseDialogProps) {
           </section>
         )}
         {shown && (
-          <PlanView plan={shown} choices={choices.value} moves={moves.value} move={move} />
+          <PlanView
+            plan={shown}
+            choices={choices.value}
+            moves={moves.value}
+            move={move}
+            compare={() => (showsDiagrams.value = true)}
+          />
+        )}
+        {showsDiagrams.value && chosen.value && (
+          <RevisionDiagrams
+            run={run}
+            version={chosen.value}
+            onClose={() => (showsDiagrams.value = false)}
+          />
         )}
         {isStuck && shown.possible && may("commander") && (
           <label class="switch">

@@ -1,4 +1,5 @@
-// Which new version a run is to go on with: a mission of the folder, or a file of this computer.
+// Which new version a run is to go on with: a mission of the folder, a file of this computer, or a
+// version that the run has had.
 import { useEffect, useRef, useState } from "preact/hooks";
 import { nameOfFile, versionsOf, type Version } from "../missions/files";
 import { get } from "../shared/api";
@@ -6,24 +7,28 @@ import { moment } from "../shared/moments";
 import type { MissionLine } from "../shared/types";
 import { fill, strings } from "../strings";
 import type { NewVersion } from "./plan";
+import { nameOf, versionsOfRun, type RunVersion } from "./versions";
 
 const words = strings.revise;
 
 export interface VersionChoiceProps {
+  run: string;
   chosen: NewVersion | null;
   choose(version: NewVersion | null): void;
   fail(error: unknown): void;
 }
 
-export function VersionChoice({ chosen, choose, fail }: VersionChoiceProps) {
+export function VersionChoice({ run, chosen, choose, fail }: VersionChoiceProps) {
   const [missions, setMissions] = useState<readonly MissionLine[]>([]);
   const [versions, setVersions] = useState<readonly Version[]>([]);
+  const [had, setHad] = useState<readonly RunVersion[]>([]);
   const [isOver, setOver] = useState(false);
   const input = useRef<HTMLInputElement>(null);
   const mission = chosen?.kind === "mission" ? chosen.mission : "";
   useEffect(() => {
     get<MissionLine[]>("/missions").then(setMissions, fail);
-  }, []);
+    versionsOfRun(run).then(setHad, fail);
+  }, [run]);
   useEffect(() => {
     let left = false;
     setVersions([]);
@@ -45,6 +50,10 @@ export function VersionChoice({ chosen, choose, fail }: VersionChoiceProps) {
       fail(error);
     }
   };
+  const present = had.at(-1)?.version;
+  const earlier = had
+    .map((each, at) => ({ each, number: at + 1 }))
+    .filter(({ each }) => each.version !== present);
   return (
     <div
       class={isOver ? "rev-choose rev-over" : "rev-choose"}
@@ -92,6 +101,27 @@ export function VersionChoice({ chosen, choose, fail }: VersionChoiceProps) {
                   by,
                   at: moment(saved_at_us / 1000),
                 })}
+              </option>
+            ))}
+          </select>
+        </label>
+      )}
+      {earlier.length > 0 && (
+        <label>
+          {words.had}
+          <select
+            value={chosen?.kind === "had" ? String(chosen.number) : ""}
+            onChange={({ currentTarget: { value } }) => {
+              const found = earlier.find(({ number }) => String(number) === value);
+              choose(
+                found ? { kind: "had", version: found.each.version, number: found.number } : null,
+              );
+            }}
+          >
+            <option value="">{words.noneHad}</option>
+            {earlier.map(({ each, number }) => (
+              <option key={number} value={String(number)}>
+                {nameOf(each, number)}
               </option>
             ))}
           </select>

@@ -32,9 +32,11 @@ export interface Plan {
   approval: string;
 }
 
-/** A mission of the folder (`version` "": its newest one), or a file that is not saved there. */
+/** A mission of the folder (`version` "": its newest one), a file that is not saved there, or a
+    version that the run has had (`number`: its place in the list of them, from 1 on). */
 export type NewVersion =
   | { kind: "mission"; mission: string; version: string }
+  | { kind: "had"; version: string; number: number }
   | { kind: "file"; mission: string; file: string; xml: string };
 
 /** Where the token on an element goes: by its id, a target of the new version; "": it ends. */

@@ -6,10 +6,16 @@ import type { Moves, NewVersion, Plan } from "./plan";
 /** The new version is checked, and what follows it is explored. */
 const LIMIT_MS = 120_000;
 
-const bodyOf = (wanted: NewVersion, moves: Moves) =>
-  wanted.kind === "file"
-    ? { mission: wanted.mission, xml: wanted.xml, moves }
-    : { mission: wanted.mission, version: wanted.version || null, moves };
+function bodyOf(wanted: NewVersion, moves: Moves) {
+  switch (wanted.kind) {
+    case "file":
+      return { mission: wanted.mission, xml: wanted.xml, moves };
+    case "had":
+      return { had: wanted.version, moves };
+    case "mission":
+      return { mission: wanted.mission, version: wanted.version || null, moves };
+  }
+}
 
 const pathOf = (run: string) => `/runs/${encodeURIComponent(run)}/revision`;
 

@@ -1,10 +1,13 @@
 // What can be done with the mission as a whole.
 import { useRef } from "preact/hooks";
+import { revising } from "../../revise/revising";
+import { activeRuns } from "../../shared/executive";
 import { Menu, type MenuItem } from "../../shared/Menu";
 import { go } from "../../shared/router";
+import { titleOf } from "../../shared/runs";
 import { may } from "../../shared/session";
 import { toast } from "../../shared/Toasts";
-import { strings } from "../../strings";
+import { fill, strings } from "../../strings";
 import type { MissionWork } from "../session/MissionWork";
 import { bpmnFile, download, pngFile, svgFile } from "../session/pictures";
 import { Icon, IconButton } from "./icons";
@@ -128,6 +131,12 @@ function FileMenu({ work }: { work: MissionWork }) {
       label: strings.compare.open,
       act: () => void work.compare(),
     },
+    ...(may("commander") ? activeRuns.value : [])
+      .filter((run) => titleOf(run) === mission)
+      .map(({ run }) => ({
+        label: fill(strings.revise.giveTo, { run }),
+        act: () => void giveTo(work, run),
+      })),
     { label: texts.upload, act: () => file.current?.click() },
     {
       label: texts.download,
@@ -160,4 +169,11 @@ function FileMenu({ work }: { work: MissionWork }) {
       />
     </>
   );
+}
+
+/** The run shows what it would do to go on with what is drawn here, which is saved before. */
+async function giveTo(work: MissionWork, run: string): Promise<void> {
+  if (!(await work.save())) return;
+  go(`/runs/${encodeURIComponent(run)}`);
+  revising.value = { run, version: { kind: "mission", mission: work.mission, version: "" } };
 }

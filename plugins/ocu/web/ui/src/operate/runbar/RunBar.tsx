@@ -3,7 +3,7 @@ import { useSignal } from "@preact/signals";
 import { command } from "../../shared/command";
 import { activeRuns } from "../../shared/executive";
 import { clock, dateTime, grouped } from "../../shared/format";
-import { revising } from "../../revise/revising";
+import { listingVersions, revising } from "../../revise/revising";
 import { go } from "../../shared/router";
 import { titleOf } from "../../shared/runs";
 import { may } from "../../shared/session";
@@ -33,6 +33,16 @@ export function RunBar() {
       <strong class="mission-name" title={summary?.process}>
         {summary ? titleOf(summary) : ""}
       </strong>
+      {scene.run && (
+        <button
+          type="button"
+          class="secondary"
+          title={strings.revise.versionsHint}
+          onClick={() => (listingVersions.value = scene.run)}
+        >
+          {strings.revise.versions}
+        </button>
+      )}
       {scene.mode === "replay" && (
         <span class="mode">
           {scene.run ? text.replay : text.rehearsal}
@@ -189,7 +199,7 @@ function Controls({ status }: { status: string }) {
         type="button"
         class="secondary"
         disabled={!goesOn}
-        onClick={() => (revising.value = scene.run)}
+        onClick={() => (revising.value = { run: scene.run, version: null })}
       >
         {strings.revise.open}
       </button>
