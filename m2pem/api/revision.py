@@ -63,7 +63,8 @@ class RevisionPreview:
     `findings`: those of `m2pem check` about the new version; with errors, it cannot be used.
     `outlook`: whether the mission completes after it, explored from the run's present state; None:
     that was not explored, as the revision cannot be. `approval`: who must approve the new version
-    before; "": that is not needed.
+    before; "": that is not needed. `busy`: which vehicles and payloads new and changed tasks name
+    that other runs or operators have now, and what happens to the task then, as sentences.
     """
 
     run: RunId
@@ -77,6 +78,7 @@ class RevisionPreview:
     findings: tuple[Finding, ...] = ()
     outlook: IncidentPreview | None = None
     approval: str = ""
+    busy: tuple[str, ...] = ()
 
     @property
     def is_possible(self) -> bool:
@@ -90,6 +92,7 @@ class RevisionPreview:
         if not self.refusals:
             lines.append("what becomes of the run:" if self.effects else "all that is active stays")
         lines += [f"  {each.kind}: {each.text}" for each in self.effects]
+        lines += [f"  busy: {each}" for each in self.busy]
         lines += [str(each) for each in self.findings]
         lines += [f"refused: {each.text}" for each in self.refusals]
         if self.approval:

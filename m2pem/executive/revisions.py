@@ -16,6 +16,7 @@ from m2pem.engine.state import BehaviorPhase, RunState
 from m2pem.errors import MissionError, OperatorError
 from m2pem.executive.incidents import IncidentChoices
 from m2pem.executive.loading import monitored_requirements
+from m2pem.executive.revision_needs import NeedsOfRevisions
 from m2pem.executive.run_starter import RunStarter
 from m2pem.executive.runner import Runner
 from m2pem.executive.supervisor import Supervisor
@@ -175,6 +176,14 @@ class RunRevisions:
             prepared.findings,
             await self._outlooks.outlook(run, prepared.item) if possible else None,
             "" if approval.may_start else str(approval),
+            self._needs().busy(run, plan.difference),
+        )
+
+    def _needs(self) -> NeedsOfRevisions:
+        supervisor = self._supervisor
+        taken = supervisor.handover.taken
+        return NeedsOfRevisions(
+            supervisor.fleet, supervisor.availability, taken, supervisor.runners
         )
 
     async def refuse(self, run: RunId, prepared: Prepared, plan: str) -> None:

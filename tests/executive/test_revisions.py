@@ -94,6 +94,38 @@ def test_a_plan_that_holds_no_more_is_refused(play):
     play(story, "ugv1")
 
 
+def test_a_plan_names_what_others_have_of_what_it_needs(play):
+    async def story(world: World):
+        control = world.executive.control
+        run = await begun(world)
+        other = await control.start(mission(sequence(("Drive", behavior("Drive", "hold", "ugv2")))))
+        await world.fake.until_called("start", f"{other}.b1")
+        await control.take("ugv3", by="anna")
+        tasks = [
+            (name, behavior(name, "hold", resource))
+            for name, resource in (("Look", "ugv2"), ("Help", "ugv3"), ("Stay", "ugv1"))
+        ]
+        go = ("Go", behavior("Go", "drive_stop", "ugv1"))
+        plan = await control.plan_revision(run, mission(sequence(go, *tasks)))
+        assert plan.is_possible
+        then = "the task ends with error RESOURCE_UNAVAILABLE, unless that is free when it starts"
+        assert plan.busy == (
+            f"script task Look needs ugv2, which Drive of {other} has now: {then}",
+            f"script task Help needs ugv3, which operator anna has now: {then}",
+        )
+        assert f"  busy: {plan.busy[0]}" in str(plan)
+        waits = mission(sequence(go, *tasks[:1])).replace(
+            b'vehicle="ugv2"', b'vehicle="ugv2" m2pem:wait="PT5M"'
+        )
+        plan = await control.plan_revision(run, waits)
+        assert plan.busy == (
+            f"script task Look needs ugv2, which Drive of {other} has now: the task waits until "
+            "that is free, as long as its limit lets it",
+        )
+
+    play(story, "ugv1", "ugv2", "ugv3")
+
+
 def test_a_run_goes_back_to_a_version_that_it_has_had(play):
     async def story(world: World):
         control = world.executive.control

@@ -70,3 +70,16 @@ async def test_a_vehicle_stops_when_its_token_is_moved(desk: Desk) -> None:
     page_of = await desk.ask("GET", f"/api/runs/{run}/records?limit=5000")
     ended = [each for each in page_of["records"] if each["record"] == "BehaviorEnded"]
     assert any("DriveRoute" in str(each) for each in ended)
+
+
+async def test_a_vehicle_that_an_operator_has_is_named(desk: Desk) -> None:
+    page = await desk.driving()
+    await desk.ask("POST", "/api/resources/evsg2/take")
+    xml = (desk.executive.missions / f"{MISSION}.bpmn").read_text(encoding="utf-8")
+    before, start, task = xml.partition('<bpmn:scriptTask id="DriveStop"')
+    dialog = await planned(desk, page, before + start + task.replace("evsg1", "evsg2", 1))
+    await expect(dialog.get_by_role("region", name="What others have now")).to_have_text(
+        "What others have now"
+        "script task 'DRIVE STOP' (DriveStop) needs evsg2, which operator anna has now: "
+        "the task ends with error RESOURCE_UNAVAILABLE, unless that is free when it starts"
+    )

@@ -98,7 +98,8 @@ class RefusalModel(BaseModel):
 
 class PlanModel(BaseModel):
     """What a revision would do. `possible`: nothing speaks against it but what may be confirmed;
-    `approval`: who must approve the new version before, "" if that is not needed."""
+    `approval`: who must approve the new version before, "" if that is not needed. `busy`: what new
+    and changed tasks name and others have now, with what happens then."""
 
     plan: str
     version: str
@@ -110,6 +111,7 @@ class PlanModel(BaseModel):
     findings: list[FindingModel]
     outlook: OutlookModel | None
     approval: str
+    busy: list[str]
 
 
 def plan_model(preview: RevisionPreview) -> PlanModel:
@@ -148,6 +150,7 @@ def plan_model(preview: RevisionPreview) -> PlanModel:
         if outlook is None
         else OutlookModel(verdict=outlook.verdict.value, reason=outlook.reason, text=str(outlook)),
         approval=preview.approval,
+        busy=list(preview.busy),
     )
 
 

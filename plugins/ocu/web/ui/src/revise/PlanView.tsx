@@ -62,6 +62,16 @@ export function PlanView({ plan, choices, moves, move, compare }: PlanViewProps)
               </ul>
             </section>
           )}
+          {plan.busy.length > 0 && (
+            <section aria-label={words.busy}>
+              <h3>{words.busy}</h3>
+              <ul>
+                {plan.busy.map((each) => (
+                  <li key={each}>{each}</li>
+                ))}
+              </ul>
+            </section>
+          )}
           {plan.outlook && (
             <section aria-label={words.follows}>
               <h3>{words.follows}</h3>

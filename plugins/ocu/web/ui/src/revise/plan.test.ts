@@ -12,6 +12,7 @@ const PLAN: Plan = {
   findings: [],
   outlook: null,
   approval: "",
+  busy: [],
 };
 
 const refusal = (

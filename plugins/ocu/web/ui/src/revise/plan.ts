@@ -30,6 +30,7 @@ export interface Plan {
   findings: Finding[];
   outlook: { verdict: string; reason: string; text: string } | null;
   approval: string;
+  busy: string[];
 }
 
 /** A mission of the folder (`version` "": its newest one), a file that is not saved there, or a

@@ -42,6 +42,7 @@ export const revise = {
   move: "stays: no choice yet",
   moveTo: "goes to {element}",
   moveEnd: "ends",
+  busy: "What others have now",
   findings: "What the check finds",
   follows: "What follows",
   stuck: "After it the mission cannot complete. Revise the run all the same.",

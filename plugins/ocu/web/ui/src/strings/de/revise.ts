@@ -44,6 +44,7 @@ export const revise: Translation<typeof english.revise> = {
   move: "bleibt: noch nicht gewählt",
   moveTo: "geht zu {element}",
   moveEnd: "endet",
+  busy: "Was andere jetzt haben",
   findings: "Was die Prüfung findet",
   follows: "Was folgt",
   stuck: "Danach kann die Mission nicht abschließen. Den Lauf trotzdem ändern.",
