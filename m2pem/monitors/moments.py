@@ -298,6 +298,11 @@ class Moments:
             self._begin(_CAUSE, _COMPLETED)
             self._thrower = record.token
 
+    def _error_thrown(self, record: r.ErrorThrown) -> None:
+        """A task fails in a step of its own token, not in that of a token that has completed."""
+        if self._stage == _COMPLETED and record.token != self._left:
+            self._begin(_CAUSE, _COMPLETED)
+
     def _escalation_thrown(self, record: r.EscalationThrown) -> None:
         self._thrown(record)
         self._caught_by = record.caught_by
@@ -384,6 +389,7 @@ _READERS: Mapping[type, Callable[[Moments, Any], None]] = {
     r.DataWritten: Moments._data_written,
     r.SignalThrown: Moments._thrown,
     r.MessageThrown: Moments._thrown,
+    r.ErrorThrown: Moments._error_thrown,
     r.EscalationThrown: Moments._escalation_thrown,
     r.ScopeInterrupted: Moments._scope_interrupted,
 }

@@ -37,13 +37,13 @@ FILES = sorted(
 APART = {
     "message_boundary_call": "a subprocess that is interrupted loses its tokens a step later",
     "message_boundary_subprocess": "the same",
-    "conditional_catch_false": "the net does not follow the data of its condition",
     "inclusive_merge_and_split": "tokens leave a join, and then no flow is true",
 }
 """Files whose net takes other steps than the engine, and why."""
 PARTS = 4
 
 _APART = (
+    events.ConditionalEventDefinition,
     events.SignalEventDefinition,
     events.EscalationEventDefinition,
     events.CompensateEventDefinition,
@@ -137,6 +137,28 @@ def test_each_moment_of_a_run_is_one_of_a_run_of_the_net(part: int) -> None:
                 wrong[file.name] = found
     assert wrong == {}
     assert compared > 40
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        """<startEvent id="start"/>
+        start -> wait
+        <intermediateCatchEvent id="wait">timer PT5S</intermediateCatchEvent>""",
+        """<startEvent id="start"/>
+        start -> wait
+        <intermediateCatchEvent id="wait">message M</intermediateCatchEvent>""",
+        """<startEvent id="start"/>
+        start -> busy
+        start -> done
+        start -> fails
+        <scriptTask id="busy">do drive_stop uav1</scriptTask> <exclusiveGateway id="done"/>
+        <scriptTask id="fails">do drive_stop uav1</scriptTask>""",
+    ],
+    ids=["nothing follows a timer", "nothing follows a message", "a task fails after a completion"],
+)
+def test_it_is_so_of(text: str) -> None:
+    assert first_unlike(notation(text), range(3)) == ""
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ from m2pem.verify.requirements.check import Answer
 from m2pem.verify.requirements.propositions import Labels
 from m2pem.verify.search.explore import Limits
 from m2pem.verify.translate import Options, translate
+from tests.engine.notation import mission as notation
 from tests.verify.answers import check_mission
 from tests.verify.missions import approval, in_a_row, pair, survey, task
 
@@ -83,6 +84,13 @@ DATA = Path(__file__).parents[1] / "data"
 )
 def test_what_completes_and_is_active_is_what_records_say(file: str, formula: str) -> None:
     assert ltl(read_mission(DATA / file), formula).result is HOLDS
+
+
+def test_a_catch_event_that_nothing_follows_completes() -> None:
+    waits = notation("""<startEvent id="start"/>
+    start -> wait
+    <intermediateCatchEvent id="wait">timer PT5S</intermediateCatchEvent>""")
+    assert ltl(waits, "<> completed(wait)").result is HOLDS
 
 
 def test_a_broken_requirement_comes_with_the_transitions_of_a_run() -> None:

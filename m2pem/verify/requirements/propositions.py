@@ -188,19 +188,19 @@ class Labels:
     def _completes(self, step: Step, transition: Transition) -> bool:
         """Whether a token leaves the element of a step as completed.
 
-        One that waits at a catch event leaves it as soon as that is triggered; where no flow can be
-        taken, the activity or gateway fails.
+        One that waits at a catch event leaves it as soon as that is triggered, by the flows that it
+        has; where no flow can be taken, the activity or gateway fails.
         """
         if step.action is Action.TRIGGERED:
             element = self._mission.elements.get(step.element)
-            flows = (
-                {flow.id for flow in element.outgoing}
-                if isinstance(element, IntermediateCatchEvent | ReceiveTask)
-                else ()
-            )
-            return any(
-                each.action is Action.TAKEN and each.element in flows for each in transition.steps
-            )
+            if not isinstance(element, IntermediateCatchEvent | ReceiveTask):
+                return False
+            if not element.outgoing:
+                stays = (self.net.places[place].element for place, _ in transition.produce)
+                return step.element not in stays
+            flows = {flow.id for flow in element.outgoing}
+            taken = (each.element for each in transition.steps if each.action is Action.TAKEN)
+            return any(each in flows for each in taken)
         if step.action is not Action.COMPLETED:
             return False
         failed = Step(step.element, Action.THROWN, "NO_FLOW")
