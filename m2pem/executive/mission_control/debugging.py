@@ -91,8 +91,9 @@ def _why_no_step(state: RunState) -> str:
         return (
             "it is not paused: pause it, or set a breakpoint, and make a step when it has stopped"
         )
-    awaited = f", which wait for {', '.join(waits)}" if (waits := state.awaited()) else ""
+    awaited = ", ".join(state.awaited())
+    waits = f"; its tokens wait for {awaited}" if awaited else ""
     return (
-        f"it makes a step already, and is paused before the next one as soon as one of its tokens "
-        f"moves{awaited}; pause it to end the step before that"
+        f"it makes a step already{waits}. It is paused again as soon as a token moves; "
+        "pause it to end the step before that"
     )
