@@ -3,7 +3,7 @@
 import os
 from pathlib import Path
 
-from playwright.async_api import Browser, Locator, Page, expect
+from playwright.async_api import Browser, Locator, Page, Route, expect
 from web_axe import Accessibility
 from web_browsing import SIGN_IN, page_at
 from web_desk import IN_ONE_LOOP, Desk, element, signed_in
@@ -110,6 +110,8 @@ async def test_a_run_is_stopped_looked_at_changed_and_goes_on(desk: Desk) -> Non
     await banner(page).get_by_role("button", name="Continue").click()
     await expect(element(page, "DriveRoute")).to_contain_class("m2-active")
     await expect(banner(page)).to_have_count(0)
+    await other.close()
+    await page.goto(desk.executive.origin)  # else it reads the data of a run that is over
     await desk.ask("POST", f"/api/runs/{run}/stop", {"reason": "seen"})
     await page.goto(f"{desk.executive.origin}/runs/{run}?t=0")
     await the_replay_shows_the_stops(page)
@@ -187,6 +189,9 @@ async def test_a_condition_stops_the_run_and_a_viewer_only_sees_it(
         await element(vera.page, GATEWAY).locator(".djs-hit").first.click(button="right")
         item = vera.page.get_by_role("menuitem", name="Set a breakpoint")
         await expect(item).to_have_attribute("aria-disabled", "true")
+        eyes = Accessibility(vera.page)
+        await eyes.look("the menu of an element", ".element-menu")
+        eyes.assert_well()
         await vera.page.keyboard.press("Escape")
         await expect(item).to_have_count(0)
         for method, path, body in (
@@ -202,6 +207,32 @@ async def test_a_condition_stops_the_run_and_a_viewer_only_sees_it(
             )
             assert refused.status == 403
         await desk.ask("POST", f"/api/runs/{run}/step")
+
+
+async def test_a_fleet_that_allows_no_breakpoints_says_why(desk: Desk) -> None:
+    page = desk.page
+
+    async def real(route: Route) -> None:
+        answered = await route.fetch()
+        fleet = {**await answered.json(), "may_be_debugged": False}
+        await route.fulfill(response=answered, json=fleet)
+
+    await page.route("**/api/fleet", real)
+    await page.set_viewport_size({"width": 1440, "height": 960})
+    await desk.start()
+    await expect(page.get_by_role("tab", name="Breakpoints")).to_have_count(0)
+    await row(page, "Decision?").click(button="right")
+    menu = page.get_by_role("menu", name="Decision?: breakpoint")
+    await expect(menu).to_contain_text("its file does not say “debugging: true”")
+    item = menu.get_by_role("menuitem")
+    await expect(item).to_have_attribute("aria-disabled", "true")
+    await item.press("Enter")
+    await expect(menu).to_be_visible()
+    await page.keyboard.press("Escape")
+    await expect(row(page, "Decision?")).to_be_focused()
+    await page.keyboard.press("b")
+    await expect(page.locator(".toast")).to_contain_text("debugging: true")
+    await expect(badge(page, GATEWAY)).to_have_count(0)
 
 
 async def test_a_run_is_debugged_on_a_phone_in_german(chromium: Browser, desk: Desk) -> None:

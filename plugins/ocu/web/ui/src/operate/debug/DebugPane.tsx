@@ -26,7 +26,7 @@ export default function DebugPane() {
   }
   const refusal = refusalOf(shown);
   const isPaused = scene.status.value === "paused";
-  const data = <RunData mayChange={refusal === "" && isPaused} />;
+  const data = refusal !== null && <RunData mayChange={refusal === "" && isPaused} />;
   const steps = refusal === "" && isPaused && (
     <button
       type="button"
