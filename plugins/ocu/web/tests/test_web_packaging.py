@@ -44,6 +44,8 @@ ON_DEMAND = (
     "ElementMenu-*.*",
     "StopBanner-*.*",
     "debug-*.css",
+    "Outcome-*.*",
+    "Verdict-*.*",
 )
 """Loaded by no page, but by a button of one, or for those who chose a language."""
 

@@ -141,6 +141,7 @@ export const requirements = {
     nothing: "throws nothing",
     kinds: { error: "throws an error", signal: "throws a signal" },
     code: "Error code",
+    codeExample: "UNSAFE",
     codeHint: "An event subprocess of the process that the run begins with catches it; otherwise the run fails.",
     signal: "Signal",
     signalHint: "All that wait for it go on.",

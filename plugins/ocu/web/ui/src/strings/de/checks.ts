@@ -160,6 +160,7 @@ export const requirements: Translation<typeof english.requirements> = {
     nothing: "wirft nichts",
     kinds: { error: "wirft einen Fehler", signal: "wirft ein Signal" },
     code: "Fehlercode",
+    codeExample: "UNSAFE",
     codeHint:
       "Ein Ereignis-Teilprozess des Prozesses, mit dem der Lauf beginnt, fängt ihn; sonst schlägt der Lauf fehl.",
     signal: "Signal",

@@ -61,7 +61,7 @@ export function InRuns({ prefix, requirement, signals, findings, write }: InRuns
           hint={words.codeHint}
           required
           mono
-          placeholder="UNSAFE"
+          placeholder={words.codeExample}
           value={name}
           error={isOfName ? error : undefined}
           write={(code) => throwing(`error:${code.trim()}`)}

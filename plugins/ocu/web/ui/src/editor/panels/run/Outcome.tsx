@@ -19,7 +19,7 @@ export interface OutcomeProps {
   read: Read;
 }
 
-export function Outcome({ editor, id, summary, read }: OutcomeProps) {
+export default function Outcome({ editor, id, summary, read }: OutcomeProps) {
   const { spans, unsaid, requirements, count } = read;
   const { status, detail, records, started_us, ended_us } = summary;
   const seconds = ended_us === null ? 0 : (ended_us - started_us) / 1e6;

@@ -4,6 +4,7 @@ import { Approval } from "../../../people/Approval";
 import { Dialog } from "../../../shared/Dialog";
 import { go } from "../../../shared/router";
 import { may, session } from "../../../shared/session";
+import { loaded } from "../../../shared/loaded";
 import { fill, strings } from "../../../strings";
 import { beginningOf } from "../begin/beginning";
 import { BeginForm } from "../begin/BeginForm";
@@ -11,7 +12,6 @@ import type { EditorContext, Panel } from "../panel";
 import { ProblemView } from "../ProblemView";
 import { BusyDialog } from "./BusyDialog";
 import { AnswersForm } from "./AnswersForm";
-import { Outcome } from "./Outcome";
 import { rehearsalOf } from "./rehearsal";
 import { startingOf } from "./starting";
 import "../begin/begin.css";
@@ -19,6 +19,9 @@ import "../verify/verify.css";
 import "./run.css";
 
 const words = strings.run;
+
+/** Who only draws needs nothing of it. */
+const Outcome = loaded(() => import("./Outcome"));
 
 export const runPanel: Panel = {
   id: "run",
