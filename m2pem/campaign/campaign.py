@@ -9,6 +9,8 @@ from m2pem.campaign.folder import CampaignFolder
 from m2pem.campaign.pool import Chunk, chunks_of, rehearse_on_cluster, rehearse_on_processes
 from m2pem.campaign.runs import Order, Row, rehearse_runs
 from m2pem.campaign.statistics import SequentialTest, is_good
+from m2pem.campaign.variations import read_variations
+from m2pem.errors import OperatorError
 
 CHUNK = 50
 """So many runs are handed to a process at once, and written to one file."""
@@ -46,8 +48,10 @@ def run_campaign(
     was done until then is its result. `test`: ends it when it is decided, in the order of the runs.
 
     Raises:
-        OperatorError: the folder or the cluster cannot be used.
+        OperatorError: the folder or the cluster cannot be used, or the test.
     """
+    if test is not None and read_variations(order.variations).weighted:
+        raise OperatorError("a sequential test counts runs: it does not go with `sampled`")
     store = None if folder is None else CampaignFolder(folder, order, resume=resume)
     rows = {row["run"]: row for row in (store.rows() if store else ()) if row["run"] < runs}
     chunks = chunks_of([run for run in range(runs) if run not in rows], chunk)

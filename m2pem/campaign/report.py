@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from statistics import fmean
 
 from m2pem.campaign.campaign import CampaignResult
 from m2pem.campaign.charts import Chart, Histogram, Intervals, Mark
@@ -15,11 +16,13 @@ from m2pem.campaign.statistics import (
     compared,
     effects,
     ends,
-    estimated,
+    failure,
     is_good,
     quantiles,
     rehearsed,
     requirements,
+    weight_of,
+    weighted,
     worst,
 )
 
@@ -27,6 +30,9 @@ WORST = 5
 """So many of the worst runs are written as answers files."""
 
 MOST_EFFECTS = 15
+
+RARE = 0.005
+"""Probabilities below have a power of ten."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +79,12 @@ def report_of(
         f"{len(rows):,} runs of {result.wanted:,}, seed {result.order.seed}. Intervals are of "
         f"{CONFIDENCE:.0%} confidence."
     ]
+    if weighted(rows):
+        mean = fmean(map(weight_of, rows))
+        paragraphs.append(
+            "What is sampled was drawn with another probability than its own: each run counts by "
+            f"its weight. The mean weight is {mean:.3f}; far from 1, there are too few runs."
+        )
     if failed := [row for row in result.rows if row["error"]]:
         first = failed[0]
         paragraphs.append(
@@ -108,15 +120,19 @@ def _table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> Table:
 
 
 def _ends(rows: Sequence[Row]) -> Section:
-    bad = estimated(sum(not is_good(row) for row in rows), len(rows))
-    counted = [*ends(rows).items(), (("any failure", ""), bad)]
+    counted = [*ends(rows).items(), (("any failure", ""), failure(rows))]
     columns = ("outcome", "end", "runs", "probability", "interval")
     listed = [(*end, f"{each.count:,}", *_probability(each)) for end, each in counted]
     return Section("Ends", (), _table(columns, listed))
 
 
 def _probability(estimate: Estimate) -> tuple[str, str]:
-    return f"{estimate.share:.4f}", f"{estimate.low:.4f} to {estimate.high:.4f}"
+    rare = 0 < estimate.share < RARE
+    share, low, high = (
+        f"{each:.2e}" if rare else f"{each:.4f}"
+        for each in (estimate.share, estimate.low, estimate.high)
+    )
+    return share, f"{low} to {high}"
 
 
 def _requirements(rows: Sequence[Row], required: Sequence[str]) -> list[Section]:
@@ -139,7 +155,8 @@ def _requirements(rows: Sequence[Row], required: Sequence[str]) -> list[Section]
 
 
 def _quantities(rows: Sequence[Row]) -> Section:
-    listed = [_quantiles("time, s", [row["took_s"] for row in rows])]
+    weights = [weight_of(row) for row in rows]
+    listed = [_quantiles("time, s", [row["took_s"] for row in rows], weights)]
     keys = dict.fromkeys(key for row in rows for key in row)
     for start, name, factor in (
         ("distance.", "distance of {}, m", 1),
@@ -148,8 +165,8 @@ def _quantities(rows: Sequence[Row]) -> Section:
         for key in keys:
             if key.startswith(start):
                 shown = name.format(key.removeprefix(start))
-                values = [factor * row[key] for row in rows if key in row]
-                listed.append(_quantiles(shown, values))
+                values = [factor * row[key] for row in rows]
+                listed.append(_quantiles(shown, values, weights))
     good, failed = (
         [row["took_s"] for row in rows if is_good(row) is wanted] for wanted in (True, False)
     )
@@ -161,8 +178,8 @@ def _quantities(rows: Sequence[Row]) -> Section:
     )
 
 
-def _quantiles(name: str, values: Sequence[float]) -> tuple[str, ...]:
-    found = quantiles(values)
+def _quantiles(name: str, values: Sequence[float], weights: Sequence[float]) -> tuple[str, ...]:
+    found = quantiles(values, weights)
     numbers = (found.low, found.median, found.high, found.mean)
     return (name, *(f"{each:.1f}" for each in numbers))
 

@@ -33,7 +33,8 @@ Row = dict[str, Any]
 `battery.VEHICLE` at its end, a fraction; `distance.VEHICLE`: the way it has gone, in m;
 `requirement.ID`: "satisfied", "violated", or "open" if its end has not decided it; `drawn.NAME`.
 `good`: it has completed or was terminated, and violates nothing that is required. `error`: why it
-could not be rehearsed; such a run has nothing else."""
+could not be rehearsed; such a run has nothing else. `weight`: how many times as likely it is as it
+was drawn."""
 
 _GOOD = (RunStatus.COMPLETED, RunStatus.TERMINATED)
 _VIOLATED = r.RequirementVerdict.VIOLATED.value
@@ -165,6 +166,7 @@ def row_of(
         "took_s": summary.took_s,
         "records": sum(type(each.record) is not r.BehaviorProgressed for each in result.records),
         "error": "",
+        "weight": drawn.weight,
     }
     for vehicle, at_end in result.vehicles.items():
         row[f"battery.{vehicle}"] = at_end.battery

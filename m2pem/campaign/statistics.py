@@ -1,29 +1,32 @@
 """What the rows of a campaign say: probabilities with their intervals, and what they depend on."""
 
 import math
-from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from bisect import bisect_left
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
+from itertools import accumulate
+from statistics import NormalDist
 
 from m2pem.campaign.runs import Row
 from m2pem.campaign.variations import shown
 
 CONFIDENCE = 0.95
 
+Interval = tuple[float, float, float]
+"""A value, and the interval that it lies in: (value, low, high)."""
+
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """A probability: that of `count` of `runs`, and the interval it lies in with `CONFIDENCE`."""
+    """A probability: that of `count` of `runs`, and the interval it lies in with `CONFIDENCE`.
+    `share`: the most likely value."""
 
     count: int
     runs: int
     low: float
     high: float
-
-    @property
-    def share(self) -> float:
-        """The most likely value."""
-        return self.count / self.runs if self.runs else math.nan
+    share: float
 
     def __str__(self) -> str:
         return f"{self.share:.4f} ({self.low:.4f} to {self.high:.4f})"
@@ -34,9 +37,54 @@ def estimated(count: int, runs: int) -> Estimate:
     from scipy.stats import binomtest  # noqa: PLC0415  # an extra, slow to load
 
     if not runs:
-        return Estimate(0, 0, 0.0, 1.0)
+        return Estimate(0, 0, 0.0, 1.0, math.nan)
     interval = binomtest(count, runs).proportion_ci(CONFIDENCE, method="exact")
-    return Estimate(count, runs, float(interval.low), float(interval.high))
+    return Estimate(count, runs, float(interval.low), float(interval.high), count / runs)
+
+
+def weight_of(row: Row) -> float:
+    """Return how much a run counts; see `DrawnRun`."""
+    return float(row.get("weight", 1.0))
+
+
+def weighted(rows: Iterable[Row]) -> bool:
+    """Whether runs were drawn with other probabilities than their own."""
+    return any(weight_of(row) != 1 for row in rows)
+
+
+def probability(rows: Sequence[Row], holds: Callable[[Row], bool]) -> Estimate:
+    """Return how likely a run is such.
+
+    Of weighted runs, that of the rarer side, such runs or the others, is the mean of its weights,
+    with the interval of Fay and Feuer (1997); without any, by the highest weight.
+    """
+    such = [row for row in rows if holds(row)]
+    if not weighted(rows):
+        return estimated(len(such), len(rows))
+    others = [row for row in rows if not holds(row)]
+    sums = [math.fsum(map(weight_of, each)) for each in (such, others)]
+    most = max(map(weight_of, rows))
+    if sums[0] <= sums[1]:
+        share, low, high = _weighted_mean(such, len(rows), most)
+    else:
+        share, low, high = (1 - each for each in _weighted_mean(others, len(rows), most))
+        low, high = high, low
+    return Estimate(len(such), len(rows), low, high, share)
+
+
+def _weighted_mean(such: Sequence[Row], runs: int, most: float) -> Interval:
+    from scipy.stats import chi2  # noqa: PLC0415  # an extra
+
+    weights = [weight_of(row) / runs for row in such]
+    mean, variance = math.fsum(weights), math.fsum(each**2 for each in weights)
+    highest = max(weights, default=most / runs)
+    tail = (1 - CONFIDENCE) / 2
+    low = 0.0
+    if mean > 0:
+        low = float(chi2.ppf(tail, 2 * mean**2 / variance)) * variance / (2 * mean)
+    above, spread = mean + highest, variance + highest**2
+    high = float(chi2.ppf(1 - tail, 2 * above**2 / spread)) * spread / (2 * above)
+    return mean, low, min(1.0, high)
 
 
 def is_good(row: Row) -> bool:
@@ -54,8 +102,11 @@ class Quantiles:
     mean: float
 
 
-def quantiles(values: Sequence[float]) -> Quantiles:
-    """Return the 5 %, 50 % and 95 % quantiles, and the mean; there is at least one value."""
+def quantiles(values: Sequence[float], weights: Sequence[float] = ()) -> Quantiles:
+    """Return the 5 %, 50 % and 95 % quantiles, and the mean; there is at least one value.
+    `weights`: of each value, if they are not equal."""
+    if len({*weights}) > 1:
+        return _weighted_quantiles(sorted(zip(values, weights, strict=True)))
     ordered = sorted(values)
 
     def at(share: float) -> float:
@@ -67,8 +118,15 @@ def quantiles(values: Sequence[float]) -> Quantiles:
     return Quantiles(at(0.05), at(0.5), at(0.95), math.fsum(ordered) / len(ordered))
 
 
-Interval = tuple[float, float, float]
-"""A value, and the interval that it lies in: (value, low, high)."""
+def _weighted_quantiles(ordered: Sequence[tuple[float, float]]) -> Quantiles:
+    total = math.fsum(weight for _, weight in ordered)
+    below = [*accumulate(weight for _, weight in ordered)]
+
+    def at(share: float) -> float:
+        return ordered[min(bisect_left(below, share * total), len(ordered) - 1)][0]
+
+    mean = math.fsum(value * weight for value, weight in ordered) / total
+    return Quantiles(at(0.05), at(0.5), at(0.95), mean)
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +136,9 @@ class Effect:
     `split`: how the runs are halved: those with it and without, or above the median and not above.
     `share`: of the runs that have it. `failure`, within `low` and `high` (Newcombe 1998): the
     difference of the two probabilities; `took_s`: of the mean durations of good runs (Welch 1947).
-    `rank`: Spearman's correlation with failure; nan of a quantity that is no number.
+    `rank`: Spearman's correlation with failure; nan of a quantity that is no number. Weighted runs
+    have neither the interval of the time nor a rank, and count as so many runs as would be as
+    uncertain (Kish 1965).
     """
 
     name: str
@@ -121,7 +181,7 @@ def _effects_of(name: str, rows: Sequence[Row]) -> Iterable[Effect]:
         median = quantiles(values).median
         failures = [not is_good(row) for row in known]
         rank = math.nan
-        if len(set(failures)) > 1:
+        if len(set(failures)) > 1 and not weighted(known):
             rank = float(spearmanr(values, failures).statistic)
         above = [each > median for each in values]
         yield _effect(drawn, f"above {shown(drawn, median)}", known, above, rank)
@@ -140,38 +200,58 @@ def _effect(
         groups[within].append(row)
     without, within_ = (_failures(group) for group in groups)
     low, high = _newcombe(within_, without)
-    times = [[row["took_s"] for row in group if is_good(row)] for group in groups]
+    good = [[row for row in group if is_good(row)] for group in groups]
     return Effect(
         name,
         split,
-        within_[1] / len(rows),
-        _share(within_) - _share(without),
+        math.fsum(map(weight_of, groups[1])) / math.fsum(map(weight_of, rows)),
+        within_[0] - without[0],
         low,
         high,
-        _welch(times[1], times[0]),
+        _took_s(good[1], good[0]),
         rank,
     )
 
 
-def _failures(rows: Sequence[Row]) -> tuple[int, int]:
-    return sum(not is_good(row) for row in rows), len(rows)
+def _failures(rows: Sequence[Row]) -> tuple[float, float]:
+    """Return the share of the runs that failed, and as how many runs they count."""
+    weights = [weight_of(row) for row in rows]
+    total = math.fsum(weights)
+    if not total:
+        return 0.0, 0.0
+    failed = math.fsum(weight_of(row) for row in rows if not is_good(row))
+    return failed / total, total**2 / math.fsum(each**2 for each in weights)
 
 
-def _share(counted: tuple[int, int]) -> float:
-    return counted[0] / counted[1] if counted[1] else 0.0
-
-
-def _newcombe(first: tuple[int, int], second: tuple[int, int]) -> tuple[float, float]:
+def _newcombe(first: tuple[float, float], second: tuple[float, float]) -> tuple[float, float]:
     """Return the interval of the difference of two probabilities, by those of Wilson (1927)."""
-    from scipy.stats import binomtest  # noqa: PLC0415  # an extra
-
     if not first[1] or not second[1]:
         return -1.0, 1.0
-    a, b = (binomtest(*each).proportion_ci(CONFIDENCE, method="wilson") for each in (first, second))
-    p, q = _share(first), _share(second)
-    low = p - q - math.sqrt((p - a.low) ** 2 + (b.high - q) ** 2)
-    high = p - q + math.sqrt((a.high - p) ** 2 + (q - b.low) ** 2)
-    return float(low), float(high)
+    (p, _), (q, _) = first, second
+    (a_low, a_high), (b_low, b_high) = _wilson(*first), _wilson(*second)
+    low = p - q - math.sqrt((p - a_low) ** 2 + (b_high - q) ** 2)
+    high = p - q + math.sqrt((a_high - p) ** 2 + (q - b_low) ** 2)
+    return low, high
+
+
+def _wilson(share: float, runs: float) -> tuple[float, float]:
+    z = NormalDist().inv_cdf((1 + CONFIDENCE) / 2)
+    middle = (share + z**2 / (2 * runs)) / (1 + z**2 / runs)
+    half = z / (1 + z**2 / runs) * math.sqrt(share * (1 - share) / runs + (z / (2 * runs)) ** 2)
+    return max(0.0, middle - half), min(1.0, middle + half)
+
+
+def _took_s(first: Sequence[Row], second: Sequence[Row]) -> Interval:
+    if weighted([*first, *second]):
+        if not first or not second:
+            return math.nan, math.nan, math.nan
+        return _mean_took_s(first) - _mean_took_s(second), math.nan, math.nan
+    return _welch(*([row["took_s"] for row in group] for group in (first, second)))
+
+
+def _mean_took_s(rows: Sequence[Row]) -> float:
+    total = math.fsum(map(weight_of, rows))
+    return math.fsum(weight_of(row) * row["took_s"] for row in rows) / total
 
 
 def _welch(first: Sequence[float], second: Sequence[float]) -> Interval:
@@ -208,8 +288,10 @@ def compared(first: Sequence[Row], second: Sequence[Row]) -> Difference:
     pairs = [
         (row, others[row["run"]]) for row in first if not row["error"] and row["run"] in others
     ]
-    failures = [float(not is_good(b)) - float(not is_good(a)) for a, b in pairs]
-    took_s = [b["took_s"] - a["took_s"] for a, b in pairs if is_good(a) and is_good(b)]
+    failures = [weight_of(a) * (float(is_good(a)) - float(is_good(b))) for a, b in pairs]
+    good = [(a, b) for a, b in pairs if is_good(a) and is_good(b)]
+    each = math.fsum(weight_of(a) for a, _ in good) / len(good) if good else 1.0
+    took_s = [weight_of(a) / each * (b["took_s"] - a["took_s"]) for a, b in good]
     return Difference(len(pairs), _mean(failures), _mean(took_s))
 
 
@@ -262,8 +344,18 @@ class SequentialTest:
 
 def ends(rows: Sequence[Row]) -> Mapping[tuple[str, str], Estimate]:
     """Return the probability of each outcome and end, the most likely first."""
-    counted: Counter[tuple[str, str]] = Counter((row["outcome"], row["end"]) for row in rows)
-    return {end: estimated(count, len(rows)) for end, count in counted.most_common()}
+    counted = dict.fromkeys((row["outcome"], row["end"]) for row in rows)
+    found = {end: probability(rows, partial(_has_end, end)) for end in counted}
+    return dict(sorted(found.items(), key=lambda item: -item[1].share))
+
+
+def _has_end(end: tuple[str, str], row: Row) -> bool:
+    return (row["outcome"], row["end"]) == end
+
+
+def failure(rows: Sequence[Row]) -> Estimate:
+    """Return the probability of failure."""
+    return probability(rows, lambda row: not is_good(row))
 
 
 @dataclass(frozen=True, slots=True)
@@ -279,12 +371,17 @@ def requirements(rows: Sequence[Row]) -> Mapping[str, Kept]:
     names = dict.fromkeys(key for row in rows for key in row if key.startswith("requirement."))
     found = {}
     for key in names:
-        said = Counter(row[key] for row in rows if key in row)
-        runs = said.total()
-        found[key.removeprefix("requirement.")] = Kept(
-            estimated(said["satisfied"], runs), estimated(said["violated"], runs)
+        known = [row for row in rows if key in row]
+        satisfied, violated = (
+            probability(known, partial(_has_verdict, key, verdict))
+            for verdict in ("satisfied", "violated")
         )
+        found[key.removeprefix("requirement.")] = Kept(satisfied, violated)
     return found
+
+
+def _has_verdict(key: str, verdict: str, row: Row) -> bool:
+    return bool(row[key] == verdict)
 
 
 def rehearsed(rows: Iterable[Row]) -> list[Row]:

@@ -13,8 +13,10 @@ from typing import Any
 from m2pem.campaign.distributions import Distribution, Draw, weighted
 from m2pem.campaign.variations_file import (
     Arrival,
+    Failure,
     VariationsModel,
     VariedBehavior,
+    VariedLink,
     VariedService,
     read_model,
 )
@@ -27,6 +29,8 @@ from m2pem.rehearsal.answers import Answers, check_answers
 from m2pem.rehearsal.answers_file import AnswersModel
 
 Drawn = float | bool | str
+
+MayHappen = Failure | Arrival | VariedLink
 
 _DEGREES = ("deg", math.degrees(1))
 _SHOWN: Mapping[str, tuple[str, float]] = {
@@ -48,10 +52,12 @@ def shown(name: str, value: float) -> str:
 @dataclass(frozen=True, slots=True)
 class DrawnRun:
     """One run that was drawn. `answers`: the content of its answers file; `values`: what was drawn
-    for the first visit of each element, and for the whole run, by its name."""
+    for the first visit of each element, and for the whole run, by its name. `weight`: how many
+    times as likely it is as it was drawn."""
 
     answers: dict[str, Any]
     values: dict[str, Drawn]
+    weight: float = 1.0
 
 
 class Variations:
@@ -60,6 +66,16 @@ class Variations:
     def __init__(self, model: VariationsModel, source: YamlSource) -> None:
         self.model = model
         self.source = source
+
+    @property
+    def weighted(self) -> bool:
+        """Whether anything is drawn with another probability than its own."""
+        model = self.model
+        tasks: list[VariedBehavior | VariedService] = []
+        tasks += [*model.behaviors.values(), *model.services.values()]
+        may_happen: list[MayHappen] = [*model.signals, *model.messages, *model.links]
+        may_happen += [each.fails for each in tasks if each.fails is not None]
+        return any(each.sampled is not None for each in may_happen)
 
     def draw(self, seed: int, run: int) -> DrawnRun:
         """Return what happens in one run. The same seed and run give the same."""
@@ -105,6 +121,7 @@ class _Drawing:
         self._draw = draw
         self._everything = everything
         self._values: dict[str, Drawn] = {}
+        self._weight = 1.0
 
     def whole(self) -> DrawnRun:
         model, visits = self._model, range(self._model.visits)
@@ -129,7 +146,8 @@ class _Drawing:
             speed = self._number("wind", model.wind.speed)
             from_rad = self._number("wind.from", model.wind.from_)
             answers["wind"] = {"speed": speed, "from": f"{from_rad!r} rad"}
-        return DrawnRun({key: said for key, said in answers.items() if said}, self._values)
+        content = {key: said for key, said in answers.items() if said}
+        return DrawnRun(content, self._values, self._weight)
 
     def _number(self, key: str, distribution: Distribution, visit: int = 0) -> float:
         value = distribution.value(self._draw.share(key, visit))
@@ -137,8 +155,13 @@ class _Drawing:
             self._values[key] = value
         return value
 
-    def _happens(self, key: str, probability: float, visit: int = 0) -> bool:
-        happens = self._draw.share(key, visit) < probability
+    def _happens(self, key: str, drawn: MayHappen, visit: int = 0) -> bool:
+        probability, sampled = drawn.probability, drawn.sampled
+        if sampled is None or visit > 0:
+            sampled = probability
+        happens = self._draw.share(key, visit) < sampled
+        if sampled != probability:
+            self._weight *= probability / sampled if happens else (1 - probability) / (1 - sampled)
         if visit == 0:
             self._values[key] = happens
         return happens or self._everything
@@ -167,7 +190,7 @@ class _Drawing:
 
     def _behavior(self, element: str, varied: VariedBehavior, visit: int) -> dict[str, Any]:
         key = f"behaviors.{element}"
-        if (fails := varied.fails) and self._happens(f"{key}.fails", fails.probability, visit):
+        if (fails := varied.fails) and self._happens(f"{key}.fails", fails, visit):
             after_s = fails.after.value(self._draw.share(f"{key}.fails.after", visit))
             return {"after": after_s, "end": "failed", "error": fails.error}
         if varied.duration is not None:
@@ -180,7 +203,7 @@ class _Drawing:
 
     def _service(self, name: str, varied: VariedService, visit: int) -> dict[str, Any]:
         key = f"services.{name}"
-        if (fails := varied.fails) and self._happens(f"{key}.fails", fails.probability, visit):
+        if (fails := varied.fails) and self._happens(f"{key}.fails", fails, visit):
             after_s = fails.after.value(self._draw.share(f"{key}.fails.after", visit))
             return {"after": after_s, "error": fails.error}
         after_s = self._number(f"{key}.after", varied.after, visit)
@@ -196,7 +219,7 @@ class _Drawing:
         found = []
         for number, each in enumerate(arrivals):
             key = f"{kind}.{each.id}" + (f".{number}" if number else "")
-            if self._happens(f"{key}.comes", each.probability):
+            if self._happens(f"{key}.comes", each):
                 at_s = self._number(f"{key}.at", each.at)
                 found.append({"at": at_s, "id": each.id, "data": each.data})
         return found
@@ -212,7 +235,7 @@ class _Drawing:
         }
         for number, link in enumerate(self._model.links):
             key = f"links.{link.vehicle}" + (f".{number}" if number else "")
-            if self._happens(f"{key}.lost", link.probability):
+            if self._happens(f"{key}.lost", link):
                 loss = {"at": self._number(f"{key}.at", link.at)}
                 if link.for_ is not None:
                     loss["for"] = self._number(f"{key}.for", link.for_)

@@ -128,6 +128,9 @@ Factor = Annotated[
 ]
 Probability = Annotated[float, Field(ge=0, le=1)]
 Weight = Annotated[float, Field(ge=0)]
+Sampled = Annotated[float, Field(gt=0, lt=1)] | None
+"""With what probability it is drawn in place of its own, for the first visit: such runs count by
+their weight (importance sampling)."""
 
 
 def _now() -> Distribution:
@@ -148,6 +151,7 @@ class Failure(_Model):
     """With what probability a behavior or service fails, when after its start, and with what."""
 
     probability: Probability
+    sampled: Sampled = None
     after: Seconds = Field(default_factory=_now)
     error: Text = "FAILED"
 
@@ -192,6 +196,7 @@ class Arrival(_Model):
     id: Text
     at: Seconds
     probability: Probability = 1.0
+    sampled: Sampled = None
     data: dict[Text, Any] = Field(default_factory=dict)
 
 
@@ -202,6 +207,7 @@ class VariedLink(_Model):
     at: Seconds
     for_: Seconds | None = Field(None, alias="for")
     probability: Probability = 1.0
+    sampled: Sampled = None
 
 
 class VariedVehicle(_Model):

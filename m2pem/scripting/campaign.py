@@ -13,7 +13,7 @@ from m2pem.campaign.markdown import markdown_lines
 from m2pem.campaign.report import report_of
 from m2pem.campaign.report_files import write_report
 from m2pem.campaign.runs import Row, order_of, read_text
-from m2pem.campaign.statistics import Effect, Estimate, effects, ends, estimated, is_good, rehearsed
+from m2pem.campaign.statistics import Effect, Estimate, effects, ends, failure, rehearsed
 from m2pem.mission.mission import Mission
 from m2pem.mission.values import Value
 from m2pem.scripting.sources import FleetSource, fleet_of, load_mission
@@ -34,8 +34,7 @@ class Campaign:
     @property
     def failure(self) -> Estimate:
         """The probability of failure, with its interval."""
-        rows = rehearsed(self.result.rows)
-        return estimated(sum(not is_good(row) for row in rows), len(rows))
+        return failure(rehearsed(self.result.rows))
 
     @property
     def ends(self) -> Mapping[tuple[str, str], Estimate]:

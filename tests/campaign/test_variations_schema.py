@@ -18,8 +18,9 @@ from tests.campaign.conftest import TWO
 REPOSITORY = Path(__file__).parents[2]
 FOLDER = REPOSITORY / "missions" / "variations"
 PAGE = (REPOSITORY / "docs" / "campaigns.md").read_text(encoding="utf-8")
+ON_PAGE = re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL)
 EXAMPLES = {
-    "page": re.search(r"```yaml\n(.*?)```", PAGE, re.DOTALL)[1],  # type: ignore[index]  # it is there
+    **{f"page, example {number}": text for number, text in enumerate(ON_PAGE, 1)},
     "bench": VARIATIONS.decode(),
     "tests": TWO,
     **{file.name: file.read_text(encoding="utf-8") for file in FOLDER.glob("*.yaml")},
@@ -57,7 +58,7 @@ def test_every_example_fits_the_schema_and_is_read(name: str) -> None:
 
 
 def test_the_page_shows_the_example() -> None:
-    assert EXAMPLES["page"] == EXAMPLES["vignette1.yaml"]
+    assert ON_PAGE[0] == EXAMPLES["vignette1.yaml"]
 
 
 @pytest.mark.parametrize(
@@ -86,6 +87,8 @@ def test_the_page_shows_the_example() -> None:
         "vehicles: {uav1: 5}",
         "wind: 5",
         "wind: {from: 5 deg}",
+        "links: [{vehicle: uav1, at: 5 s, sampled: 1}]",
+        "signals: [{id: stop, at: 5 s, sampled: 0}]",
         "visits: 0",
         "visits: 1001",
         "visits: 1.5",
