@@ -15,10 +15,13 @@ font:16px/1.5 system-ui,sans-serif}
 h1,h2{line-height:1.25;overflow-wrap:anywhere}h2{margin-top:32px}
 .wide{overflow-x:auto}.wide:focus-visible{outline:2px solid var(--good);outline-offset:2px}
 table{border-collapse:collapse}td,th{padding:4px 12px 4px 0;text-align:left;vertical-align:top;
-border-bottom:1px solid var(--rule)}tbody th{font-weight:normal;min-width:120px}
+border-bottom:1px solid var(--rule)}tbody th{font-weight:normal}
+tbody th:not(.number){min-width:120px}
 .number{text-align:right;font-variant-numeric:tabular-nums}.interval{white-space:nowrap}
 figure{margin:24px 0}.chart{max-width:100%;min-width:560px;height:auto}
-@media print{:root{color-scheme:light}body{padding:0;max-width:none;font-size:11px}
+@media print{:root{color-scheme:light}body{padding:0;max-width:none;font-size:9px}
+tbody th:not(.number){min-width:0;overflow-wrap:anywhere}.interval{white-space:normal}
+td,th{padding:2px 8px 2px 0}
 .wide{overflow:visible}.chart{min-width:0}tr,figure{break-inside:avoid}h2{break-after:avoid}
 thead{display:table-header-group}}
 """

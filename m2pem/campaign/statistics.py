@@ -134,8 +134,8 @@ class Effect:
     """How a drawn quantity changes a probability of failure and a duration.
 
     `split`: how the runs are halved: those with it and without, or above the median and not above.
-    `share`: of the runs that have it. `failure`, within `low` and `high` (Newcombe 1998): the
-    difference of the two probabilities; `took_s`: of the mean durations of good runs (Welch 1947).
+    `share`: of all runs, those that have it. `failure`, within `low` and `high` (Newcombe 1998):
+    the difference of both probabilities; `took_s`: of the mean durations of good runs (Welch 1947).
     `rank`: Spearman's correlation with failure; nan of a quantity that is no number. Weighted runs
     have neither the interval of the time nor a rank, and count as so many runs as would be as
     uncertain (Kish 1965).
@@ -175,6 +175,7 @@ def _effects_of(name: str, rows: Sequence[Row]) -> Iterable[Effect]:
     drawn = name.removeprefix("drawn.")
     if len(set(values)) < 2:
         return
+    total = math.fsum(map(weight_of, rows))
     if isinstance(values[0], float):
         from scipy.stats import spearmanr  # noqa: PLC0415  # an extra
 
@@ -184,17 +185,19 @@ def _effects_of(name: str, rows: Sequence[Row]) -> Iterable[Effect]:
         if len(set(failures)) > 1 and not weighted(known):
             rank = float(spearmanr(values, failures).statistic)
         above = [each > median for each in values]
-        yield _effect(drawn, f"above {shown(drawn, median)}", known, above, rank)
+        yield _effect(drawn, f"above {shown(drawn, median)}", known, above, rank, total)
     elif isinstance(values[0], bool):
-        yield _effect(drawn, "with it", known, values, math.nan)
+        yield _effect(drawn, "with it", known, values, math.nan, total)
     else:
         for choice in sorted(set(values)):
-            yield _effect(drawn, f"{choice}", known, [each == choice for each in values], math.nan)
+            chosen = [each == choice for each in values]
+            yield _effect(drawn, f"{choice}", known, chosen, math.nan, total)
 
 
 def _effect(
-    name: str, split: str, rows: Sequence[Row], with_it: Sequence[bool], rank: float
+    name: str, split: str, rows: Sequence[Row], with_it: Sequence[bool], rank: float, total: float
 ) -> Effect:
+    """`rows`: those for which it was drawn. `total`: the weight of all."""
     groups: list[list[Row]] = [[], []]
     for row, within in zip(rows, with_it, strict=True):
         groups[within].append(row)
@@ -204,7 +207,7 @@ def _effect(
     return Effect(
         name,
         split,
-        math.fsum(map(weight_of, groups[1])) / math.fsum(map(weight_of, rows)),
+        math.fsum(map(weight_of, groups[1])) / total,
         within_[0] - without[0],
         low,
         high,

@@ -90,6 +90,14 @@ def test_what_is_compared_with_a_value_says_its_unit(name: str, value: float, te
     assert effect.split == f"above {text}"
 
 
+def test_what_is_drawn_in_few_runs_costs_little() -> None:
+    rows = [row(run, True) for run in range(900)]
+    rows += [row(run, run % 2 == 0, at=float(run % 2) + run / 1e6) for run in range(900, 1000)]
+    [effect] = effects(rows)
+    assert effect.failure == 1
+    assert effect.cost == pytest.approx(0.05)
+
+
 def test_pairs_are_compared_more_exactly_than_two_groups() -> None:
     first = [row(run, run % 3 > 0, 100.0 + run) for run in range(300)]
     second = [row(run, run % 3 > 0 and run % 30 != 1, 95.0 + run) for run in range(250)]

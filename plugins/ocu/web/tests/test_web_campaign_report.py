@@ -29,6 +29,9 @@ TABLES = """() => [...document.querySelectorAll("table")].map((table) =>
   [...table.rows].map((row) => [...row.cells].map((cell) => cell.textContent)))"""
 BACKGROUND = "() => getComputedStyle(document.body).backgroundColor"
 CHART_BACKGROUND = "() => getComputedStyle(document.querySelector('.chart > rect')).fill"
+PAPER = 718
+"""Pixels across A4, without its margins."""
+
 WHITE = "rgb(255, 255, 255)"
 
 
@@ -109,6 +112,8 @@ async def test_it_is_accessible_in_light_and_dark_and_on_a_phone(
         for element in (BACKGROUND, CHART_BACKGROUND):
             assert (await page.evaluate(element) == WHITE) is (scheme == "light")
         await page.emulate_media(media="print")
+        await page.set_viewport_size({"width": PAPER, "height": 1000})
+        assert await page.evaluate("() => document.documentElement.scrollWidth") == PAPER
         for element in (BACKGROUND, CHART_BACKGROUND):
             assert await page.evaluate(element) == WHITE
 
