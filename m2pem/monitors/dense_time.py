@@ -175,8 +175,8 @@ def delays_us(formula: Formula) -> frozenset[int]:
     inner = frozenset({0}).union(*(delays_us(each) for each in _children(formula)))
     if not isinstance(formula, Timed):
         return inner
-    own = {formula.low_us or formula.high_us, formula.high_us, formula.high_us - formula.low_us}
-    return frozenset(a + b for a in inner for b in own)
+    own = {formula.low_us, formula.high_us, formula.high_us - formula.low_us}
+    return frozenset(a + b for a in inner for b in own) - {0}  # a change is read anyway
 
 
 def _children(formula: Formula) -> Iterator[Formula]:
