@@ -69,6 +69,7 @@ class PlainOcu:
         self._prompts: dict[tuple[RunId, str], OpenPrompt] = {}
         self._active: dict[RunId, None] = {}
         """Runs that have not ended, in the order of their first events."""
+        self._ended: set[RunId] = set()
         self._lines: asyncio.Queue[str] = asyncio.Queue()
         self._listening = True
         self._end_noted = False
@@ -146,6 +147,7 @@ class PlainOcu:
                 self._active[run] = None
             case RunEnded():
                 self._active.pop(run, None)
+                self._ended.add(run)
 
     def _open(self, prompt: OpenPrompt) -> None:
         key = (prompt.run, prompt.prompt)
@@ -226,23 +228,30 @@ class PlainOcu:
         names = ", ".join(map(self._name, self._prompts))
         raise OperatorError(f"several prompts are open: {names}; begin with the one you answer")
 
-    def _which(self, words: list[str]) -> RunId:
+    async def _which(self, words: list[str]) -> RunId:
+        """The run that is named, else the only one that this unit has seen go on. Where it has seen
+        none, as it came later, the executive is asked."""
         if words:
             return words[0]
-        if len(self._active) != 1:
+        going_on = list(self._active) or [
+            each.run
+            for each in await self._control.runs()
+            if each.status in (RunStatus.RUNNING, RunStatus.PAUSED) and each.run not in self._ended
+        ]
+        if len(going_on) != 1:
             raise OperatorError(
-                f"which run: {', '.join(self._active)}?" if self._active else "no mission runs"
+                f"which run: {', '.join(going_on)}?" if going_on else "no mission runs"
             )
-        return next(iter(self._active))
+        return going_on[0]
 
     async def _stop(self, words: list[str]) -> None:
         if words == ["all"]:
             await self._control.stop_all(by=NAME)
         else:
-            await self._control.stop(self._which(words), by=NAME)
+            await self._control.stop(await self._which(words), by=NAME)
 
     async def _pause(self, words: list[str]) -> None:
-        await self._control.pause(self._which(words), by=NAME)
+        await self._control.pause(await self._which(words), by=NAME)
 
     async def _resume(self, words: list[str]) -> None:
         """Resume a paused run; while none is paused, it may answer a prompt after a restart."""
@@ -254,7 +263,7 @@ class PlainOcu:
         if asked and not words and not await self._is_any_paused():
             await self._answer(["resume"])
         else:
-            await self._control.resume(self._which(words), by=NAME)
+            await self._control.resume(await self._which(words), by=NAME)
 
     async def _is_any_paused(self) -> bool:
         runs = await self._control.runs()
@@ -274,7 +283,7 @@ class PlainOcu:
 
     async def _requirements(self, words: list[str]) -> None:
         """List the requirements of a run, what is violated first."""
-        run, last = self._which(words), 0
+        run, last = await self._which(words), 0
         known = RequirementStates()
         while page := await self._control.records(run, last):
             for stamped in page:

@@ -340,3 +340,11 @@ async def test_the_requirements_of_a_run_are_listed_with_their_verdicts(operator
         "home is open: At some point the mission is over\n"
         "r2 is monitored for no requirement\n"
     )
+
+
+async def test_the_only_run_is_meant_also_if_it_had_begun_before(operator: Operator) -> None:
+    await operator.type("stop")
+    assert operator.control.calls == [("stop", "r1")]
+    await operator.hear(RunStarted("P", 0), run="r3")
+    await operator.type("stop")
+    assert operator.control.calls[1:] == [("stop", "r3")]

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from tests.cli.conftest import Invoke
-from tests.command_line import REPOSITORY
+from tests.command_line import REPOSITORY, CommandLine
 
 PAIR = (
     REPOSITORY / "missions" / "survey_pair.bpmn",
@@ -166,3 +166,21 @@ def test_a_rehearsal_knows_telemetry_from_the_first_moment_on(
     }  # fmt: skip
     assert decided["full"]["because"] == "not battery(uav1) > 99 %"
     assert records(out, "RequirementLeftOpen") == []
+
+
+def test_an_operator_who_comes_later_lists_them(m2pem: CommandLine, tmp_path: Path) -> None:
+    mission = tmp_path / "wait.bpmn"
+    mission.write_text(WAIT.replace("PT0.2S", "PT1H"), encoding="utf-8")
+    words = (mission, *NOBODY, "--spec", spec(tmp_path), "--format", "json")
+    program = m2pem.start("run", *words)
+    program.until_record("RequirementDecided", requirement="soon")
+    operator = m2pem.start("attach", "--ocu", "plain")
+    operator.type("requirements")
+    assert operator.until_text("soon is violated") == (
+        "soon is violated since 0.1 s: Within 0.1 s 'Wait' is completed (its time is over)"
+    )
+    assert operator.until_text("later is") == "later is open: Within 9 s 'Wait' is completed"
+    operator.type("stop")
+    left = program.until_record("RequirementLeftOpen", requirement="later")
+    assert left["because"] == "the run was stopped"
+    assert program.rest()[0] == 130
