@@ -7,7 +7,7 @@ folder of its own, as `m2pem sitl` starts it, and speaks to a UDP port of this m
 import os
 import socket
 import subprocess
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 
@@ -20,6 +20,7 @@ __all__ = [
     "SPEED",
     "Launch",
     "ardupilot",
+    "first_instance",
     "free_port",
     "program",
     "programs_folder",
@@ -65,11 +66,17 @@ def programs_folder(folder: Path, *names: str) -> Path:
     return folder
 
 
+def first_instance(programs: int) -> int:
+    """The number of the first of so many programs; tests run side by side (pytest -n)."""
+    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
+    return programs * worker
+
+
 def ardupilot(
     binary: Path,
     model: str,
     instance: int,
-    port: int,
+    port: int | Sequence[int],
     system_id: int | None = None,
     parameters: Mapping[str, float] = MappingProxyType({}),
 ) -> Launch:
@@ -83,7 +90,7 @@ def ardupilot(
         _start(system - 1),
         instance=instance,
         system_id=system,
-        ports=[port],
+        ports=[port] if isinstance(port, int) else port,
         parameters=parameters,
     )
 
