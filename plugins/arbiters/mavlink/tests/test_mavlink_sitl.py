@@ -1,7 +1,6 @@
 """The contract of arbiters on real autopilots, in the loop with their makers' simulations."""
 
 import asyncio
-import os
 import signal
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -20,12 +19,13 @@ from m2pem.testing import ArbiterCase, ArbiterContract
 
 A, B = ResourceId("a"), ResourceId("b")
 READY_WITHIN_S = 120.0
+LOST_AFTER_S = 2.0
+"""Of the wall clock: tests share their processors, and a process may get none for a while."""
 
 
 def ardupilots(binary: Path, model: str, ports: list[int]) -> list[sitl.Launch]:
-    """Vehicles with system ids from 1 on; tests run side by side (pytest -n)."""
-    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
-    first = len(ports) * worker
+    """Vehicles with system ids from 1 on."""
+    first = sitl.first_instance(len(ports))
     return [
         sitl.ardupilot(binary, model, first + number, port, number + 1)
         for number, port in enumerate(ports)
@@ -106,7 +106,9 @@ class _RealAutopilot(ArbiterContract):
             connections = {}
             for number, (resource, (_, url)) in enumerate(zip((A, B), autopilots, strict=True), 1):
                 settings = {"url": url, "system_id": number, "driver": request.param}
-                connections[resource] = Connection(resource, self.domain, settings)
+                connections[resource] = Connection(
+                    resource, self.domain, settings, lost_after_s=LOST_AFTER_S * self.speed
+                )
             return MavlinkArbiter(connections, context)
 
         return make
