@@ -4,7 +4,14 @@ import { SelectField } from "../../properties/fields/SelectField";
 import { TextField } from "../../properties/fields/TextField";
 import { Rows } from "../../properties/forms/Rows";
 import { commandingTasks, servingTasks, type Task } from "../drawn";
-import { carriesError, ENDS, hasTime, isGiven } from "./answers";
+import {
+  carriesError,
+  ENDS,
+  hasTime,
+  isFactor,
+  isGiven,
+  type ScriptedBehavior,
+} from "./answers";
 import type { PartProps } from "./AnswersForm";
 import { Seconds } from "./Seconds";
 
@@ -83,6 +90,8 @@ export function Services({ editor, script, write }: PartProps) {
   );
 }
 
+const NEW: ScriptedBehavior = { element: "", after: "5", factor: "", end: "failed", error: "" };
+
 export function Behaviors({ editor, script, write }: PartProps) {
   const tasks = commandingTasks(editor);
   if (tasks.length === 0 && script.behaviors.length === 0) return null;
@@ -92,7 +101,7 @@ export function Behaviors({ editor, script, write }: PartProps) {
       <Rows
         rows={script.behaviors}
         write={(behaviors) => write({ behaviors })}
-        add={() => ({ element: tasks[0]?.id ?? "", after: "5", end: "failed" as const, error: "" })}
+        add={() => ({ ...NEW, element: tasks[0]?.id ?? "" })}
         addLabel={words.addBehavior}
         empty={words.behaviorUsual}
         label={(row) => nameOf(tasks, row.element)}
@@ -116,13 +125,22 @@ export function Behaviors({ editor, script, write }: PartProps) {
                 options={ENDS.map((end) => ({ value: end, label: words.ends[end] }))}
                 write={(end) => change({ end: ENDS.find((each) => each === end) ?? row.end })}
               />
-              {hasTime(row.end) && (
+              {hasTime(row.end) ? (
                 <Seconds
                   id={`${id}-after`}
                   label={words.after}
                   value={row.after}
                   required
                   write={(after) => change({ after })}
+                />
+              ) : (
+                <TextField
+                  id={`${id}-factor`}
+                  label={words.factor}
+                  value={row.factor}
+                  placeholder="1"
+                  error={row.factor.trim() && !isFactor(row.factor) ? words.unread.factor : undefined}
+                  write={(factor) => change({ factor })}
                 />
               )}
               {carriesError(row.end) && (

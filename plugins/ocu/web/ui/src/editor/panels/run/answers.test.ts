@@ -14,9 +14,10 @@ const script: Script = {
     { element: "Detector", after: "", name: "", value: "", error: "SENSOR_BROKEN" },
   ],
   behaviors: [
-    { element: "DriveRoute", after: "30", end: "failed", error: "ROUTE_BLOCKED" },
-    { element: "DriveStop", after: "9", end: "stalled", error: "ignored" },
-    { element: "DriveStop", after: "left", end: "simulated", error: "" },
+    { element: "DriveRoute", after: "30", factor: "2", end: "failed", error: "ROUTE_BLOCKED" },
+    { element: "DriveStop", after: "9", factor: "", end: "stalled", error: "ignored" },
+    { element: "DriveStop", after: "left", factor: "", end: "simulated", error: "" },
+    { element: "DriveStop", after: "", factor: "1.25", end: "simulated", error: "" },
   ],
   sends: [
     { kind: "signal", id: "dc45ff2b-ef6b", at: "12.5", data: "reason = dust, depth = 2" },
@@ -39,6 +40,7 @@ behaviors:
   DriveStop:
     - {after: 9 s, end: stalled}
     - {end: simulated}
+    - {end: simulated, factor: 1.25}
 signals:
   - {at: 12.5 s, id: dc45ff2b-ef6b, data: {reason: dust, depth: 2}}
 messages:
@@ -58,6 +60,10 @@ wind: {speed: 6 m/s}
     expect(isComplete({ ...script, sends: [{ ...send!, data: "dust" }] })).toBe(false);
     for (const after of ["soon", ""]) {
       const behaviors = [{ ...script.behaviors[0]!, after }];
+      expect(isComplete({ ...script, behaviors })).toBe(false);
+    }
+    for (const factor of ["0", "-1", "twice"]) {
+      const behaviors = [{ ...script.behaviors[0]!, end: "simulated" as const, factor }];
       expect(isComplete({ ...script, behaviors })).toBe(false);
     }
     const answers = { Ask: [{ decision: "go", after: "soon" }] };

@@ -17,10 +17,14 @@ export interface ScriptedAnswer {
   after: string;
 }
 
-/** Of a behavior: after how many seconds it ends, how, and with what error. */
+/**
+ * Of a behavior: after how many seconds it ends, how, and with what error. `factor`: by its own motion, it
+ * takes so many times as long; "": 1.
+ */
 export interface ScriptedBehavior {
   element: string;
   after: string;
+  factor: string;
   end: End;
   error: string;
 }
@@ -55,12 +59,19 @@ export const EMPTY: Script = { answers: {}, behaviors: [], services: [], sends: 
 
 export const isSeconds = (text: string): boolean => /^\d+(\.\d+)?$/.test(text.trim());
 
+export const isFactor = (text: string): boolean =>
+  /^\d*\.?\d+(e[-+]?\d+)?$/i.test(text.trim()) && Number(text) > 0;
+
+/** Whether it is said when or how fast a behavior ends, if that has to be said. */
+const isBehaviorTimed = ({ after, factor, end }: ScriptedBehavior): boolean =>
+  hasTime(end) ? isSeconds(after) : factor.trim() === "" || isFactor(factor);
+
 /** Whether nothing is missing in the rows: times, and what is meant. */
 export function isComplete(script: Script): boolean {
   const timed = (text: string) => text.trim() === "" || isSeconds(text);
   return (
     Object.values(script.answers).every((visits) => visits.every(({ after }) => timed(after))) &&
-    script.behaviors.every((row) => row.element && (isSeconds(row.after) || !hasTime(row.end))) &&
+    script.behaviors.every((row) => row.element && isBehaviorTimed(row)) &&
     script.services.every((row) => row.element && timed(row.after) && isGiven(row)) &&
     script.sends.every(({ id, at, data }) => id && isSeconds(at) && dataOf(data) !== undefined)
   );
@@ -122,10 +133,11 @@ function answerEntry({ decision, after }: ScriptedAnswer): string {
   ]);
 }
 
-function behaviorEntry({ after, end, error }: ScriptedBehavior): string {
+function behaviorEntry({ after, factor, end, error }: ScriptedBehavior): string {
   return flow([
     ...(hasTime(end) ? [["after", seconds(after)] as const] : []),
     ["end", end],
+    ...(!hasTime(end) && factor.trim() ? [["factor", String(Number(factor))] as const] : []),
     ...(carriesError(end) && error.trim() ? [["error", written(error.trim())] as const] : []),
   ]);
 }

@@ -46,8 +46,9 @@ it("reads what the form writes", () => {
       { element: "Detector", after: "0.5", name: "at", value: '[1,{"x":null}]', error: "" },
     ],
     behaviors: [
-      { element: "Drive", after: "", end: "simulated", error: "" },
-      { element: "Drive", after: "30", end: "failed", error: "ROUTE_BLOCKED" },
+      { element: "Drive", after: "", factor: "", end: "simulated", error: "" },
+      { element: "Drive", after: "", factor: "1.2345678901234567", end: "simulated", error: "" },
+      { element: "Drive", after: "30", factor: "", end: "failed", error: "ROUTE_BLOCKED" },
     ],
     sends: [
       { kind: "signal", id: "dc45ff2b", at: "12.5", data: "reason = dust, depth = 2" },
@@ -93,6 +94,8 @@ describe("what the form cannot show stays as YAML, with the reason", () => {
     ["answers: {Ask: [{after: 3}]}", /^answers\.Ask\[0\]\.decision: write a text$/],
     ["answers: {Ask: [{decision: a, at: 3}]}", /^answers\.Ask\[0\]\.at: write one of decision/],
     ["behaviors: {D: [{after: 3, end: simulated}]}", /\.after: what ends by its own motion/],
+    ["behaviors: {D: [{end: simulated, factor: 0}]}", /\.factor: write a number above 0/],
+    ["behaviors: {D: [{after: 3, end: lost, factor: 2}]}", /\.factor: only what ends by its own/],
     ["answers: {Ask: continue}", /^answers\.Ask: write a list/],
     ["answers: {Ask: [true]}", /^answers\.Ask\[0\]: write a text$/],
     ["services: {S: [{write: {a: 1, b: 2}}]}", /^services\.S\[0\]\.write: the form writes one/],

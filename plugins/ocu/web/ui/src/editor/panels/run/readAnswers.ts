@@ -7,6 +7,7 @@ import {
   dataOf,
   ENDS,
   hasTime,
+  isFactor,
   type Script,
   type ScriptedAnswer,
   type ScriptedSend,
@@ -125,9 +126,11 @@ function behaviorOf(entry: Entry, place: string) {
   if (error && !carriesError(end)) throw unread(words.errorOfFailure, `${place}.error`);
   if (!hasTime(end)) {
     if (entry["after"] !== undefined) throw unread(words.noTime, `${place}.after`);
-    return { after: "", end, error };
+    return { after: "", factor: factorOf(entry["factor"] ?? 1, `${place}.factor`), end, error };
   }
-  return { after: secondsOf(entry["after"] ?? null, `${place}.after`), end, error };
+  if (entry["factor"] !== undefined) throw unread(words.noFactor, `${place}.factor`);
+  const after = secondsOf(entry["after"] ?? null, `${place}.after`);
+  return { after, factor: "", end, error };
 }
 
 function sendsOf(file: Entry, kind: ScriptedSend["kind"]): ScriptedSend[] {
@@ -148,6 +151,12 @@ function sendsOf(file: Entry, kind: ScriptedSend["kind"]): ScriptedSend[] {
       data: shown,
     };
   });
+}
+
+/** How many times as long; "" where it is as long. */
+function factorOf(value: Value, place: string): string {
+  if (typeof value !== "number" || !isFactor(String(value))) throw unread(words.factor, place);
+  return value === 1 ? "" : String(value);
 }
 
 /** A duration as a number of seconds. */
