@@ -33,7 +33,8 @@ let receivedAt_ms = Date.now();
 /** Known from the stream, while it is connected. */
 export const serverClock = new ServerClock();
 
-const OVER = new Set(["completed", "terminated", "failed", "stopped"]);
+/** The states of a run that has ended. */
+export const OVER: ReadonlySet<string> = new Set(["completed", "terminated", "failed", "stopped"]);
 
 export const isOver = (run: RunSummary): boolean => OVER.has(run.status);
 

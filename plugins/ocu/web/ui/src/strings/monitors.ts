@@ -9,7 +9,7 @@ export const monitors = {
     violated: "violated",
   },
   openHint: "not decided yet: what comes next may satisfy or violate it",
-  neverDecided: "not decided: the run was stopped before that",
+  neverDecided: "not decided, and the run has ended",
   since: "since {time}",
   openBecause: "Why it is open: {because}",
   because: "What made it certain: {because}",

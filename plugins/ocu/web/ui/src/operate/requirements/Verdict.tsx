@@ -1,5 +1,6 @@
 // One requirement, and what is certain of it.
 import type { ComponentChildren } from "preact";
+import { OVER } from "../../shared/executive";
 import { clockTenths } from "../../shared/format";
 import type { Requirement, RunStatus } from "../../shared/types";
 import { fill, strings } from "../../strings";
@@ -48,7 +49,7 @@ export function Verdict({ name, requirement, status, onShow, hint, children }: V
       )}
       <p>{english}</p>
       {verdict === "open" && (
-        <p class="hint">{status === "stopped" ? text.neverDecided : text.openHint}</p>
+        <p class="hint">{status && OVER.has(status) ? text.neverDecided : text.openHint}</p>
       )}
       {because && <p>{fill(verdict === "open" ? text.openBecause : text.because, { because })}</p>}
       {thrown && <p class="hint">{fill(thrown, { name: rest.join(":") })}</p>}

@@ -11,7 +11,7 @@ export const monitors: Translation<typeof english.monitors> = {
     violated: "verletzt",
   },
   openHint: "noch nicht entschieden: was noch kommt, kann sie erfüllen oder verletzen",
-  neverDecided: "nicht entschieden: der Lauf wurde vorher gestoppt",
+  neverDecided: "nicht entschieden, und der Lauf ist zu Ende",
   since: "seit {time}",
   openBecause: "Warum sie offen ist: {because}",
   because: "Wodurch das feststeht: {because}",
