@@ -232,9 +232,16 @@ class ArdupilotDriver(Autopilot):
 
     async def upload(self, items: Sequence[MissionItem]) -> None:
         """Store a mission. The landing sequence of the mission before stays behind it, unless the
-        new one has its own; the mission must not continue into it."""
+        new one has its own; the mission must not continue into it.
+
+        In AUTO an ArduPilot would go on at once with the new mission, at the number of the item
+        that it was at in the old one. So it leaves AUTO first: if m2pem is killed before the
+        mission is started at its first item, the vehicle waits.
+        """
         if self.kind is Kind.PLANE and items and landing_start(items) is None:
             items = (*items, *landing_items(await self.downloaded()))
+        if self.state.mode is FlightMode.MISSION:
+            await self.set_mode(FlightMode.GUIDED)
         await super().upload(items)
 
     async def start_mission(self, first: int = 0) -> None:
