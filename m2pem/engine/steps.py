@@ -130,11 +130,14 @@ class Steps(Execution):
         # Written out for speed: there may be thousands at each of many batches.
         tokens, scopes = self.state.tokens, self.state.scopes
         steps = []
-        for item in dict.fromkeys(self._in_order()):
+        there = set[int]()
+        for item in self._in_order():
             if type(item) is Token:
-                if tokens.get(item.id) is item and not item.incident:
+                if tokens.get(item.id) is item and not item.incident and item.id not in there:
+                    there.add(item.id)
                     steps.append(item.id)
             elif scopes.get(item.id) is item:
+                # As often as it is queued: it may complete at any of its turns.
                 steps.append(-item.id)
         self.queue.clear()
         self.entered.clear()

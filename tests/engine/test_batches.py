@@ -35,6 +35,28 @@ def test_a_run_in_batches_leaves_the_same_trace_as_in_one_go(batch: int) -> None
     assert all(len(step.records) < 20 * batch + 20 for step in parts.steps)
 
 
+@pytest.mark.parametrize("batch", range(1, 10))
+def test_a_subprocess_completes_in_the_same_order_in_batches(batch: int) -> None:
+    # Its scope is in the queue twice: before its last token, when the token moves on to the event,
+    # and after it, when the event has occurred at once.
+    text = """
+        <startEvent id="start"/> <parallelGateway id="fork"/>
+        <task id="t"/> <task id="u"/> <task id="v"/> <userTask id="w"/>
+        <subProcess id="sub">
+          <startEvent id="s"/> <endEvent id="e"/>
+          <intermediateCatchEvent id="c">conditional n == 0</intermediateCatchEvent>
+          <subProcess id="h" triggeredByEvent="true"> <startEvent id="hs">signal go</startEvent>
+          </subProcess>
+          s -> c -> e
+        </subProcess>
+        start -> fork -> t -> u -> v -> w
+        fork -> sub
+    """
+    whole = Play(text).start({"n": 0})
+    parts = Play(text, batch=batch).start({"n": 0})
+    assert without_yields(parts) == without_yields(whole)
+
+
 @pytest.mark.parametrize("batch", [1, 2, 3, 5])
 def test_timers_due_at_once_fire_in_the_same_order_in_batches(batch: int) -> None:
     text = """
