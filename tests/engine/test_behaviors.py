@@ -3,6 +3,7 @@
 import pytest
 
 from m2pem.engine import records as r
+from m2pem.engine.apply import apply
 from m2pem.engine.commands import CancelBehavior
 from m2pem.engine.inputs import BehaviorReported
 from m2pem.mission.catalogue import BehaviorState
@@ -296,3 +297,14 @@ def test_a_mission_may_have_a_return_ended_by_a_low_battery_and_other_faults_end
     assert play.fault("evsg1", "BATTERY_LOW").at == "u"
     play = Play(COMES_DOWN.format(behavior="return_to_launch", more="")).start()
     assert play.fault("evsg1", "LINK_LOST").ended == "failed"
+
+
+def test_parameters_that_were_adjusted_are_in_the_order_of_their_records() -> None:
+    # The same in each process that replays the run, whatever its hashes of strings.
+    play = two("evsg1", "evsg2")
+    names = [f"p{number}" for number in range(20)]
+    behavior = play.behavior("one")
+    for some in (names[:12], names[8:]):
+        apply(play.run.state, r.BehaviorAdjusted(behavior.id, dict.fromkeys(some, 1)))
+    assert behavior.adjusted == tuple(names)
+    Play.made.clear()  # no input has led to these records

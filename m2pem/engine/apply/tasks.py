@@ -79,7 +79,7 @@ def behavior_progressed(state: RunState, record: r.BehaviorProgressed) -> None:
 def behavior_adjusted(state: RunState, record: r.BehaviorAdjusted) -> None:
     behavior = state.behaviors[record.behavior]
     behavior.parameters = {**behavior.parameters, **record.parameters}
-    behavior.adjusted = (*behavior.adjusted, *(record.parameters.keys() - behavior.adjusted))
+    behavior.adjusted = tuple(dict.fromkeys((*behavior.adjusted, *record.parameters)))
 
 
 def behavior_cancel_requested(state: RunState, record: r.BehaviorCancelRequested) -> None:
