@@ -4,6 +4,7 @@ import os
 import tempfile
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from random import Random
 
@@ -16,7 +17,7 @@ def examples(few: int, many: int) -> int:
 
 
 def seeds_for(seconds: float) -> Iterator[int]:
-    """One after another from a random one on, one at least; the test names the one that fails.
+    """One after another from a random one on, one at least; `named` says which one has failed.
 
     A file in the folder for temporary files, `m2pem-seed-` and the process's number, has the last
     one: where the process is killed for want of memory, no test can name it.
@@ -31,3 +32,13 @@ def seeds_for(seconds: float) -> Iterator[int]:
         if time.monotonic() > until:
             last.unlink()
             return
+
+
+@contextmanager
+def named(seed: int) -> Iterator[None]:
+    """Have the failure of what is done with a seed say the seed."""
+    try:
+        yield
+    except BaseException as error:  # the timeout of a test is no Exception
+        error.add_note(f"seed {seed}")
+        raise

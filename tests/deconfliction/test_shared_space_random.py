@@ -8,7 +8,7 @@ import pytest
 
 from m2pem.api.runs import RunStatus
 from m2pem.fleet.fleet import SharedSpace
-from tests.seeds import seeds_for
+from tests.seeds import named, seeds_for
 
 from .conftest import Play, World, task
 from .sky import area, place, route
@@ -107,4 +107,5 @@ def test_no_area_has_too_many_and_none_waits_while_there_is_place(play: Play, se
 @pytest.mark.long
 def test_the_same_with_other_stories(play: Play) -> None:
     for seed in seeds_for(60):
-        play_one(play, seed)
+        with named(seed):
+            play_one(play, seed)

@@ -11,7 +11,7 @@ from tests.engine.kit import Play
 from tests.engine.random_missions import structured
 from tests.engine.random_play import RandomPlay
 from tests.engine.trace import table
-from tests.seeds import seeds_for
+from tests.seeds import named, seeds_for
 
 ROUND = """
     <startEvent id="start"/> <exclusiveGateway id="merge"/>
@@ -207,19 +207,25 @@ class Stepped(RandomPlay):
             self.give(i.Tick())
 
 
+MOST_STEPS = 2_000
+"""After one input; with more, a mission is without end."""
+
+
 def check_single_steps(seed: int) -> None:
     text = structured(Random(seed))
     plays = []
     for kind in (RandomPlay, Stepped):
-        game = kind(text, 10_000)
+        game = kind(text, MOST_STEPS)
         game.spare = 0
         game.go([])
         game.finish()
+        if game.play.run.wants_continue:
+            return  # such as a process whose end event throws the signal that begins it
         plays.append(game.play)
     assert undebugged(plays[1]) == undebugged(plays[0]), (seed, text)
 
 
-@pytest.mark.parametrize("seed", range(60))
+@pytest.mark.parametrize("seed", [*range(60), 88001152])
 def test_single_steps_change_nothing_else(seed: int) -> None:
     check_single_steps(seed)
 
@@ -227,5 +233,7 @@ def test_single_steps_change_nothing_else(seed: int) -> None:
 @pytest.mark.long
 def test_single_steps_of_many_missions_change_nothing_else() -> None:
     for seed in seeds_for(120.0):
-        Play.made.clear()
-        check_single_steps(seed)
+        with named(seed):
+            check_single_steps(seed)
+            while Play.made:
+                Play.made.pop().verify()

@@ -52,7 +52,7 @@ from m2pem.verify.spin.trail import replay
 from m2pem.verify.translate import Options, translate
 from tests.engine.notation import mission as notation
 from tests.engine.random_missions import graph, structured
-from tests.seeds import examples, seeds_for
+from tests.seeds import examples, named, seeds_for
 from tests.verify import formulas
 from tests.verify.missions import approval, pair
 from tests.verify.random_needs import OPEN, branches_with_needs, fleet_of, net_of
@@ -219,11 +219,8 @@ def test_many_random_ones_have_the_same_states(made) -> None:  # type: ignore[no
         net = made(seed)
         if too_large_for_spin(net) or len(explore(net, SMALL).states) > SMALL.states:
             continue
-        try:
+        with named(seed):
             same(net)
-        except Exception as error:
-            error.add_note(f"seed {seed}")
-            raise
         compared += 1
     assert compared >= tried // 2, f"{tried - compared} of {tried} were left out"
 
