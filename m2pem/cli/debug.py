@@ -196,10 +196,14 @@ class DebugShell(cmd.Cmd):
         self.show_place()
 
     def do_data(self, _: str) -> None:
-        """data: the data of each active process, subprocess and task."""
-        for (_scope, element), data in self._session.data().items():
-            print(f"  {element} ({self._session.view.label(element)}):")
-            for name, value in data.items():
+        """data: the data of the data stores and of each active process, subprocess and task."""
+        for each in self._session.data():
+            if not each.data:
+                continue
+            label = self._session.view.label(each.element)
+            instance = "" if each.instance is None else f", instance {each.instance}"
+            print(f"  {each.element} ({label}){instance}:" if each.element else "  data stores:")
+            for name, value in each.data.items():
                 print(f"    {name} = {value!r}")
 
     def do_vehicles(self, _: str) -> None:

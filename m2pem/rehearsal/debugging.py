@@ -20,13 +20,14 @@ import msgspec
 
 from m2pem.api.clock import run_virtual
 from m2pem.api.run_view import RunView
-from m2pem.api.runs import RunStatus, RunSummary, StampedRecord
+from m2pem.api.runs import RunStatus, RunSummary, ScopeData, StampedRecord
 from m2pem.api.telemetry import PayloadState, VehicleState
 from m2pem.engine import inputs as i
 from m2pem.engine import records as r
 from m2pem.engine.breakpoints import why_refused
 from m2pem.engine.state import RunStatus as EngineStatus
 from m2pem.errors import InternalError, OperatorError
+from m2pem.executive.mission_control.debugging import data_of
 from m2pem.executive.runner import Runner
 from m2pem.fleet.fleet import Fleet
 from m2pem.mission.mission import Mission
@@ -144,9 +145,9 @@ class DebugSession:
         """Whether the run has ended: only `go_back` goes on from there."""
         return self.here.reached is None
 
-    def data(self) -> dict[tuple[int, str], dict[str, Value]]:
-        """The data of each active process and subprocess that has some, by the number of its scope
-        and its id; then that of tasks, by the number of their scope and their id."""
+    def data(self) -> Sequence[ScopeData]:
+        """The data of the data stores and of each active process, subprocess and task, from the
+        outside in: what is not empty, and that of each process."""
         return self._rehearsed.data()
 
     def moment_at(self, t_s: float) -> int:
@@ -297,15 +298,10 @@ class _Rehearsed:
             self._orders.put(i.StopRun(BY, "the author ends it"))
             self._thread.join()
 
-    def data(self) -> dict[tuple[int, str], dict[str, Value]]:
+    def data(self) -> Sequence[ScopeData]:
         """See `DebugSession.data`; nothing is executed meanwhile."""
         assert self._runner is not None
-        state = self._runner.run.state
-        found = {(each.id, each.container.id): dict(each.data) for each in state.scopes.values()}
-        for token in state.tokens.values():
-            if token.own:
-                found[token.scope.id, token.node.id] = dict(token.own)
-        return {place: data for place, data in found.items() if data}
+        return data_of(self._runner.run.state)
 
     def _next_stop(self) -> Stop:
         answer = self._answered.get()

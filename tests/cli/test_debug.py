@@ -3,11 +3,13 @@
 import io
 import sys
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
 from tests.cli.conftest import Invoke
 from tests.command_line import ANSWERS, FLEET, MISSION
+from tests.engine.notation import xml
 
 DETECTION = (MISSION, "--fleet", FLEET, "--answers", ANSWERS / "vignette1_detection.yaml")
 Printed = Callable[..., list[str]]
@@ -38,6 +40,32 @@ def test_steps_and_places(printed: Printed) -> None:
         "0.0 s  next is DETECTION",
         "VIGNETTE1 (VIGNETTE1):",
         "user.decision = 'continue'",
+    ]
+
+
+def test_data_of_stores_and_of_each_instance(
+    invoke: Invoke, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    text = """
+        <dataStore id="seen" name="seen"/> <process id="MAIN" isExecutable="true">
+        <startEvent id="start"/> <endEvent id="end"/> <scriptTask id="write">seen = 2</scriptTask>
+        <dataStoreReference id="memory" dataStoreRef="seen"/>
+        <userTask id="ask">ask a b<each m2pem:collection="['x', 'y']" m2pem:elementVariable="item">
+        </each></userTask>
+        start -> write -> ask -> end
+        </process>
+    """
+    file = tmp_path / "two.bpmn"
+    file.write_text(xml(text), encoding="utf-8")
+    monkeypatch.setattr(sys, "stdin", io.StringIO("step 3\ndata\n"))
+    _, out, _ = invoke("debug", file)
+    assert out.splitlines()[-6:] == [
+        "  data stores:",
+        "    seen = 2",
+        "  ask (ask), instance 0:",
+        "    item = 'x'",
+        "  ask (ask), instance 1:",
+        "    item = 'y'",
     ]
 
 

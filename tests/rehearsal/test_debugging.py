@@ -16,6 +16,7 @@ from m2pem.rehearsal.answers_file import AnswersModel
 from m2pem.rehearsal.debugging import OF_DEBUGGING, DebugSession
 from m2pem.rehearsal.rehearsal import rehearse
 from m2pem.scripting.sources import fleet_of
+from tests.engine.notation import mission
 
 REPOSITORY = Path(__file__).parents[2]
 MISSION = load_source(REPOSITORY / "missions/vignette1.bpmn")
@@ -72,7 +73,25 @@ def test_it_stops_before_a_task_and_its_vehicle_has_not_moved(session: DebugSess
 def test_a_condition_over_the_data_of_a_called_process_stops_it(session: DebugSession) -> None:
     session.set_breakpoints([], ["detection.type == 'camera'"])
     session.resume()
-    assert {"detection.type": "camera"} in session.data().values()
+    assert {"detection.type": "camera"} in [each.data for each in session.data()]
+
+
+def test_each_instance_has_its_data() -> None:
+    two = """
+        <startEvent id="start"/> <endEvent id="end"/>
+        <userTask id="ask">ask a b<each m2pem:collection="['x', 'y']" m2pem:elementVariable="item">
+        </each></userTask>
+        start -> ask -> end
+    """
+    with DebugSession(mission(two), None, plugins=PluginManager(), data={"n": 1}) as session:
+        session.step()
+        session.step()
+        found = {(each.element, each.instance): each.data for each in session.data()}
+    assert found == {
+        ("MAIN", None): {"n": 1},
+        ("ask", 0): {"item": "x"},
+        ("ask", 1): {"item": "y"},
+    }
 
 
 def test_a_called_process_can_be_given_other_data(session: DebugSession) -> None:

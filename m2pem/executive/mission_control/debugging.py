@@ -52,7 +52,7 @@ class DebugOperations(ControlParts):
         async with self._explain_end("data", run):
             runner = self._supervisor.runner(run)
             refuse_ended(runner)
-            return _data_of(runner.run.state)
+            return data_of(runner.run.state)
 
     def _refuse_debugging(self) -> None:
         fleet = self._supervisor.fleet
@@ -63,7 +63,7 @@ class DebugOperations(ControlParts):
             )
 
 
-def _data_of(state: RunState) -> list[ScopeData]:
+def data_of(state: RunState) -> list[ScopeData]:
     """The data of a run from the outside in: what is not empty, and that of each process."""
     found: list[ScopeData] = []
     if state.shared.data:
