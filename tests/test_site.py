@@ -92,7 +92,7 @@ def test_names_that_are_loaded_when_asked_for_are_all_there() -> None:
 
 @pytest.mark.long
 def test_links_to_files_of_the_repository_lead_to_them(site: Path) -> None:
-    written = re.compile(r"\]\(\.\./(?!\.\.)([^)#]+)\)")
+    written = re.compile(r"\]\(\.\./(?!\.\.)([^)#]+)(?:#([^)]+))?\)")
     count = 0
     for page in (REPOSITORY / "docs").glob("*.md"):
         built = site / page.relative_to(REPOSITORY / "docs").with_suffix(".html")
@@ -100,9 +100,11 @@ def test_links_to_files_of_the_repository_lead_to_them(site: Path) -> None:
         links = re.findall(r'href="(repository/[^"#]+)', text)
         targets = written.findall(page.read_text(encoding="utf-8"))
         assert len(links) == len(targets), page
-        for link, target in zip(links, targets, strict=True):
+        for link, (target, anchor) in zip(links, targets, strict=True):
             if target.endswith(".md"):
-                assert "<article" in (site / link).read_text(encoding="utf-8")
+                there = (site / link).read_text(encoding="utf-8")
+                assert "<article" in there
+                assert not anchor or f'id="{anchor}"' in there
             else:
                 assert (site / link).read_bytes() == (REPOSITORY / target).read_bytes()
             count += 1
