@@ -7,11 +7,15 @@ from m2pem.engine.revision import RevisionPlan, plan_revision
 from m2pem.engine.state import RunState
 from m2pem.mission.mission import Mission
 
+MOST = 30
+"""Ways out of a plan that are chosen."""
+
 
 def check_ways_out(
     state: RunState, new: Mission, plan: RevisionPlan, moves: Mapping[str, str], now_us: int
 ) -> Counter[str]:
-    """Choose each of them. Returns how many are to go elsewhere ("go"), and to end ("end")."""
+    """Choose each of them, up to a bound: thousands of tokens may be refused. Returns how many are
+    to go elsewhere ("go"), and to end ("end")."""
     tried: Counter[str] = Counter()
     for refusal in plan.refusals:
         ways = [*refusal.candidates, *([""] if refusal.can_end else [])]
@@ -24,4 +28,6 @@ def check_ways_out(
             assert not left, (refusal, way, left)
             assert refusal.token in {each.token for each in then.moves}
             tried["go" if way else "end"] += 1
+        if tried.total() >= MOST:
+            break
     return tried

@@ -34,7 +34,7 @@ class PlanDraft:
         self._versions = version_of(new), version_of(state.mission)
         self._requested = dict(moves)
         self._effects: list[Effect] = []
-        self._refusals: list[Refusal] = []
+        self._refusals: dict[Refusal, None] = {}  # several instances have the same one
         self._moves: list[Move] = []
         self._restarted: list[int] = []
         self._adjustments: list[Adjustment] = []
@@ -48,7 +48,7 @@ class PlanDraft:
 
     def refuse(self, element: str, text: str, token: int = 0) -> None:
         """Add why the revision cannot be, where the way out is another one than moving a token."""
-        self._refusals.append(Refusal(element, token, text))
+        self._refuse(Refusal(element, token, text))
 
     def refuse_token(self, token: Token, why: str, container: Container) -> None:
         """Add why a token cannot be on its element in the new version, and where it can go.
@@ -57,13 +57,14 @@ class PlanDraft:
         """
         moved = moved_with(token)
         there = candidates(moved, container)
-        refusal = _refusal_of(moved, f"{why}: {way_out(moved, there)}", there)
-        if refusal not in self._refusals:  # as of several instances
-            self._refusals.append(refusal)
+        self._refuse(_refusal_of(moved, f"{why}: {way_out(moved, there)}", there))
 
     def refuse_move(self, token: Token, why: str, container: Container) -> None:
         """Add why a token cannot go where it is to go. `why` says where it can."""
-        self._refusals.append(_refusal_of(token, why, candidates(token, container)))
+        self._refuse(_refusal_of(token, why, candidates(token, container)))
+
+    def _refuse(self, refusal: Refusal) -> None:
+        self._refusals[refusal] = None
 
     def move(self, move: Move) -> None:
         """Have a token leave its element."""
