@@ -22,7 +22,8 @@ figure{margin:24px 0}.chart{max-width:100%;min-width:560px;height:auto}
 @media print{:root{color-scheme:light}body{padding:0;max-width:none;font-size:9px}
 tbody th:not(.number){min-width:0;overflow-wrap:anywhere}.interval{white-space:normal}
 td,th{padding:2px 8px 2px 0}
-.wide{overflow:visible}.chart{min-width:0}tr,figure{break-inside:avoid}h2{break-after:avoid}
+.wide{overflow:visible}pre{white-space:pre-wrap;overflow-wrap:anywhere}.chart{min-width:0}
+tr,figure{break-inside:avoid}h2{break-after:avoid}
 thead{display:table-header-group}}
 """
 )

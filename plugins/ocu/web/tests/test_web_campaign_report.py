@@ -60,7 +60,8 @@ def markdown_tables(text: str) -> list[list[list[str]]]:
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     inside = f"<extensionElements>{QUICK}</extensionElements><startEvent"
     mission = sequence("A", "B").replace(b"<startEvent", inside.encode(), 1)
-    folder = tmp_path_factory.mktemp("campaign")
+    folder = tmp_path_factory.mktemp("campaign") / ("with_a_long_name_" * 8)  # so are commands
+    folder.mkdir()
     other = campaign(sequence("B", "A"), VARIATIONS, 60)
     write_report(folder, campaign(mission, VARIATIONS, 60), other)
     return folder
