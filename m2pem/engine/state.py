@@ -271,6 +271,17 @@ class Behavior:
     remaining: dict[str, Value] | None = None
     adjusted: tuple[str, ...] = ()
 
+    @property
+    def left(self) -> dict[str, Value] | None:
+        """`remaining` with what was adjusted as it is now: arbiters may report what they began
+        with."""
+        if self.remaining is None:
+            return None
+        return {
+            name: self.parameters[name] if name in self.adjusted and value is not None else value
+            for name, value in self.remaining.items()
+        }
+
 
 @dataclass(frozen=True, slots=True)
 class ControlRequest:

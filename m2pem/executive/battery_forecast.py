@@ -136,7 +136,7 @@ class BatteryForecast:
         if spec is None:
             return None
         fleet, run = self._arbiters.fleet, behavior.id.partition(".")[0]
-        raw = {**behavior.parameters, **(behavior.remaining or {})}
+        raw = {**behavior.parameters, **(behavior.left or {})}
         try:
             return resolve(
                 spec,

@@ -25,19 +25,20 @@ def task(role: str, kind: str = "vehicle") -> str:
     )
 
 
-def play(
-    role: str = 'requires="true" store="who" onLoss="reassign"', kind: str = "vehicle"
-) -> Play:
-    """A task with one of two vehicles, ugv1 has it; error LINK_LOST is caught."""
-    world = Play(
-        f"""<startEvent id="start"/> {task(role, kind)} <userTask id="then"/>
+REASSIGNS = 'requires="true" store="who" onLoss="reassign"'
+
+
+def text(role: str = REASSIGNS, kind: str = "vehicle") -> str:
+    return f"""<startEvent id="start"/> {task(role, kind)} <userTask id="then"/>
         <boundaryEvent id="lost" attachedToRef="go">error</boundaryEvent> <userTask id="caught"/>
         start -> go -> then
         lost -> caught
-        """,
-        fleet=FLEET,
-    ).start()
-    return choose(world, "ugv1")
+        """
+
+
+def play(role: str = REASSIGNS, kind: str = "vehicle") -> Play:
+    """A task with one of two vehicles, ugv1 has it; error LINK_LOST is caught."""
+    return choose(Play(text(role, kind), fleet=FLEET).start(), "ugv1")
 
 
 def running(world: Play, remaining: dict[str, object] | None = None, number: int = 2) -> Play:
@@ -79,6 +80,14 @@ def test_a_last_report_says_what_is_left() -> None:
     world = running(play(), {"route": "long"})
     world.give(i.BehaviorReported("r1.b1", 3, LOST, remaining={"route": "short"}))
     assert reassigned(world)[0].parameters["route"] == "short"
+
+
+def test_what_is_left_is_done_at_the_speed_that_a_revision_gave() -> None:
+    world = running(play(), {"route": "rest", "speed": 2.0})
+    world.revise(text().replace("2 m/s", "3 m/s"), "r1.b1")
+    running(world, {"route": "short", "speed": 2.0}, number=3)
+    world.report("go", LOST)
+    assert reassigned(world)[0].parameters == {"route": "short", "speed": "3 m/s"}
 
 
 def test_a_parameter_that_is_not_left_is_null() -> None:

@@ -44,7 +44,8 @@ def end_work(
         throw_error(x, token, code, reason, behavior=behavior)
         return
     asks = on_loss is OnLoss.ASK
-    parameters = {**behavior.parameters, **(behavior.remaining or {})}
+    left = behavior.left
+    parameters = {**behavior.parameters, **(left or {})}
     x.emit(
         r.WorkReassigned(
             token.id,
@@ -57,7 +58,7 @@ def end_work(
             parameters,
             tuple(resources) if is_excluded(code) and not asks else (),
             asks,
-            behavior.remaining,
+            left,
         )
     )
     if asks:
