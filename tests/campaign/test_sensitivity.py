@@ -115,7 +115,8 @@ def test_values_lie_in_their_intervals_and_rank_as_their_costs(
 @pytest.mark.long
 @pytest.mark.timeout(3000)
 def test_values_lie_in_their_intervals_in_90_of_100_campaigns() -> None:
-    counts = judged(campaign(1000 + seed, 250) for seed in range(100))
+    # With fewer runs, D may not fail in any of a campaign.
+    counts = judged(campaign(1000 + seed, 500) for seed in range(100))
     print(counts)
     assert min(counts.values()) >= 90, counts
 
