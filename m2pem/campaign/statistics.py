@@ -238,6 +238,7 @@ def _newcombe(first: tuple[float, float], second: tuple[float, float]) -> tuple[
 
 
 def _wilson(share: float, runs: float) -> tuple[float, float]:
+    """Return the interval of a probability; scipy's takes whole numbers of runs only."""
     z = NormalDist().inv_cdf((1 + CONFIDENCE) / 2)
     middle = (share + z**2 / (2 * runs)) / (1 + z**2 / runs)
     half = z / (1 + z**2 / runs) * math.sqrt(share * (1 - share) / runs + (z / (2 * runs)) ** 2)

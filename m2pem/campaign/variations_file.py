@@ -129,7 +129,7 @@ Factor = Annotated[
 Probability = Annotated[float, Field(ge=0, le=1)]
 Weight = Annotated[float, Field(ge=0)]
 Sampled = Annotated[float, Field(gt=0, lt=1)] | None
-"""With what probability it is drawn in place of its own, for the first visit: such runs count by
+"""The probability with which it is drawn, in place of `probability`, for the first visit: such runs count by
 their weight (importance sampling)."""
 
 

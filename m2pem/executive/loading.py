@@ -231,6 +231,7 @@ def monitored_requirements(
     """
     if spec is None and not has_requirements(mission):
         return ()
+    # What reads formulas takes time to load, and most runs have none.
     from m2pem.monitors.selection import can_be_monitored, monitored  # noqa: PLC0415
     from m2pem.verify.requirements import Names, collect  # noqa: PLC0415
 

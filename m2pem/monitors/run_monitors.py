@@ -143,6 +143,7 @@ class RunMonitors:
         mission = self._state.mission
         self._moments = Moments(made.known, mission, self._fleet, self._read, tables(made, mission))
         self._add(monitored, made)
+        # What telemetry has said before the start is true from the first moment on, to come.
         self._moments.letter = NO_LETTER
         self._product, self._at = made.product, made.product.start
 

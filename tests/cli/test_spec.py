@@ -32,12 +32,12 @@ SPEC = """requirements:
   - {id: soon, ltl: "<>[0 s, 0.1 s] completed(Wait)"}
   - {id: later, ltl: "<>[0 s, 9 s] completed(Wait)"}
 """
-NOBODY = ("--fleet", "sim", "--ocu", "none")
+NO_OPERATOR = ("--fleet", "sim", "--ocu", "none")
 
 
 @pytest.fixture
 def wait(tmp_path: Path) -> Path:
-    """A mission that waits 0.2 s, with one requirement of its own."""
+    """A mission that waits 0.2 s, that has one requirement."""
     path = tmp_path / "wait.bpmn"
     path.write_text(WAIT, encoding="utf-8")
     return path
@@ -59,7 +59,7 @@ def records(out: str, name: str) -> list[dict[str, Any]]:
 def test_a_run_is_monitored_for_those_in_both_files(
     invoke: Invoke, wait: Path, tmp_path: Path, command: str
 ) -> None:
-    more = (*NOBODY, "--journal", "memory:") if command == "run" else ()
+    more = (*NO_OPERATOR, "--journal", "memory:") if command == "run" else ()
     status, out, _ = invoke(command, wait, *more, "--spec", spec(tmp_path), "--format", "json")
     assert status == 0
     monitored = [each["requirement"] for each in records(out, "RequirementMonitored")]
@@ -75,7 +75,7 @@ def test_a_run_is_monitored_for_those_in_both_files(
 def test_at_the_end_a_table_says_what_became_of_each(
     invoke: Invoke, wait: Path, tmp_path: Path, command: str
 ) -> None:
-    more = (*NOBODY, "--journal", "memory:") if command == "run" else ()
+    more = (*NO_OPERATOR, "--journal", "memory:") if command == "run" else ()
     status, out, _ = invoke(command, wait, *more, "--spec", spec(tmp_path))
     assert status == 0
     *_, summary, header, first, _, _ = out.splitlines()
@@ -88,7 +88,7 @@ def test_at_the_end_a_table_says_what_became_of_each(
 
 def test_the_journal_keeps_them(invoke: Invoke, wait: Path, tmp_path: Path) -> None:
     journal = ("--journal", tmp_path / "journal.db")
-    assert invoke("run", wait, *NOBODY, *journal, "--spec", spec(tmp_path))[0] == 0
+    assert invoke("run", wait, *NO_OPERATOR, *journal, "--spec", spec(tmp_path))[0] == 0
     _, out, _ = invoke("replay", "r1", *journal, "--state", "--format", "json")
     found = {each["requirement"]: each for each in json.loads(out)["requirements"]}
     assert found["soon"] == {
@@ -109,7 +109,7 @@ def test_the_journal_keeps_them(invoke: Invoke, wait: Path, tmp_path: Path) -> N
 def test_two_with_one_id_are_refused(
     invoke: Invoke, wait: Path, tmp_path: Path, command: str
 ) -> None:
-    more = (*NOBODY, "--journal", tmp_path / "journal.db") if command == "run" else ()
+    more = (*NO_OPERATOR, "--journal", tmp_path / "journal.db") if command == "run" else ()
     both = spec(tmp_path, "{id: ends, ltl: '<> completed(Wait)'}")
     status, out, err = invoke(command, wait, *more, "--spec", both)
     assert (status, out) == (2, "")
@@ -130,7 +130,7 @@ def test_one_that_cannot_be_read_is_refused_before_a_run_begins(
 ) -> None:
     journal = ("--journal", tmp_path / "journal.db")
     wrong = spec(tmp_path, requirement)
-    status, out, err = invoke("run", wait, *NOBODY, *journal, "--spec", wrong)
+    status, out, err = invoke("run", wait, *NO_OPERATOR, *journal, "--spec", wrong)
     assert (status, out) == (2, "")
     assert f"m2pem: the requirements cannot be used:\n{wrong}:2: requirements[0]." in err
     assert says in err
@@ -171,7 +171,7 @@ def test_a_rehearsal_knows_telemetry_from_the_first_moment_on(
 def test_an_operator_who_comes_later_lists_them(m2pem: CommandLine, tmp_path: Path) -> None:
     mission = tmp_path / "wait.bpmn"
     mission.write_text(WAIT.replace("PT0.2S", "PT1H"), encoding="utf-8")
-    words = (mission, *NOBODY, "--spec", spec(tmp_path), "--format", "json")
+    words = (mission, *NO_OPERATOR, "--spec", spec(tmp_path), "--format", "json")
     program = m2pem.start("run", *words)
     program.until_record("RequirementDecided", requirement="soon")
     operator = m2pem.start("attach", "--ocu", "plain")

@@ -74,12 +74,12 @@ def flies(route: str, altitude: str, speed: str = CRUISE) -> tuple[str, Mapping[
 
 
 def drawn(first: Steps, second: Steps, **geometries: Point | Route | Area) -> bytes:
-    """A mission of both, with tasks A1, A2, ... and B1, B2, ..., and geometries of its own."""
+    """A mission of both, with tasks A1, A2, ... and B1, B2, ..., and their geometries."""
     return scenarios.drawn(scenarios.side_by_side(("uav1", first), ("uav2", second)), **geometries)
 
 
 class Sample(NamedTuple):
-    """What a copter says of itself at a time of its own clock; `place` as `Place`."""
+    """What a copter says of itself at a time of its clock; `place` as `Place`."""
 
     at_s: float
     mode: str
@@ -224,7 +224,7 @@ def _launch(number: int, ports: tuple[int, int]) -> sitl.Launch:
 async def until(condition: Callable[[], bool]) -> None:
     """Wait until something is so."""
     async with asyncio.timeout(WITHIN_S):
-        while not condition():  # noqa: ASYNC110  # a thread and a program of its own make it so
+        while not condition():  # noqa: ASYNC110  # a thread and another program change it
             await asyncio.sleep(0.02)
 
 

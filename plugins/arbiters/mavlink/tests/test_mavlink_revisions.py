@@ -122,7 +122,7 @@ def test_only_the_speed_of_a_way_that_is_driven_is_changed(tmp_path: Path) -> No
             executive = Executive(fleet, MemoryJournal(), PluginManager(), clock, speed=SPEED)
 
             async def driven_m(number: int) -> float:
-                """How far a rover comes in ten seconds of its own."""
+                """How far a rover comes in ten seconds of its clock."""
                 begun_m, now_s = place(simulator, number)[0], simulator[number].autopilot.now_s
                 await simulator.until(lambda: simulator[number].autopilot.now_s > now_s + 10.0)
                 return place(simulator, number)[0] - begun_m

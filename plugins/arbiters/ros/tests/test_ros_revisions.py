@@ -22,14 +22,14 @@ ENDED = (GoalStatus.STATUS_CANCELED, GoalStatus.STATUS_ABORTED)
 """Nav2 aborts a goal that a new one preempts."""
 
 
-def drives(element: str, vehicle: str, route: str = "") -> str:
+def drives(element: str, vehicle: str, route: str = "", speed_m_s: float = 5.0) -> str:
     """A task: the vehicle drives the named route, or else its own route to the north."""
     return _task(
         element,
         vehicle,
         "single_vehicle_routing",
         f'<m2pem:property name="route" value="{route or f"route_{vehicle}"}"/>'
-        '<m2pem:property name="speed" value="5 m/s"/>',
+        f'<m2pem:property name="speed" value="{speed_m_s} m/s"/>',
     )
 
 
@@ -188,6 +188,25 @@ def test_routes_branches_and_a_subprocess_change_while_other_vehicles_drive_on(
     states = [state for _, _, state in watch["topics"].statuses]
     assert BehaviorStatus.CANCELLED in states
     assert m2pem.m2pem("replay", "r1", "--verify").rest() == 0
+
+
+@pytest.mark.timeout(5 * AMPLE_S)
+def test_vehicles_drive_on_at_another_speed(m2pem: Programs, watch: Watch) -> None:
+    program = begin(m2pem, watch)
+    watch.until(lambda: all(each.odometry[-1].forward_m_s > 4.0 for _, each in watch.items()))
+    slow = [{f"Drive_{name}": drives(f"Drive_{name}", name, speed_m_s=2.0)} for name in ALL]
+    branches = [
+        {"Sub": inside("Sub", each["Drive_nav"], "Drive_nav")} if "Drive_nav" in each else each
+        for each in slow
+    ]
+    said = revise(m2pem, version(m2pem.folder, "slow", *branches), "--yes")
+    assert said.process.returncode == 0, said.said
+    assert sum(line.startswith("  adjusts: the speed of") for line in said.lines) == len(ALL)
+    watch.until(lambda: all(each.odometry[-1].forward_m_s < 2.5 for _, each in watch.items()))
+    far_m = {name: each.north_m + 20.0 for name, each in watch.items()}
+    watch.until(lambda: all(watch[name].north_m > far_m[name] for name in ALL))
+    drives_on(watch, *ALL)
+    program.process.terminate()
 
 
 @pytest.mark.timeout(5 * AMPLE_S)

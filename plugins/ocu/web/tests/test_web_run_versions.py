@@ -1,6 +1,6 @@
 """The versions of its mission that a run has had: listed, compared, and gone back to."""
 
-from playwright.async_api import Page, expect
+from playwright.async_api import FilePayload, Page, expect
 from web_axe import Accessibility
 from web_desk import IN_ONE_LOOP, Desk, signed_in
 
@@ -93,9 +93,13 @@ async def test_a_file_and_an_older_version_of_the_folder_are_drawn_beside_it(des
     await dialog.get_by_role("button", name="Show both diagrams…").click()
     await expect(changes).to_contain_text("name: done → over")
     await page.keyboard.press("Escape")
+    await dialog.get_by_role("combobox", name="Version", exact=True).select_option(index=2)
+    await dialog.get_by_role("button", name="Show both diagrams…").click()
+    await expect(changes.get_by_role("status")).to_have_text("Nothing is different.")
+    await page.keyboard.press("Escape")
     content = LATER.replace(b"done", b"by file")
-    file = {"name": "mine.bpmn", "mimeType": "text/xml", "buffer": content}
-    await dialog.locator("input[type=file]").set_input_files(file)  # type: ignore[arg-type]
+    file = FilePayload(name="mine.bpmn", mimeType="text/xml", buffer=content)
+    await dialog.locator("input[type=file]").set_input_files(file)
     await dialog.get_by_role("button", name="Show both diagrams…").click()
     await expect(changes).to_contain_text("name: done → by file")
 

@@ -1,11 +1,9 @@
 // What a revision would do, before it is done: what is refused and vehicles first.
 import type { Finding } from "../shared/types";
 import { fill, strings } from "../strings";
-import { vehiclesFirst, type Choice, type Moves, type Plan } from "./plan";
+import { shortOf, vehiclesFirst, type Choice, type Moves, type Plan } from "./plan";
 
 const words = strings.revise;
-/** Digits of a version that people read. */
-const SHORT = 12;
 
 /** Of a choice that was not made yet. */
 const NO_CHOICE = "\u0000";
@@ -21,7 +19,7 @@ export interface PlanViewProps {
 }
 
 export function PlanView({ plan, choices, moves, move, compare }: PlanViewProps) {
-  const from = { previous: plan.previous.slice(0, SHORT), version: plan.version.slice(0, SHORT) };
+  const from = { previous: shortOf(plan.previous), version: shortOf(plan.version) };
   return (
     <>
       <p title={plan.version}>{fill(words.fromTo, from)}</p>

@@ -14,6 +14,7 @@ import { VersionChoice } from "./VersionChoice";
 import {
   choicesWith,
   needsConfirmation,
+  shortOf,
   type Choice,
   type Moves,
   type NewVersion,
@@ -101,7 +102,7 @@ export default function ReviseDialog({ run, version, onClose }: ReviseDialogProp
       await explain(error, shown);
       return;
     }
-    toast(fill(words.done, { run, version: shown.version.slice(0, 12) }), "good");
+    toast(fill(words.done, { run, version: shortOf(shown.version) }), "good");
     onClose();
   };
   /** Why it was not done; if the plan is another one by now, it is shown instead. */

@@ -5,13 +5,12 @@ import { Dialog } from "../shared/Dialog";
 import { dateTime } from "../shared/format";
 import { may } from "../shared/session";
 import { fill, strings } from "../strings";
+import { shortOf } from "./plan";
 import { revising } from "./revising";
 import { versionsOfRun, type RunVersion } from "./versions";
 import "./revise.css";
 
 const words = strings.revise;
-/** Digits of a version that people read. */
-const SHORT = 12;
 
 export interface RunVersionsProps {
   run: string;
@@ -42,7 +41,7 @@ export default function RunVersions({ run, isLive, onClose }: RunVersionsProps) 
           <li key={each.seq}>
             <p>
               <b>{fill(words.versionNumber, { number: at + 1 })}</b>{" "}
-              <code title={each.version}>{each.version.slice(0, SHORT)}</code>{" "}
+              <code title={each.version}>{shortOf(each.version)}</code>{" "}
               {each === present && <em>{isLive ? words.present : words.last}</em>}
             </p>
             <p>

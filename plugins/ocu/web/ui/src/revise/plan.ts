@@ -50,6 +50,9 @@ export interface Choice {
   canEnd: boolean;
 }
 
+/** What people read of a version. */
+export const shortOf = (version: string): string => version.slice(0, 12);
+
 /** What concerns vehicles comes first; otherwise in the order of the plan. */
 export function vehiclesFirst<T extends { resources: readonly string[] }>(all: readonly T[]): T[] {
   return [

@@ -166,7 +166,7 @@ function NewValue({ scope }: { scope: number }) {
 
 interface FormProps {
   label: string;
-  /** What stands in the field at first. */
+  /** The text of the field at first. */
   before: string;
   scope: number;
   name: string;
