@@ -129,8 +129,8 @@ Factor = Annotated[
 Probability = Annotated[float, Field(ge=0, le=1)]
 Weight = Annotated[float, Field(ge=0)]
 Sampled = Annotated[float, Field(gt=0, lt=1)] | None
-"""The probability with which it is drawn, in place of `probability`, for the first visit: such runs count by
-their weight (importance sampling)."""
+"""The probability with which it is drawn, in place of `probability`, for the first visit: such runs
+count by their weight (importance sampling)."""
 
 
 def _now() -> Distribution:
