@@ -128,6 +128,8 @@ if TYPE_CHECKING:
         OpenIncident,
         OpenPrompt,
         PromptClosed,
+        RequirementOutlook,
+        RequirementProspect,
         RunId,
         RunStatus,
         RunSummary,
@@ -277,7 +279,8 @@ _MODULES = {
     "m2pem.api.runs": (
         "CONTROL_REQUEST NEWS SCHEDULE Alert GeometryVersion HandedOver IncidentPreview"
         " IncidentVerdict"
-        " OpenIncident OpenPrompt PromptClosed RunId RunStatus RunSummary ScopeData"
+        " OpenIncident OpenPrompt PromptClosed RequirementOutlook RequirementProspect RunId"
+        " RunStatus RunSummary ScopeData"
         " SimulationResult StampedRecord TelemetrySample"
     ),
     "m2pem.api.statistics": (
@@ -480,6 +483,8 @@ __all__ = [
     "RemainingRoute",
     "RemainingSurvey",
     "RemainingWork",
+    "RequirementOutlook",
+    "RequirementProspect",
     "RequirementState",
     "RequirementStates",
     "ResolvedValue",

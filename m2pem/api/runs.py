@@ -164,18 +164,56 @@ class IncidentVerdict(StrEnum):
     UNKNOWN = "not known"
 
 
-@dataclass(frozen=True, slots=True)
-class IncidentPreview:
-    """What follows a choice about an incident, explored from the run's present state."""
+class RequirementProspect(StrEnum):
+    """What is foreseen of a requirement that is monitored and open."""
 
-    verdict: IncidentVerdict
+    HOLDS = "holds"
+    MAY_BE_VIOLATED = "may be violated"
+    WILL_BE_VIOLATED = "will be violated"
+    UNKNOWN = "not known"
+
+
+@dataclass(frozen=True, slots=True)
+class RequirementOutlook:
+    """What is foreseen of a requirement. `text`: the requirement, in words."""
+
+    requirement: str
+    text: str
+    verdict: RequirementProspect
     reason: str = ""
 
     def __str__(self) -> str:
         reason = f": {self.reason}" if self.reason else ""
+        return f"requirement {self.requirement} {_PROSPECTS[self.verdict]}{reason}"
+
+
+@dataclass(frozen=True, slots=True)
+class IncidentPreview:
+    """What follows a choice about an incident, explored from the run's present state.
+
+    `requirements`: what follows for those that the run is monitored for, and that are open.
+    """
+
+    verdict: IncidentVerdict
+    reason: str = ""
+    requirements: tuple[RequirementOutlook, ...] = ()
+
+    @property
+    def completion(self) -> str:
+        """Whether the mission completes, as a sentence."""
+        reason = f": {self.reason}" if self.reason else ""
         return f"the mission {_VERDICTS[self.verdict]}{reason}"
 
+    def __str__(self) -> str:
+        return "\n".join([self.completion, *(f"  {each}" for each in self.requirements)])
 
+
+_PROSPECTS = {
+    RequirementProspect.HOLDS: "holds on all paths from there",
+    RequirementProspect.MAY_BE_VIOLATED: "may be violated from there",
+    RequirementProspect.WILL_BE_VIOLATED: "is violated on all paths from there",
+    RequirementProspect.UNKNOWN: "may or may not hold from there, which is not known",
+}
 _VERDICTS = {
     IncidentVerdict.COMPLETES: "completes on all paths from there",
     IncidentVerdict.MAY_NOT_COMPLETE: "may not complete from there",

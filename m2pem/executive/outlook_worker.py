@@ -39,8 +39,8 @@ async def outlook_in_subprocess(
     now_us: int,
     writers: Sequence[str],
 ) -> IncidentPreview:
-    """Return what follows a choice about an incident of a run, or a revision of its mission,
-    explored in a subprocess.
+    """Return what follows a choice about an incident of a run, or a revision of its mission, and
+    for its requirements, explored in a subprocess.
 
     `mission`: with which the run began. `entries`: all of the run's, from its journal. Other
     arguments as in `Order`.
@@ -57,26 +57,32 @@ async def outlook_in_subprocess(
         list(writers),
     )
     answer = await run_in_subprocess(__name__, msgspec.msgpack.encode(order))
-    verdict, reason = msgspec.msgpack.decode(answer, type=tuple[str, str])
-    return IncidentPreview(IncidentVerdict(verdict), reason)
+    return msgspec.msgpack.decode(answer, type=IncidentPreview)
 
 
 def _work(content: bytes, _: SendProgress) -> bytes:
     # What explores is loaded here: the executive has no use for it.
     from m2pem.bpmn import parse_mission  # noqa: PLC0415
+    from m2pem.monitors.requirement_outlook import OpenRequirements  # noqa: PLC0415
     from m2pem.verify.outlook import outlook  # noqa: PLC0415
 
     order = msgspec.msgpack.decode(content, type=Order)
     library = KeptLibrary(order.library)
     mission = parse_mission(order.source, order.file, library, accepted=True)
-    run = MissionRun(mission, restore(order.fleet), order.run)
+    fleet = restore(order.fleet)
+    run = MissionRun(mission, fleet, order.run)
+    requirements = OpenRequirements(run.state, fleet)
     for body in order.bodies:
         item, records = decode_body(body)
         run.replay(records, item)
+        requirements.observe(records)
     choice = msgspec.json.decode(order.choice, type=Input)
     assert isinstance(choice, ResolveIncident | Revise)
-    found = outlook(run, order.now_us, choice, writers=frozenset(order.writers))
-    return msgspec.msgpack.encode((found.verdict.value, found.reason))
+    writers = frozenset(order.writers)
+    found = outlook(run, order.now_us, choice, writers=writers, reader=requirements)
+    judged = requirements.judge(found.explored)
+    preview = IncidentPreview(IncidentVerdict(found.verdict), found.reason, judged)
+    return msgspec.msgpack.encode(preview)
 
 
 if __name__ == "__main__":

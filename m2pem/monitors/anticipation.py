@@ -10,9 +10,10 @@ A *letter* has bit n set if the n-th proposition of the formula is true in a mom
 known in part: each bit of `unknown` may be either.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from enum import StrEnum
 from functools import lru_cache
+from typing import TypeAlias
 
 from m2pem.verify.ltl import Observer, negated, propositions
 from m2pem.verify.ltl.automaton import components
@@ -35,6 +36,10 @@ class Verdict(StrEnum):
 MOST_STEPS = 100_000
 """Steps of a product of automaton and memory that are looked at, at most. Beyond, a state counts as
 one that may accept if its automaton alone may: a verdict may come late then, and is never wrong."""
+
+
+Ways: TypeAlias = Callable[[int], Iterable[tuple[Sequence[int], int]]]
+"""The ways out of a place of a graph: the letters of each, one at least, and where it leads."""
 
 
 class _Language:
@@ -75,20 +80,37 @@ class _Language:
 
     def accepts_for_ever(self, number: int, letter: int, unknown: int) -> bool:
         """Whether a run is accepted that has this letter in all moments from now on."""
-        letters = list(completions(letter, unknown))
-        order = list(self._sets[number])
-        index = {state: at for at, state in enumerate(order)}
+        letters = [((each,), 0) for each in completions(letter, unknown)]
+        return self.accepts_on(number, 0, lambda _: letters)
+
+    def accepts_on(self, number: int, place: int, ways: Ways) -> bool:
+        """Whether a run is accepted that goes on for ever from a place of a graph."""
+        order = [(place, state) for state in self._sets[number]]
+        index = {pair: at for at, pair in enumerate(order)}
         edges: list[list[tuple[int, int]]] = []
         while len(edges) < len(order):
+            here, state = order[len(edges)]
             found: list[tuple[int, int]] = []
-            for each in letters:
-                for target, postponed in self._observer.step(order[len(edges)], each):
-                    if target not in index:
-                        index[target] = len(order)
-                        order.append(target)
-                    found.append((index[target], postponed))
+            for letters, there in ways(here):
+                for target, postponed in self._path(state, letters):
+                    pair = (there, target)
+                    if pair not in index:
+                        index[pair] = len(order)
+                        order.append(pair)
+                    found.append((index[pair], postponed))
             edges.append(found)
         return any(_accepting(edges, self._observer.promises))
+
+    def _path(self, state: int, letters: Iterable[int]) -> set[tuple[int, int]]:
+        """The states after letters, each with the promises that all steps to it postpone."""
+        found = {(state, self._observer.promises)}
+        for letter in letters:
+            found = {
+                (target, postponed & late)
+                for source, postponed in found
+                for target, late in self._observer.step(source, letter)
+            }
+        return found
 
 
 def completions(letter: int, unknown: int) -> Iterator[int]:
@@ -203,6 +225,16 @@ class Anticipation:
                 int(self._no.accepts_for_ever(no, letter, unknown)),
             )
         return verdict
+
+    def on_ways(self, state: int, place: int, ways: Ways) -> Verdict:
+        """The verdict on all runs that go on for ever from a place of a graph.
+
+        It is OPEN if it differs.
+        """
+        yes, no = self._pairs[state]
+        return self._verdict(
+            int(self._yes.accepts_on(yes, place, ways)), int(self._no.accepts_on(no, place, ways))
+        )
 
 
 anticipation = lru_cache(maxsize=1_000)(Anticipation)

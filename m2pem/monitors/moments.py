@@ -6,7 +6,7 @@ The state of a moment is that after the step. The order of records tells the ste
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, Self
 
 from m2pem.engine import records as r
 from m2pem.engine.state import BehaviorPhase, RunState
@@ -113,10 +113,29 @@ class Moments:
 
         The new ones are as the state says, after all records that were read.
         """
-        self.take_data(state)
         known = len(self.propositions)
         self.propositions = tuple(propositions)
         self._follow(MomentTables(self.propositions, state.mission), state.mission)
+        self._take_state(state, known)
+
+    @classmethod
+    def after(
+        cls,
+        state: RunState,
+        propositions: Sequence[Proposition],
+        fleet: Fleet | None,
+        on_moment: Callable[[int, int], None],
+        tables: MomentTables,
+    ) -> Self:
+        """Go on from a state in which no input is half done, as if all records had been read."""
+        moments = cls(propositions, state.mission, fleet, on_moment, tables)
+        moments._take_state(state, 0)
+        moments.letter = moments.state
+        return moments
+
+    def _take_state(self, state: RunState, known: int) -> None:
+        """Take propositions from the state, but the first `known`."""
+        self.take_data(state)
         for number, each in enumerate(self.propositions[known:], known):
             self._take_from(state, 1 << number, each)
 

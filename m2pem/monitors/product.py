@@ -6,6 +6,7 @@ once, and serve all runs with the same formulas.
 """
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from m2pem.monitors.anticipation import Anticipation, Verdict
 
@@ -16,6 +17,14 @@ Certain = tuple[tuple[int, Verdict], ...]
 """Which formulas are satisfied or violated, by their place."""
 Bits = tuple[tuple[int, int], ...]
 """Bits of the run's letter, and of the formula's."""
+
+
+class Position(NamedTuple):
+    """Where the monitor of one formula is. `bits`: those of the letters that it reads."""
+
+    monitor: Anticipation
+    bits: Bits
+    state: int
 
 
 class State:

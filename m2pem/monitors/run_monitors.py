@@ -28,9 +28,9 @@ if TYPE_CHECKING:
     from m2pem.monitors.anticipation import Verdict
     from m2pem.monitors.moments import Moments
     from m2pem.monitors.monitor import MonitorPlan, Plans, TimedMonitor
-    from m2pem.monitors.product import Product, State
+    from m2pem.monitors.product import Position, Product, State
     from m2pem.monitors.telemetry_conditions import Latest
-    from m2pem.verify.ltl.formula import Measured
+    from m2pem.verify.ltl.formula import Measured, Proposition
 
 ENDED = "the run has ended"
 STOPPED = "the run was stopped"
@@ -124,6 +124,23 @@ class RunMonitors:
             if due_us is not None and (least is None or due_us < least):
                 least = due_us
         return least
+
+    @property
+    def propositions(self) -> "Sequence[Proposition]":
+        """What the letters of the run are about."""
+        return self._moments.propositions if self._moments is not None else ()
+
+    def positions(self) -> "dict[str, Position | None]":
+        """Where the monitor of each open requirement is; None: its formula has bounds."""
+        from m2pem.monitors.product import Position  # noqa: PLC0415  # as in `_begin`
+
+        found: dict[str, Position | None] = dict.fromkeys(self._open)
+        at = self._at.parts if self._at is not None else ()
+        for name, state in zip(self._names, at, strict=True):
+            untimed = self._open[name].untimed if name in self._open else None
+            if untimed is not None:
+                found[name] = Position(*untimed, state)
+        return found
 
     def take(self) -> list[RequirementDecided | RequirementLeftOpen]:
         """Return what has become certain, and is not recorded yet; each once."""
@@ -226,18 +243,20 @@ class RunMonitors:
         `otherwise`: what made a verdict certain if none does."""
         product, at = self._product, self._at
         certain: list[tuple[str, Verdict]] = []
-        if at is not None and product is not None and changed & product.mask:
+        first = before == _NO_LETTER  # a formula may be decided whatever its propositions are
+        if at is not None and product is not None and (changed & product.mask or first):
             # Written out, as most moments of long runs end here.
             after = None if self._unknown else at.after.get(letter & product.mask)
             if after is None:
                 after = product.step(at, letter, self._unknown)
-            if after is not at:
+            if after is not at or first:
                 self._at = after
-                if len(after.certain) != len(at.certain):
+                known = () if first else at.certain
+                if len(after.certain) != len(known):
                     certain = [
                         (self._names[place], verdict)
                         for place, verdict in after.certain
-                        if (place, verdict) not in at.certain
+                        if (place, verdict) not in known
                     ]
         if changed & self._timed_mask:
             for name, each in self._timed.items():

@@ -8,19 +8,22 @@ translated. States that differ only in ids and in the time of day are one.
 Behaviors succeed, or fail with an error that some event catches; prompts get any answer; timers
 come in any order with the ends of behaviors; operators may send signals. Incidents that were open
 before are skipped; a new one ends its path.
+
+What is true on the way, for requirements, is read by a `MomentReader`: the engine knows none.
 """
 
 import copy
 import time
 from collections import deque
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any, TypeAlias
+from typing import Any, Protocol, TypeAlias
 
 import msgspec
 
 from m2pem.engine import inputs as i
-from m2pem.engine.records import RunOutcome, Trigger
+from m2pem.engine.records import Record, RunOutcome, Trigger
 from m2pem.engine.run import MissionRun
 from m2pem.engine.state import BehaviorPhase, RunState, RunStatus, Scope, Token, Wait
 from m2pem.engine.throwing import catcher_of_error
@@ -43,11 +46,84 @@ class Verdict(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
+class Way:
+    """From one state to another. `letters`: of the moments on the way, those that are as the one
+    before left out; `what`: what comes, for people."""
+
+    to: int
+    letters: tuple[int, ...]
+    what: str
+
+
+@dataclass(slots=True)
+class Ways:
+    """All that was explored, by the numbers of states; 0 is the state after the choice.
+
+    `ways`: out of each state. `letters`: of the last moment of each. `over`: the states after which
+    nothing comes. `why_not_all`: why others have no way out either: they were not explored; "": all
+    were.
+    """
+
+    ways: list[list[Way]] = field(default_factory=list)
+    letters: list[int] = field(default_factory=list)
+    over: set[int] = field(default_factory=set)
+    why_not_all: str = ""
+
+    def add(self, letter: int) -> None:
+        """Add a state."""
+        self.ways.append([])
+        self.letters.append(letter)
+
+
+@dataclass(frozen=True, slots=True)
 class Outlook:
-    """The verdict, and its reason for people."""
+    """The verdict, its reason for people, and what was explored to find it."""
 
     verdict: Verdict
     reason: str = ""
+    explored: Ways = field(default_factory=Ways, compare=False, repr=False)
+
+
+class Reading(Protocol):
+    """Reads the records of what follows one state. `letters`: of the moments so far; `letter`: of
+    the last one."""
+
+    letters: list[int]
+
+    @property
+    def letter(self) -> int: ...
+
+    def read(self, records: Sequence[Record]) -> None:
+        """Read the records of one input."""
+
+
+class MomentReader(Protocol):
+    """What is true on the ways that are explored; `m2pem.monitors.prospects` has one."""
+
+    def observe(self, records: Sequence[Record]) -> None:
+        """Read the records of the choice itself."""
+
+    def reading(self, state: RunState) -> Reading:
+        """Read what follows a state of the run, in which no input is half done."""
+
+
+class _NoReading:
+    """Nothing is of interest on the way."""
+
+    def __init__(self) -> None:
+        self.letters: list[int] = []
+        self.letter = 0
+
+    def read(self, records: Sequence[Record]) -> None:
+        pass
+
+
+class _NoReader:
+    def observe(self, records: Sequence[Record]) -> None:
+        pass
+
+    def reading(self, state: RunState) -> Reading:
+        return _NoReading()
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,21 +144,31 @@ def outlook(
     choice: i.ResolveIncident | i.Revise,
     limits: OutlookLimits | None = None,
     writers: frozenset[str] = frozenset(),
+    reader: MomentReader | None = None,
 ) -> Outlook:
     """Return whether a run completes after a choice about an incident, or a revision.
 
     `run` is changed. `now_us`: microseconds since the Unix epoch. `writers`: names of behaviors
-    that write data when they end.
+    that write data when they end. `reader`: reads what is true on the ways that are explored.
     """
-    explorer = _Explorer(run, limits or OutlookLimits(), writers)
+    explorer = _Explorer(run, limits or OutlookLimits(), writers, reader or _NoReader())
     try:
         return explorer.explore(now_us, choice)
     except _NotKnownError as error:
-        return Outlook(Verdict.UNKNOWN, str(error))
+        explorer.found.why_not_all = str(error)
+        return Outlook(Verdict.UNKNOWN, str(error), explorer.found)
 
 
 class _Explorer:
-    def __init__(self, run: MissionRun, limits: OutlookLimits, writers: frozenset[str]) -> None:
+    def __init__(
+        self,
+        run: MissionRun,
+        limits: OutlookLimits,
+        writers: frozenset[str],
+        reader: MomentReader,
+    ) -> None:
+        self.found = Ways()
+        self._reader = reader
         self._first = run
         self._limits = limits
         self._until = time.monotonic() + limits.seconds
@@ -91,22 +177,24 @@ class _Explorer:
 
     def explore(self, now_us: int, choice: i.ResolveIncident | i.Revise) -> Outlook:
         """Explore all states, breadth first, and judge them."""
-        run = self._first
+        run, observe = self._first, self._reader.observe
         if isinstance(choice, i.Revise):  # its plan is that of the run as it is
-            self._receive(run, choice, now_us)
+            self._receive(run, choice, now_us, observe)
             if version_of(run.state.mission) != choice.version:
                 raise _NotKnownError("the run has gone on since the plan of the revision was made")
-        self._receive(run, i.SetBreakpoints(), now_us)  # an author lets it go on from there
+        self._receive(run, i.SetBreakpoints(), now_us, observe)  # an author lets it go on
         if run.state.status is RunStatus.PAUSED:
-            self._receive(run, i.ResumeRun(), now_us)
+            self._receive(run, i.ResumeRun(), now_us, observe)
         if isinstance(choice, i.ResolveIncident):
-            self._receive(run, choice, now_us)
+            self._receive(run, choice, now_us, observe)
         mission = run.state.mission
         shared = [mission, *mission.elements.values()]
         self._shared = {id(each): each for each in shared}
         self._codes = list(dict.fromkeys(["FAILED", *(e.code for e in mission.errors.values())]))
-        numbers: dict[Key, int] = {_key(run.state, now_us): 0}
-        before: list[list[int]] = [[]]
+        letter = self._reader.reading(run.state).letter
+        numbers = {(_key(run.state, now_us), letter): 0}
+        found = self.found
+        found.add(letter)
         good: list[int] = []
         bad: dict[int, str] = {}
         waiting = deque([(0, run, now_us)])
@@ -114,6 +202,7 @@ class _Explorer:
             number, run, now_us = waiting.popleft()
             self._check_time()
             if run.state.status is RunStatus.ENDED:
+                found.over.add(number)
                 if run.state.outcome in (RunOutcome.COMPLETED, RunOutcome.TERMINATED):
                     good.append(number)
                 else:
@@ -121,19 +210,22 @@ class _Explorer:
                 continue
             steps = self._steps(run, now_us)
             if not steps:
+                found.over.add(number)
                 bad[number] = _where_it_stops(run.state)
-            for item, at_us in steps:
+            whats = [_said(run.state, item) for item, _ in steps]
+            for (item, at_us), what in zip(steps, whats, strict=True):
                 following = copy.deepcopy(run, dict(self._shared)) if len(steps) > 1 else run
-                self._receive(following, item, at_us)
-                key = _key(following.state, at_us)
-                known = numbers.setdefault(key, len(before))
-                if known == len(before):
+                reading = self._reader.reading(following.state)
+                self._receive(following, item, at_us, reading.read)
+                key = (_key(following.state, at_us), reading.letter)
+                known = numbers.setdefault(key, len(found.ways))
+                if known == len(found.ways):
                     if known >= self._limits.states:
                         raise _NotKnownError(f"there are more than {self._limits.states} states")
-                    before.append([])
+                    found.add(reading.letter)
                     waiting.append((known, following, at_us))
-                before[known].append(number)
-        return _judge(before, good, bad)
+                found.ways[number].append(Way(known, tuple(reading.letters), what))
+        return _judge(found, good, bad)
 
     def _steps(self, run: MissionRun, now_us: int) -> list[tuple[i.Input, int]]:
         """Return the inputs that may come next, each with its time."""
@@ -177,14 +269,20 @@ class _Explorer:
     def _caught_at(self, token: Token) -> list[str]:
         return [code for code in self._codes if catcher_of_error(token, code) is not None]
 
-    def _receive(self, run: MissionRun, item: i.Input, at_us: int) -> None:
+    def _receive(
+        self,
+        run: MissionRun,
+        item: i.Input,
+        at_us: int,
+        read: Callable[[Sequence[Record]], None],
+    ) -> None:
         """Give a run an input, and all steps that follow at once."""
-        run.receive(item, at_us)
+        read(run.receive(item, at_us).records)
         for _ in range(MAX_CONTINUES):
             if not run.wants_continue:
                 return
             self._check_time()
-            run.receive(i.Continue(), at_us)
+            read(run.receive(i.Continue(), at_us).records)
         raise _NotKnownError("a loop of the mission does not wait")
 
     def _check_time(self) -> None:
@@ -199,20 +297,56 @@ def _where_it_stops(state: RunState) -> str:
     return f"it waits at {', '.join(nodes)}"
 
 
-def _judge(before: list[list[int]], good: list[int], bad: dict[int, str]) -> Outlook:
-    reaches = set(good)
-    waiting = list(good)
+ROUND_AND_ROUND = "it goes round in a loop that it does not leave"
+
+
+def _judge(found: Ways, good: list[int], bad: dict[int, str]) -> Outlook:
+    reaches = leading_to(good, [[way.to for way in ways] for ways in found.ways])
+    reason = next(iter(bad.values()), ROUND_AND_ROUND)
+    if 0 not in reaches:
+        return Outlook(Verdict.CANNOT_COMPLETE, reason, found)
+    if bad or len(reaches) < len(found.ways):
+        return Outlook(Verdict.MAY_NOT_COMPLETE, reason, found)
+    return Outlook(Verdict.COMPLETES, explored=found)
+
+
+def leading_to(states: Iterable[int], following: Sequence[Sequence[int]]) -> set[int]:
+    """Return the states from which one of `states` can be reached. `following`: by state, those
+    that follow it."""
+    before: list[list[int]] = [[] for _ in following]
+    for state, targets in enumerate(following):
+        for target in targets:
+            before[target].append(state)
+    reaches = set(states)
+    waiting = list(reaches)
     while waiting:
         for earlier in before[waiting.pop()]:
             if earlier not in reaches:
                 reaches.add(earlier)
                 waiting.append(earlier)
-    reason = next(iter(bad.values()), "it goes round in a loop that it does not leave")
-    if 0 not in reaches:
-        return Outlook(Verdict.CANNOT_COMPLETE, reason)
-    if bad or len(reaches) < len(before):
-        return Outlook(Verdict.MAY_NOT_COMPLETE, reason)
-    return Outlook(Verdict.COMPLETES)
+    return reaches
+
+
+def _said(state: RunState, item: i.Input) -> str:
+    """Return what comes, for people."""
+    match item:
+        case i.BehaviorReported(behavior, _, now, code):
+            element = state.behaviors[behavior].element
+            node = state.mission.elements.get(element)  # a revision may have removed it
+            label = node.label if node is not None else element
+            if now is BehaviorState.FAILED:
+                return f"{label} fails with {code}"
+            return f"{label} {'succeeds' if now is BehaviorState.SUCCEEDED else 'is cancelled'}"
+        case i.PromptAnswer(prompt, value):
+            label = state.prompts[prompt].token.node.label
+            return f"{label} is answered {value}"
+        case i.SignalReceived(ref):
+            signal = state.mission.signals.get(ref)
+            return f"signal {signal.name if signal else ref} comes"
+        case i.ResolveIncident(incident):
+            return f"{state.incidents[incident].token.node.label} is skipped"
+        case _:
+            return "a timer ends"
 
 
 # --- states ---------------------------------------------------------------------------------------

@@ -90,6 +90,27 @@ def test_a_route_that_is_driven_is_changed_and_a_task_is_added(
     assert revision["mission"]["text"] == short.read_text("utf-8")
 
 
+def test_what_follows_for_requirements_is_in_the_plan(m2pem: CommandLine, tmp_path: Path) -> None:
+    fleet, long, _ = _files(tmp_path)
+    stops = '<m2pem:requirement id="stops" ltl="&lt;&gt; completed(Stop)"/>'
+    drives_on = '<m2pem:requirement id="drives_on" ltl="[] !active(Stop)"/>'
+    new = tmp_path / "new.bpmn"
+    tasks = ("Drive", _DRIVE), ("Stop", _STOP)
+    new.write_text(_mission(_lane(38.1002) + stops + drives_on, *tasks), encoding="utf-8")
+    program = m2pem.start("run", long, "--fleet", fleet, "--format", "json", "--ocu", "none")
+    program.until_record("BehaviorProgressed", state="RUNNING")
+    status, plan, _ = m2pem.run("revise", "r1", new, "--plan")
+    assert status == 0
+    assert "requirement stops holds on all paths from there" in plan
+    violated = "requirement drives_on is violated on all paths from there: after Drive is cancelled"
+    assert f"{violated}, Drive succeeds\n" in plan
+    assert m2pem.run("revise", "r1", new, "--yes")[0] == 0
+    decided = program.until_record("RequirementDecided", verdict="violated")
+    assert decided["requirement"] == "drives_on"
+    decided = program.until_record("RequirementDecided", verdict="satisfied")
+    assert decided["requirement"] == "stops"
+
+
 def test_a_branch_with_a_token_is_refused_and_the_token_is_named(
     m2pem: CommandLine, tmp_path: Path
 ) -> None:

@@ -14,7 +14,12 @@ NAMED = FIRST.replace(b'id="Question"', b'id="Question" name="Shall it go on?"')
 ASKED_AGAIN = scenarios.question("Really go on?", ("continue", "abort", "later"))
 GONE = FIRST.replace(b'"Question"', b'"Another"')
 TWO = scenarios.two_questions()
-ONE = TWO.replace(b'"Question2"', b'"Another"')
+ONE = TWO.replace(b'"Question2"', b'"Another"').replace(
+    b"<startEvent ",
+    b"""<extensionElements><m2pem:requirement id="asked" ltl="&lt;&gt; completed(Another)"/>
+    </extensionElements><startEvent """,
+    1,
+)
 
 HANDLER = FIRST.partition(b"<userTask")[2].partition(b"</userTask>")[0]
 """What is in the question of the mission."""
@@ -150,6 +155,8 @@ async def test_a_version_with_which_the_mission_cannot_complete_is_confirmed(des
     follows = dialog.get_by_role("region", name="What follows")
     await expect(follows).to_contain_text("cannot complete")
     await expect(follows).to_contain_text("Join")
+    asked_again = follows.get_by_role("listitem")
+    await expect(asked_again).to_contain_text("requirement asked is violated on all paths")
     act = dialog.get_by_role("button", name=f"Revise {run}")
     await expect(act).to_be_disabled()
     confirmed = dialog.get_by_label("After it the mission cannot complete.")
@@ -157,6 +164,7 @@ async def test_a_version_with_which_the_mission_cannot_complete_is_confirmed(des
     # Another plan is confirmed for itself.
     await dialog.get_by_label("Token on Question2").select_option("Another")
     await expect(follows).to_contain_text("completes")
+    await expect(asked_again).to_contain_text("requirement asked holds on all paths")
     await dialog.get_by_label("Token on Question2").select_option("ends")
     await expect(confirmed).not_to_be_checked()
     await expect(act).to_be_disabled()

@@ -3,7 +3,7 @@
 from fastapi import APIRouter
 from pydantic import BaseModel
 
-from m2pem.api import MissionControl
+from m2pem.api import IncidentPreview, MissionControl
 from m2pem_plugin_web.access.permissions import Operator, Viewer
 from m2pem_plugin_web.problems import RESPONSES
 from m2pem_plugin_web.rest.models import Body, Data, Name, known_run
@@ -41,12 +41,44 @@ class ResolveModel(ChoiceModel):
     even_if_stuck: bool = False
 
 
+class RequirementOutlookModel(BaseModel):
+    """What follows for a requirement. `requirement`: its id; `english`: what it says; `text`:
+    verdict and reason in a sentence."""
+
+    requirement: str
+    english: str
+    verdict: str
+    reason: str
+    text: str
+
+
 class OutlookModel(BaseModel):
-    """What follows a choice. `text`: verdict and reason in a sentence."""
+    """What follows a choice. `text`: verdict and reason in a sentence; `requirements`: what
+    follows for those that the run is monitored for, and that are open."""
 
     verdict: str
     reason: str
     text: str
+    requirements: list[RequirementOutlookModel]
+
+
+def outlook_model(preview: IncidentPreview) -> OutlookModel:
+    """Return what follows as JSON."""
+    return OutlookModel(
+        verdict=preview.verdict.value,
+        reason=preview.reason,
+        text=preview.completion,
+        requirements=[
+            RequirementOutlookModel(
+                requirement=each.requirement,
+                english=each.text,
+                verdict=each.verdict.value,
+                reason=each.reason,
+                text=str(each),
+            )
+            for each in preview.requirements
+        ],
+    )
 
 
 def router(control: MissionControl) -> APIRouter:
@@ -85,7 +117,7 @@ def router(control: MissionControl) -> APIRouter:
                 to=wanted.to,
                 roles=wanted.roles,
             )
-        return OutlookModel(verdict=found.verdict.value, reason=found.reason, text=str(found))
+        return outlook_model(found)
 
     @routes.post("/runs/{run}/incidents/{incident}", status_code=204)
     async def resolve(person: Operator, run: str, incident: str, wanted: ResolveModel) -> None:

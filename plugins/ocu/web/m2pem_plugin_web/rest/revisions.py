@@ -11,7 +11,7 @@ from m2pem_plugin_web.access.permissions import Commander, Operator, Viewer
 from m2pem_plugin_web.missions.folder import MissionFolder
 from m2pem_plugin_web.problems import RESPONSES
 from m2pem_plugin_web.rest.drafts import WrittenName, of_folder, source_of
-from m2pem_plugin_web.rest.incidents import OutlookModel
+from m2pem_plugin_web.rest.incidents import OutlookModel, outlook_model
 from m2pem_plugin_web.rest.models import (
     Body,
     FindingModel,
@@ -146,9 +146,7 @@ def plan_model(preview: RevisionPreview) -> PlanModel:
             for each in preview.refusals
         ],
         findings=finding_models(preview.findings),
-        outlook=None
-        if outlook is None
-        else OutlookModel(verdict=outlook.verdict.value, reason=outlook.reason, text=str(outlook)),
+        outlook=None if outlook is None else outlook_model(outlook),
         approval=preview.approval,
         busy=list(preview.busy),
     )

@@ -69,7 +69,7 @@ describe("the plan of a revision", () => {
   it("wants a confirmation where the mission cannot complete, and only there", () => {
     const verdict = (name: string) => ({
       ...PLAN,
-      outlook: { verdict: name, reason: "", text: name },
+      outlook: { verdict: name, reason: "", text: name, requirements: [] },
     });
     expect(needsConfirmation(verdict("cannot complete"))).toBe(true);
     expect(needsConfirmation(verdict("may not complete"))).toBe(false);

@@ -1,5 +1,5 @@
 // The plan of a revision as the server gives it, and what the dialog makes of it.
-import type { Finding } from "../shared/types";
+import type { Finding, Outlook } from "../shared/types";
 
 export interface Effect {
   kind: string;
@@ -28,7 +28,7 @@ export interface Plan {
   effects: Effect[];
   refusals: Refusal[];
   findings: Finding[];
-  outlook: { verdict: string; reason: string; text: string } | null;
+  outlook: Outlook | null;
   approval: string;
   busy: string[];
 }

@@ -454,3 +454,11 @@ export type ServerMessage =
   | { type: "shared_space"; seq: number }
   | { type: "alive"; seq: number }
   | { type: "log"; seq: number; records: RunRecord[] };
+
+/** What follows. `english`: what a requirement says; `text`: verdict and reason in a sentence. */
+export interface Outlook {
+  verdict: string;
+  reason: string;
+  text: string;
+  requirements: { requirement: string; english: string; verdict: string; text: string }[];
+}

@@ -6,6 +6,7 @@ import { givenNow } from "../../shared/command";
 import { listen } from "../../shared/executive";
 import { may } from "../../shared/session";
 import { toast } from "../../shared/Toasts";
+import type { Outlook } from "../../shared/types";
 import { fill, strings } from "../../strings";
 import { useOperating } from "../context";
 import { blockedBy, heldFor } from "../../home/blocking";
@@ -114,8 +115,9 @@ export function IncidentPanel() {
     try {
       const body = { ...made, ...more };
       const options = { limit_ms: LIMIT_MS, headers: givenNow() };
-      const found = await post<{ text: string } | undefined>(where, body, options);
-      said.value = found?.text ?? "";
+      const found = await post<Outlook | undefined>(where, body, options);
+      const lines = found ? [found, ...found.requirements] : [];
+      said.value = lines.map((each) => each.text).join("\n");
       stuck.value = false;
       if (!found) typed.value = "";
     } catch (error) {

@@ -1,0 +1,204 @@
+"""What follows for the requirements that a run is monitored for, judged on what was explored.
+
+    reader = OpenRequirements(run.state, fleet)
+    for item, records in journal: run.replay(records, item); reader.observe(records)
+    found = outlook(run, now_us, choice, reader=reader)
+    reader.judge(found.explored)
+
+A monitor knows what came before. Each way that was explored is followed from the monitor's state:
+so a requirement is judged from the present on, not from the beginning of the mission. As in the
+outlook of the run, what is possible again and again is taken to come at some time.
+"""
+
+from collections.abc import Sequence
+
+from m2pem.api.runs import RequirementOutlook, RequirementProspect
+from m2pem.engine import records as r
+from m2pem.engine.inputs import RequirementDecided
+from m2pem.engine.state import RunState
+from m2pem.fleet.fleet import Fleet
+from m2pem.monitors.anticipation import Verdict
+from m2pem.monitors.moments import Moments, MomentTables
+from m2pem.monitors.product import Position, own_letter
+from m2pem.monitors.run_monitors import RunMonitors
+from m2pem.verify.outlook import ROUND_AND_ROUND, Ways, leading_to
+
+MOST_STEPS_SHOWN = 8
+HAS_TIMES = "its times are not explored"
+READS_TELEMETRY = "what telemetry will say is not known"
+
+
+class _Reading:
+    """The letters of what follows one state."""
+
+    def __init__(self) -> None:
+        self.letters: list[int] = []
+        self.moments: Moments | None = None
+
+    def add(self, letter: int, _: int) -> None:
+        self.letters.append(letter)
+
+    def read(self, records: Sequence[r.Record]) -> None:
+        if self.moments is not None:
+            self.moments.read(records)
+
+    @property
+    def letter(self) -> int:
+        return self.moments.letter if self.moments is not None else 0
+
+
+class OpenRequirements:
+    """Reads the records of a run up to a choice, and of what may follow it
+    (`m2pem.verify.outlook.MomentReader`)."""
+
+    def __init__(self, state: RunState, fleet: Fleet | None) -> None:
+        """`state`: of the run, to which records are applied before they are observed."""
+        self._state = state
+        self._fleet = fleet
+        self._monitors = RunMonitors(state, fleet)
+        self._tables: MomentTables | None = None
+
+    def observe(self, records: Sequence[r.Record]) -> None:
+        """Read the records of one input."""
+        # Their times matter to requirements with times alone, which are not judged.
+        self._monitors.observe(0, records)
+
+    def reading(self, state: RunState) -> _Reading:
+        """Read what follows a state."""
+        reading = _Reading()
+        known = self._monitors.propositions
+        if known:
+            if self._tables is None:
+                self._tables = MomentTables(known, state.mission)
+            reading.moments = Moments.after(state, known, self._fleet, reading.add, self._tables)
+        return reading
+
+    def judge(self, explored: Ways) -> tuple[RequirementOutlook, ...]:
+        """Return what follows for each requirement that nothing had decided before the choice."""
+        found: dict[str, tuple[RequirementProspect, str]] = {}
+        for item in self._monitors.take():  # the choice itself has decided them
+            prospect = RequirementProspect.UNKNOWN
+            if isinstance(item, RequirementDecided):
+                violated = item.verdict is r.RequirementVerdict.VIOLATED
+                prospect = (
+                    RequirementProspect.WILL_BE_VIOLATED if violated else RequirementProspect.HOLDS
+                )
+            found[item.requirement] = (prospect, item.because)
+        monitored = self._state.requirements
+        for name, position in self._monitors.positions().items():
+            if position is None:
+                found[name] = (RequirementProspect.UNKNOWN, HAS_TIMES)
+            elif monitored[name].conditions:
+                found[name] = (RequirementProspect.UNKNOWN, READS_TELEMETRY)
+            elif not explored.ways:
+                found[name] = (RequirementProspect.UNKNOWN, explored.why_not_all)
+            else:
+                found[name] = _Judge(position, explored).judge()
+        return tuple(
+            RequirementOutlook(name, monitored[name].english, *found[name])
+            for name in monitored
+            if name in found
+        )
+
+
+class _Judge:
+    """Follows one monitor on all ways. A *pair* is a state of the run and one of the monitor."""
+
+    def __init__(self, position: Position, explored: Ways) -> None:
+        self._monitor, self._bits, start = position
+        self._explored = explored
+        self._pairs = [(0, start)]
+        self._from = [(-1, "")]
+        self._following: list[list[int]] = []
+        self._good: list[int] = []
+        self._bad: list[int] = []
+        self._unexplored: list[int] = []
+        self._loops: set[int] = set()
+
+    def judge(self) -> tuple[RequirementProspect, str]:
+        """Return the verdict and its reason."""
+        self._follow()
+        round_and_round = self._look_at_loops()
+        if self._bad:
+            others = (*self._good, *self._unexplored, *round_and_round)
+            kind = RequirementProspect.WILL_BE_VIOLATED
+            if 0 in leading_to(others, self._following):
+                kind = RequirementProspect.MAY_BE_VIOLATED
+            return kind, self._way_to(self._bad[0])
+        if self._unexplored:
+            return RequirementProspect.UNKNOWN, self._explored.why_not_all
+        if round_and_round:
+            return RequirementProspect.UNKNOWN, ROUND_AND_ROUND
+        return RequirementProspect.HOLDS, ""
+
+    def _follow(self) -> None:
+        numbers = {self._pairs[0]: 0}
+        explored, monitor = self._explored, self._monitor
+        while len(self._following) < len(self._pairs):
+            pair = len(self._following)
+            following: list[int] = []
+            self._following.append(following)
+            place, state = self._pairs[pair]
+            verdict = monitor.verdicts[state]
+            if not verdict.is_certain and place in explored.over:
+                verdict = monitor.at_end(state, self._own(explored.letters[place]))
+            if verdict.is_certain:
+                (self._bad if verdict is Verdict.VIOLATED else self._good).append(pair)
+                continue
+            ways = explored.ways[place]
+            if not ways:
+                self._unexplored.append(pair)
+            for way in ways:
+                after = state
+                for letter in way.letters:
+                    after = monitor.step(after, self._own(letter))
+                number = numbers.setdefault((way.to, after), len(self._pairs))
+                if number == len(self._pairs):
+                    self._pairs.append((way.to, after))
+                    self._from.append((pair, way.what))
+                following.append(number)
+
+    def _own(self, letter: int) -> int:
+        return own_letter(self._bits, letter)
+
+    def _look_at_loops(self) -> list[int]:
+        """Judge the pairs from which runs can only go round for ever; return those whose verdict
+        depends on the way."""
+        decided = leading_to((*self._good, *self._bad, *self._unexplored), self._following)
+        left_open = []
+        for pair, (place, state) in enumerate(self._pairs):
+            if pair in decided:
+                continue
+            verdict = self._monitor.on_ways(state, place, self._ways)
+            self._loops.add(pair)
+            if verdict is Verdict.OPEN:
+                left_open.append(pair)
+            else:
+                (self._bad if verdict is Verdict.VIOLATED else self._good).append(pair)
+        return left_open
+
+    def _ways(self, place: int) -> list[tuple[list[int], int]]:
+        return [
+            ([self._own(each) for each in way.letters or (self._explored.letters[place],)], way.to)
+            for way in self._explored.ways[place]
+        ]
+
+    def _way_to(self, pair: int) -> str:
+        """What comes before, for people."""
+        last = ""
+        if pair in self._loops:
+            last = ROUND_AND_ROUND
+        elif self._pairs[pair][0] in self._explored.over:
+            last = "nothing more comes"
+        steps: list[str] = []
+        while pair:
+            pair, what = self._from[pair]
+            steps.append(what)
+        steps.reverse()
+        left_out = len(steps) - MOST_STEPS_SHOWN
+        shown = ", ".join(steps[max(left_out, 0) :])
+        if left_out > 0:
+            shown = f"{left_out} steps, then {shown}"
+        if not steps:
+            return last or "at once"
+        return f"after {shown}{f', when {last}' if last else ''}"
