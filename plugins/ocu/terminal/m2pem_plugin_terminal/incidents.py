@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from rich.text import Text
 
-from m2pem.api import IncidentPreview, IncidentVerdict, OpenIncident
+from m2pem.api import IncidentPreview, IncidentVerdict, OpenIncident, RequirementProspect
 from m2pem.api.allocation import WaitingTask, blocked_by
 from m2pem_plugin_terminal.dialogs import Choice
 
@@ -79,6 +79,8 @@ def effect_text(incident: OpenIncident, decision: Decision, preview: IncidentPre
             text.append(f"{what}\n", "#9aa4af")
     for role, ids in decision.roles.items():
         text.append(f"{role}: {', '.join(ids)}\n", "#9aa4af")
-    good = preview.verdict is IncidentVerdict.COMPLETES
+    good = preview.verdict is IncidentVerdict.COMPLETES and all(
+        each.verdict is RequirementProspect.HOLDS for each in preview.requirements
+    )
     text.append(str(preview), "#7fc8a9" if good else "#e8c468")
     return text
