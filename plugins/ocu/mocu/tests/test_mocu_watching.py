@@ -33,12 +33,29 @@ LOOPS = b"""<definitions xmlns="http://www.omg.org/spec/BPMN/20100524/MODEL" tar
 <sequenceFlow id="out" sourceRef="Again" targetRef="E"/></process></definitions>"""
 
 
+NEVER_COUNTS = LOOPS.replace(
+    b'<startEvent id="S"/>',
+    b'''<extensionElements><m2pem:requirement id="still" xmlns:m2pem="https://m2pem.org/schema/1"
+    ltl="[] !active(Count)"/></extensionElements><startEvent id="S"/>''',
+)
+
+
 def stands(prompts: Message, text: str) -> bool:
     return any(each["text"] == text for each in prompts["prompts"])
 
 
 def statuses(status: Message) -> list[int]:
     return [each["status"] for each in status["runs"]]
+
+
+async def test_a_violated_requirement_is_told_at_once(world: World, client: Client) -> None:
+    await world.has_listeners(client)
+    run = await world.control.start(NEVER_COUNTS)
+    alert = await client.hears("rosout", lambda each: "requirement still" in each["msg"])
+    assert alert["msg"].startswith(f"{run}: ")
+    assert "violated" in alert["msg"]
+    decided = await client.hears("events", lambda each: each["type"] == "RequirementDecided")
+    assert json.loads(decided["data"])["verdict"] == "violated"
 
 
 async def test_prompts_are_told_as_they_open_and_close(world: World, client: Client) -> None:
