@@ -35,8 +35,8 @@ LOOPS = b"""<definitions xmlns="http://www.omg.org/spec/BPMN/20100524/MODEL" tar
 
 NEVER_COUNTS = LOOPS.replace(
     b'<startEvent id="S"/>',
-    b'''<extensionElements><m2pem:requirement id="still" xmlns:m2pem="https://m2pem.org/schema/1"
-    ltl="[] !active(Count)"/></extensionElements><startEvent id="S"/>''',
+    b"""<extensionElements><m2pem:requirement id="still" xmlns:m2pem="https://m2pem.org/schema/1"
+    ltl="[] !active(Count)"/></extensionElements><startEvent id="S"/>""",
 )
 
 
