@@ -38,8 +38,8 @@ MOST_STEPS = 100_000
 one that may accept if its automaton alone may: a verdict may come late then, and is never wrong."""
 
 
-Ways: TypeAlias = Callable[[int], Iterable[tuple[Sequence[int], int]]]
-"""The ways out of a place of a graph: the letters of each, one at least, and where it leads."""
+Transitions: TypeAlias = Callable[[int], Iterable[tuple[Sequence[int], int]]]
+"""From a state of a run: the letters of each transition, one at least, and the state after it."""
 
 
 class _Language:
@@ -81,19 +81,19 @@ class _Language:
     def accepts_for_ever(self, number: int, letter: int, unknown: int) -> bool:
         """Whether a run is accepted that has this letter in all moments from now on."""
         letters = [((each,), 0) for each in completions(letter, unknown)]
-        return self.accepts_on(number, 0, lambda _: letters)
+        return self.accepts_some(number, 0, lambda _: letters)
 
-    def accepts_on(self, number: int, place: int, ways: Ways) -> bool:
-        """Whether a run is accepted that goes on for ever from a place of a graph."""
-        order = [(place, state) for state in self._sets[number]]
+    def accepts_some(self, number: int, run: int, transitions: Transitions) -> bool:
+        """Whether a run is accepted that goes on for ever from a state of its own."""
+        order = [(run, state) for state in self._sets[number]]
         index = {pair: at for at, pair in enumerate(order)}
         edges: list[list[tuple[int, int]]] = []
         while len(edges) < len(order):
-            here, state = order[len(edges)]
+            run, state = order[len(edges)]
             found: list[tuple[int, int]] = []
-            for letters, there in ways(here):
-                for target, postponed in self._path(state, letters):
-                    pair = (there, target)
+            for letters, after in transitions(run):
+                for target, postponed in self._read(state, letters):
+                    pair = (after, target)
                     if pair not in index:
                         index[pair] = len(order)
                         order.append(pair)
@@ -101,7 +101,7 @@ class _Language:
             edges.append(found)
         return any(_accepting(edges, self._observer.promises))
 
-    def _path(self, state: int, letters: Iterable[int]) -> set[tuple[int, int]]:
+    def _read(self, state: int, letters: Iterable[int]) -> set[tuple[int, int]]:
         """The states after letters, each with the promises that all steps to it postpone."""
         found = {(state, self._observer.promises)}
         for letter in letters:
@@ -226,14 +226,13 @@ class Anticipation:
             )
         return verdict
 
-    def on_ways(self, state: int, place: int, ways: Ways) -> Verdict:
-        """The verdict on all runs that go on for ever from a place of a graph.
-
-        It is OPEN if it differs.
-        """
+    def in_loops(self, state: int, run: int, transitions: Transitions) -> Verdict:
+        """The verdict on all runs that go on for ever from a state of theirs; OPEN if it differs
+        from run to run."""
         yes, no = self._pairs[state]
         return self._verdict(
-            int(self._yes.accepts_on(yes, place, ways)), int(self._no.accepts_on(no, place, ways))
+            int(self._yes.accepts_some(yes, run, transitions)),
+            int(self._no.accepts_some(no, run, transitions)),
         )
 
 

@@ -5,8 +5,8 @@
     found = outlook(run, now_us, choice, reader=reader)
     reader.judge(found.explored)
 
-A monitor knows what came before. Each way that was explored is followed from the monitor's state:
-so a requirement is judged from the present on, not from the beginning of the mission. As in the
+A monitor knows what came before. It is followed from its state through all that was explored: so
+a requirement is judged from the present on, not from the beginning of the mission. As in the
 outlook of the run, what is possible again and again is taken to come at some time.
 """
 
@@ -21,7 +21,7 @@ from m2pem.monitors.anticipation import Verdict
 from m2pem.monitors.moments import Moments, MomentTables
 from m2pem.monitors.product import Position, own_letter
 from m2pem.monitors.run_monitors import RunMonitors
-from m2pem.verify.outlook import ROUND_AND_ROUND, Ways, leading_to
+from m2pem.verify.outlook import ROUND_AND_ROUND, StateSpace, leading_to
 
 MOST_STEPS_SHOWN = 8
 HAS_TIMES = "its times are not explored"
@@ -73,7 +73,7 @@ class OpenRequirements:
             reading.moments = Moments.after(state, known, self._fleet, reading.add, self._tables)
         return reading
 
-    def judge(self, explored: Ways) -> tuple[RequirementOutlook, ...]:
+    def judge(self, explored: StateSpace) -> tuple[RequirementOutlook, ...]:
         """Return what follows for each requirement that nothing had decided before the choice."""
         found: dict[str, tuple[RequirementProspect, str]] = {}
         for item in self._monitors.take():  # the choice itself has decided them
@@ -90,8 +90,8 @@ class OpenRequirements:
                 found[name] = (RequirementProspect.UNKNOWN, HAS_TIMES)
             elif monitored[name].conditions:
                 found[name] = (RequirementProspect.UNKNOWN, READS_TELEMETRY)
-            elif not explored.ways:
-                found[name] = (RequirementProspect.UNKNOWN, explored.why_not_all)
+            elif not explored.letters:
+                found[name] = (RequirementProspect.UNKNOWN, explored.why_incomplete)
             else:
                 found[name] = _Judge(position, explored).judge()
         return tuple(
@@ -102,9 +102,9 @@ class OpenRequirements:
 
 
 class _Judge:
-    """Follows one monitor on all ways. A *pair* is a state of the run and one of the monitor."""
+    """Follows one monitor through the product of the states of the run and its own (*pairs*)."""
 
-    def __init__(self, position: Position, explored: Ways) -> None:
+    def __init__(self, position: Position, explored: StateSpace) -> None:
         self._monitor, self._bits, start = position
         self._explored = explored
         self._pairs = [(0, start)]
@@ -124,9 +124,9 @@ class _Judge:
             kind = RequirementProspect.WILL_BE_VIOLATED
             if 0 in leading_to(others, self._following):
                 kind = RequirementProspect.MAY_BE_VIOLATED
-            return kind, self._way_to(self._bad[0])
+            return kind, self._path_to(self._bad[0])
         if self._unexplored:
-            return RequirementProspect.UNKNOWN, self._explored.why_not_all
+            return RequirementProspect.UNKNOWN, self._explored.why_incomplete
         if round_and_round:
             return RequirementProspect.UNKNOWN, ROUND_AND_ROUND
         return RequirementProspect.HOLDS, ""
@@ -138,24 +138,24 @@ class _Judge:
             pair = len(self._following)
             following: list[int] = []
             self._following.append(following)
-            place, state = self._pairs[pair]
+            run, state = self._pairs[pair]
             verdict = monitor.verdicts[state]
-            if not verdict.is_certain and place in explored.over:
-                verdict = monitor.at_end(state, self._own(explored.letters[place]))
+            if not verdict.is_certain and run in explored.final:
+                verdict = monitor.at_end(state, self._own(explored.letters[run]))
             if verdict.is_certain:
                 (self._bad if verdict is Verdict.VIOLATED else self._good).append(pair)
                 continue
-            ways = explored.ways[place]
-            if not ways:
+            if run >= explored.expanded:
                 self._unexplored.append(pair)
-            for way in ways:
+                continue
+            for step in explored.transitions[run]:
                 after = state
-                for letter in way.letters:
+                for letter in step.letters:
                     after = monitor.step(after, self._own(letter))
-                number = numbers.setdefault((way.to, after), len(self._pairs))
+                number = numbers.setdefault((step.target, after), len(self._pairs))
                 if number == len(self._pairs):
-                    self._pairs.append((way.to, after))
-                    self._from.append((pair, way.what))
+                    self._pairs.append((step.target, after))
+                    self._from.append((pair, step.text))
                 following.append(number)
 
     def _own(self, letter: int) -> int:
@@ -163,13 +163,13 @@ class _Judge:
 
     def _look_at_loops(self) -> list[int]:
         """Judge the pairs from which runs can only go round for ever; return those whose verdict
-        depends on the way."""
+        differs from run to run."""
         decided = leading_to((*self._good, *self._bad, *self._unexplored), self._following)
         left_open = []
-        for pair, (place, state) in enumerate(self._pairs):
+        for pair, (run, state) in enumerate(self._pairs):
             if pair in decided:
                 continue
-            verdict = self._monitor.on_ways(state, place, self._ways)
+            verdict = self._monitor.in_loops(state, run, self._transitions)
             self._loops.add(pair)
             if verdict is Verdict.OPEN:
                 left_open.append(pair)
@@ -177,23 +177,24 @@ class _Judge:
                 (self._bad if verdict is Verdict.VIOLATED else self._good).append(pair)
         return left_open
 
-    def _ways(self, place: int) -> list[tuple[list[int], int]]:
+    def _transitions(self, run: int) -> list[tuple[list[int], int]]:
+        same = (self._explored.letters[run],)
         return [
-            ([self._own(each) for each in way.letters or (self._explored.letters[place],)], way.to)
-            for way in self._explored.ways[place]
+            ([self._own(each) for each in step.letters or same], step.target)
+            for step in self._explored.transitions[run]
         ]
 
-    def _way_to(self, pair: int) -> str:
+    def _path_to(self, pair: int) -> str:
         """What comes before, for people."""
         last = ""
         if pair in self._loops:
             last = ROUND_AND_ROUND
-        elif self._pairs[pair][0] in self._explored.over:
+        elif self._pairs[pair][0] in self._explored.final:
             last = "nothing more comes"
         steps: list[str] = []
         while pair:
-            pair, what = self._from[pair]
-            steps.append(what)
+            pair, text = self._from[pair]
+            steps.append(text)
         steps.reverse()
         left_out = len(steps) - MOST_STEPS_SHOWN
         shown = ", ".join(steps[max(left_out, 0) :])

@@ -9,7 +9,7 @@ Behaviors succeed, or fail with an error that some event catches; prompts get an
 come in any order with the ends of behaviors; operators may send signals. Incidents that were open
 before are skipped; a new one ends its path.
 
-What is true on the way, for requirements, is read by a `MomentReader`: the engine knows none.
+What is true on the way is read by a `MomentReader`, for requirements.
 """
 
 import copy
@@ -46,42 +46,43 @@ class Verdict(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Way:
+class Transition:
     """From one state to another. `letters`: of the moments on the way, those that are as the one
-    before left out; `what`: what comes, for people."""
+    before left out; `text`: what comes, for people."""
 
-    to: int
+    target: int
     letters: tuple[int, ...]
-    what: str
+    text: str
 
 
 @dataclass(slots=True)
-class Ways:
-    """All that was explored, by the numbers of states; 0 is the state after the choice.
+class StateSpace:
+    """What was explored, by the numbers of states; 0 is the state after the choice.
 
-    `ways`: out of each state. `letters`: of the last moment of each. `over`: the states after which
-    nothing comes. `why_not_all`: why others have no way out either: they were not explored; "": all
-    were.
+    `transitions`: from each state. `letters`: of the last moment of each. `final`: the states after
+    which nothing comes. `expanded`: so many states, the first ones, have all their transitions.
+    `why_incomplete`: why the others have not; "": there are none.
     """
 
-    ways: list[list[Way]] = field(default_factory=list)
+    transitions: list[list[Transition]] = field(default_factory=list)
     letters: list[int] = field(default_factory=list)
-    over: set[int] = field(default_factory=set)
-    why_not_all: str = ""
+    final: set[int] = field(default_factory=set)
+    expanded: int = 0
+    why_incomplete: str = ""
 
     def add(self, letter: int) -> None:
         """Add a state."""
-        self.ways.append([])
+        self.transitions.append([])
         self.letters.append(letter)
 
 
 @dataclass(frozen=True, slots=True)
 class Outlook:
-    """The verdict, its reason for people, and what was explored to find it."""
+    """The verdict, its reason for people, and the states that were explored to find it."""
 
     verdict: Verdict
     reason: str = ""
-    explored: Ways = field(default_factory=Ways, compare=False, repr=False)
+    explored: StateSpace = field(default_factory=StateSpace, compare=False, repr=False)
 
 
 class Reading(Protocol):
@@ -98,7 +99,7 @@ class Reading(Protocol):
 
 
 class MomentReader(Protocol):
-    """What is true on the ways that are explored; `m2pem.monitors.prospects` has one."""
+    """Reads what is true as the run goes on: `m2pem.monitors.requirement_outlook`."""
 
     def observe(self, records: Sequence[Record]) -> None:
         """Read the records of the choice itself."""
@@ -149,13 +150,13 @@ def outlook(
     """Return whether a run completes after a choice about an incident, or a revision.
 
     `run` is changed. `now_us`: microseconds since the Unix epoch. `writers`: names of behaviors
-    that write data when they end. `reader`: reads what is true on the ways that are explored.
+    that write data when they end. `reader`: reads what is true as the run goes on.
     """
     explorer = _Explorer(run, limits or OutlookLimits(), writers, reader or _NoReader())
     try:
         return explorer.explore(now_us, choice)
     except _NotKnownError as error:
-        explorer.found.why_not_all = str(error)
+        explorer.found.why_incomplete = str(error)
         return Outlook(Verdict.UNKNOWN, str(error), explorer.found)
 
 
@@ -167,7 +168,7 @@ class _Explorer:
         writers: frozenset[str],
         reader: MomentReader,
     ) -> None:
-        self.found = Ways()
+        self.found = StateSpace()
         self._reader = reader
         self._first = run
         self._limits = limits
@@ -177,6 +178,52 @@ class _Explorer:
 
     def explore(self, now_us: int, choice: i.ResolveIncident | i.Revise) -> Outlook:
         """Explore all states, breadth first, and judge them."""
+        self._choose(choice, now_us)
+        run = self._first
+        mission = run.state.mission
+        shared = [mission, *mission.elements.values()]
+        self._shared = {id(each): each for each in shared}
+        self._codes = list(dict.fromkeys(["FAILED", *(e.code for e in mission.errors.values())]))
+        found, letter = self.found, self._reader.reading(run.state).letter
+        found.add(letter)
+        numbers = {(_key(run.state, now_us), letter): 0}
+        good: list[int] = []
+        bad: dict[int, str] = {}
+        waiting = deque([(0, run, now_us)])
+        while waiting:
+            number, run, now_us = waiting.popleft()
+            found.expanded = number
+            self._check_time()
+            if run.state.status is RunStatus.ENDED:
+                found.final.add(number)
+                if run.state.outcome in (RunOutcome.COMPLETED, RunOutcome.TERMINATED):
+                    good.append(number)
+                else:
+                    bad[number] = run.state.detail
+                continue
+            steps = self._steps(run, now_us)
+            if not steps:
+                found.final.add(number)
+                bad[number] = _where_it_stops(run.state)
+            texts = [_said(run.state, item) for item, _ in steps]
+            for (item, at_us), text in zip(steps, texts, strict=True):
+                following = copy.deepcopy(run, dict(self._shared)) if len(steps) > 1 else run
+                reading = self._reader.reading(following.state)
+                self._receive(following, item, at_us, reading.read)
+                key = (_key(following.state, at_us), reading.letter)
+                known = numbers.setdefault(key, len(found.letters))
+                if known == len(found.letters):
+                    if known >= self._limits.states:
+                        raise _NotKnownError(f"there are more than {self._limits.states} states")
+                    found.add(reading.letter)
+                    waiting.append((known, following, at_us))
+                step = Transition(known, tuple(reading.letters), text)
+                found.transitions[number].append(step)
+        found.expanded = len(found.letters)
+        return _judge(found, good, bad)
+
+    def _choose(self, choice: i.ResolveIncident | i.Revise, now_us: int) -> None:
+        """Carry out the choice, and let the run go on if it is paused."""
         run, observe = self._first, self._reader.observe
         if isinstance(choice, i.Revise):  # its plan is that of the run as it is
             self._receive(run, choice, now_us, observe)
@@ -187,45 +234,6 @@ class _Explorer:
             self._receive(run, i.ResumeRun(), now_us, observe)
         if isinstance(choice, i.ResolveIncident):
             self._receive(run, choice, now_us, observe)
-        mission = run.state.mission
-        shared = [mission, *mission.elements.values()]
-        self._shared = {id(each): each for each in shared}
-        self._codes = list(dict.fromkeys(["FAILED", *(e.code for e in mission.errors.values())]))
-        letter = self._reader.reading(run.state).letter
-        numbers = {(_key(run.state, now_us), letter): 0}
-        found = self.found
-        found.add(letter)
-        good: list[int] = []
-        bad: dict[int, str] = {}
-        waiting = deque([(0, run, now_us)])
-        while waiting:
-            number, run, now_us = waiting.popleft()
-            self._check_time()
-            if run.state.status is RunStatus.ENDED:
-                found.over.add(number)
-                if run.state.outcome in (RunOutcome.COMPLETED, RunOutcome.TERMINATED):
-                    good.append(number)
-                else:
-                    bad[number] = run.state.detail
-                continue
-            steps = self._steps(run, now_us)
-            if not steps:
-                found.over.add(number)
-                bad[number] = _where_it_stops(run.state)
-            whats = [_said(run.state, item) for item, _ in steps]
-            for (item, at_us), what in zip(steps, whats, strict=True):
-                following = copy.deepcopy(run, dict(self._shared)) if len(steps) > 1 else run
-                reading = self._reader.reading(following.state)
-                self._receive(following, item, at_us, reading.read)
-                key = (_key(following.state, at_us), reading.letter)
-                known = numbers.setdefault(key, len(found.ways))
-                if known == len(found.ways):
-                    if known >= self._limits.states:
-                        raise _NotKnownError(f"there are more than {self._limits.states} states")
-                    found.add(reading.letter)
-                    waiting.append((known, following, at_us))
-                found.ways[number].append(Way(known, tuple(reading.letters), what))
-        return _judge(found, good, bad)
 
     def _steps(self, run: MissionRun, now_us: int) -> list[tuple[i.Input, int]]:
         """Return the inputs that may come next, each with its time."""
@@ -300,12 +308,12 @@ def _where_it_stops(state: RunState) -> str:
 ROUND_AND_ROUND = "it goes round in a loop that it does not leave"
 
 
-def _judge(found: Ways, good: list[int], bad: dict[int, str]) -> Outlook:
-    reaches = leading_to(good, [[way.to for way in ways] for ways in found.ways])
+def _judge(found: StateSpace, good: list[int], bad: dict[int, str]) -> Outlook:
+    reaches = leading_to(good, [[each.target for each in steps] for steps in found.transitions])
     reason = next(iter(bad.values()), ROUND_AND_ROUND)
     if 0 not in reaches:
         return Outlook(Verdict.CANNOT_COMPLETE, reason, found)
-    if bad or len(reaches) < len(found.ways):
+    if bad or len(reaches) < len(found.letters):
         return Outlook(Verdict.MAY_NOT_COMPLETE, reason, found)
     return Outlook(Verdict.COMPLETES, explored=found)
 

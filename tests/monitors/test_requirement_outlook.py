@@ -374,7 +374,7 @@ def compared(make: Callable[[Random], str], dice: Random) -> list[RequirementPro
         return []
     item = revision(play, new, after, **moves)
     foresight, found = foreseen(play, item)
-    if foresight.explored.why_not_all:
+    if foresight.explored.why_incomplete:
         return []
     came: dict[str, set[RequirementVerdict]] = {each: set() for each in found}
     try:
