@@ -4,7 +4,7 @@ One object per registered name serves all its resources of a fleet. `m2pem.testi
 checks every promise made here.
 """
 
-from collections.abc import AsyncIterator, Callable, Collection, Mapping, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, TypeGuard
@@ -208,8 +208,12 @@ class AdjustingArbiter(Protocol):
 
     async def adjust(
         self, behavior: BehaviorId, epoch: int, parameters: Mapping[str, ResolvedValue]
-    ) -> None:
+    ) -> Awaitable[str] | None:
         """Go on with these parameters, such as `speed`, in place of those of the same names.
+
+        It hands over, as `start` does, and does not wait for the vehicle. An arbiter whose vehicles
+        answer returns what can be awaited for that answer: "" when the vehicle has taken them, or
+        need not any more, else why it goes on as before, for operators. None: there is no answer.
 
         Parameters that cannot be changed on the way, and behaviors that have ended, stay as they
         are.

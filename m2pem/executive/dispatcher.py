@@ -30,6 +30,10 @@ log = logging.getLogger("m2pem.dispatch")
 CALL_TIMEOUT_S = 10.0
 """An arbiter's `start`, `cancel`, `hold` or `resume` only hands over; one that hangs is a fault."""
 
+ANSWER_WITHIN_S = 60.0
+"""A vehicle answers within this time whether it goes on with other parameters; one that has not
+begun its behavior answers then."""
+
 START_WAIT_S = 0.3
 """How long STOP and pause wait for an arbiter's `start` that has not returned: a cancel that comes
 before its start would stop nothing."""
@@ -60,6 +64,14 @@ class _Active:
     last_number: int = 0
     adopted: bool = False
     deadline: asyncio.Task[None] | None = None
+    answer: asyncio.Task[None] | None = None
+    """Waits for what the vehicle says to other parameters."""
+
+    def forget(self) -> None:
+        """It has ended, or is no longer commanded from here."""
+        for task in (self.deadline, self.answer):
+            if task is not None:
+                task.cancel()
 
 
 @dataclass(slots=True)
@@ -120,11 +132,12 @@ class Dispatcher:
     def adjust(self, command: AdjustBehavior, failed: Callable[[str], None]) -> None:
         """Let a behavior go on with other parameters, unless it has ended or is being cancelled.
 
-        `failed` is called with the reason when its arbiter could not be given them.
+        `failed` is called with the reason when its arbiter could not be given them, or when the
+        vehicle does not take them. The next command for the vehicle does not wait for its answer.
         """
 
         async def adjust() -> None:
-            if wrong := await self._adjust(command):
+            if wrong := await self._adjust(command, failed):
                 failed(wrong)
 
         self._enqueue(command.goes_on.resources, adjust)
@@ -340,8 +353,8 @@ class Dispatcher:
     def ended(self, behavior: str) -> None:
         """The journal has its end: its resources are free."""
         active = self._active.pop(behavior, None)
-        if active is not None and active.deadline is not None:
-            active.deadline.cancel()
+        if active is not None:
+            active.forget()
         self._availability.release(behavior)
         if self._clearance is not None:
             self._clearance.reservations.release(behavior)
@@ -377,8 +390,7 @@ class Dispatcher:
     async def close(self) -> None:
         """Let calls under way end, drop what waits for a limit."""
         for active in self._active.values():
-            if active.deadline is not None:
-                active.deadline.cancel()
+            active.forget()
         if self._tasks:
             await asyncio.wait(self._tasks)
 
@@ -475,7 +487,7 @@ class Dispatcher:
         if wrong and self._active.get(command.behavior) is active:
             self._refuse(command.behavior, "REJECTED", wrong)
 
-    async def _adjust(self, command: AdjustBehavior) -> str:
+    async def _adjust(self, command: AdjustBehavior, failed: Callable[[str], None]) -> str:
         goes_on = command.goes_on
         await self._claims.confirmed()
         active = self._active.get(goes_on.behavior)
@@ -489,8 +501,37 @@ class Dispatcher:
         except ParameterError as error:
             return str(error)
         changed = {name: parameters[name] for name in command.names}
-        call = active.arbiter.adjust(goes_on.behavior, command.epoch, changed)
-        return await self._call(f"adjust {goes_on.behavior}", call)
+        what, arbiter, answer = f"adjust {goes_on.behavior}", active.arbiter, None
+
+        async def hand_over() -> None:
+            nonlocal answer
+            answer = await arbiter.adjust(goes_on.behavior, command.epoch, changed)
+
+        wrong = await self._call(what, hand_over())
+        if answer is not None:
+            if active.answer is not None:
+                active.answer.cancel()  # of what was to be changed before
+            active.answer = asyncio.create_task(self._answered(what, active, answer, failed))
+        return wrong
+
+    async def _answered(
+        self,
+        what: str,
+        active: _Active,
+        answer: Awaitable[str],
+        failed: Callable[[str], None],
+    ) -> None:
+        """Say that a vehicle does not go on as its behavior was changed, unless that is over."""
+        try:
+            async with asyncio.timeout(ANSWER_WITHIN_S):
+                wrong = await answer
+        except TimeoutError:
+            wrong = f"there is no answer after {ANSWER_WITHIN_S:g} s"
+        except Exception as error:  # an arbiter's fault must not end the executive
+            log.exception("%s: the arbiter raised", what)
+            wrong = f"the arbiter raised {type(error).__name__}: {error}"
+        if wrong and active.deadline is None:
+            failed(wrong)
 
     def request(self, command: StartBehavior, spec: BehaviorSpec) -> BehaviorRequest:
         """What an arbiter is asked for.

@@ -195,8 +195,19 @@ class Member:
     async def _adjust(self, speed_m_s: float, epoch: int) -> None:
         if self._adjusting is not None and self._obeys:
             self._speed_m_s = speed_m_s
-            call = self._adjusting.adjust(self.part, epoch, {"speed": speed_m_s})
-            await self._call(f"adjust {self.part}", call)
+            part, arbiter = self.part, self._adjusting
+
+            async def adjust() -> None:
+                answer = await arbiter.adjust(part, epoch, {"speed": speed_m_s})
+                if answer is not None:
+                    self._task(lambda: self._answered(answer), None)
+
+            await self._call(f"adjust {part}", adjust())
+
+    async def _answered(self, answer: Awaitable[str]) -> None:
+        """Log that a speed was not taken. The next command does not wait for the answer."""
+        if wrong := await answer:
+            _log.warning("%s may keep its speed: %s", self.id, wrong, extra={"resource": self.id})
 
     @property
     def _obeys(self) -> bool:

@@ -112,15 +112,27 @@ def test_where_vehicles_share_space_the_task_begins_again(play):
 
 
 class Adjusting(FakeArbiter):
-    """Changes the speed of what goes on, or raises."""
+    """Changes the speed of what goes on, or raises. With `answering`, its vehicles answer when a
+    test sets the result of the last of `answers`."""
 
     capabilities = replace(FakeArbiter.capabilities, adjusts=True)
     broken = False
+    answering = False
 
-    async def adjust(self, behavior: str, epoch: int, parameters: Mapping[str, Any]) -> None:
+    def __init__(self, connections: Any, context: Any) -> None:
+        super().__init__(connections, context)
+        self.answers: list[asyncio.Future[str]] = []
+
+    async def adjust(
+        self, behavior: str, epoch: int, parameters: Mapping[str, Any]
+    ) -> asyncio.Future[str] | None:
         await self._called("adjust", f"{behavior} {epoch} {dict(parameters)}")
         if self.broken:
             raise OSError("no link")
+        if not self.answering:
+            return None
+        self.answers.append(asyncio.get_running_loop().create_future())
+        return self.answers[-1]
 
 
 @pytest.fixture
@@ -153,6 +165,118 @@ def test_operators_read_of_a_vehicle_whose_arbiter_fails(play):
         "ugv1 may keep the speed that goto had before the revision: the arbiter raised OSError: "
         "no link"
     )
+
+
+async def adjusted(world: World) -> str:
+    """Start the mission, and revise its speed; the run. The vehicle has not answered yet."""
+    world.fake.answering = True
+    run = await world.executive.control.start(SLOW)
+    await world.fake.until_called("start", "r1.b1")
+    world.fake.report("r1.b1", BehaviorState.RUNNING)
+    await world.clock.sleep(0.1)
+    assert await revised(world, run, FAST) == "adjusts"
+    await world.fake.until_called("adjust", "r1.b1 1 {'speed': 4.0}")
+    await world.clock.sleep(0.1)
+    return run
+
+
+async def listed(world: World) -> list[str]:
+    """The texts of the alerts of vehicles that may keep their speed."""
+    found = await world.executive.control.alerts()
+    return [each.text for each in found if each.code == "NOT_ADJUSTED"]
+
+
+@pytest.mark.usefixtures("adjusting")
+def test_operators_read_what_the_vehicle_answers(play):
+    async def story(world: World):
+        await adjusted(world)
+        await world.clock.sleep(20.0)
+        assert await listed(world) == [], "it may still take it"
+        world.fake.answers[-1].set_result("its motors are hot")
+        await world.clock.sleep(0.1)
+        return await listed(world)
+
+    assert play(story, "ugv1") == [
+        "ugv1 may keep the speed that goto had before the revision: its motors are hot"
+    ]
+
+
+@pytest.mark.usefixtures("adjusting")
+def test_a_speed_that_is_taken_is_no_alert(play):
+    async def story(world: World):
+        await adjusted(world)
+        world.fake.answers[-1].set_result("")
+        await world.clock.sleep(100.0)
+        return await listed(world)
+
+    assert play(story, "ugv1") == []
+
+
+@pytest.mark.usefixtures("adjusting")
+def test_operators_read_of_a_vehicle_that_does_not_answer(play):
+    async def story(world: World):
+        await adjusted(world)
+        await world.clock.sleep(100.0)
+        return await listed(world)
+
+    (text,) = play(story, "ugv1")
+    assert text.endswith("there is no answer after 60 s")
+
+
+@pytest.mark.usefixtures("adjusting")
+def test_operators_read_of_an_arbiter_that_fails_later(play):
+    async def story(world: World):
+        await adjusted(world)
+        world.fake.answers[-1].set_exception(OSError("no link"))
+        await world.clock.sleep(0.1)
+        return await listed(world)
+
+    (text,) = play(story, "ugv1")
+    assert text.endswith("the arbiter raised OSError: no link")
+
+
+@pytest.mark.usefixtures("adjusting")
+def test_the_answer_to_an_earlier_speed_does_not_matter(play):
+    async def story(world: World):
+        run = await adjusted(world)
+        assert await revised(world, run, drives("3 m/s")) == "adjusts"
+        await world.fake.until_called("adjust", "r1.b1 1 {'speed': 3.0}")
+        await world.clock.sleep(0.1)
+        assert world.fake.answers[0].cancelled()
+        world.fake.answers[1].set_result("its motors are hot")
+        await world.clock.sleep(0.1)
+        return await listed(world)
+
+    assert len(play(story, "ugv1")) == 1
+
+
+@pytest.mark.usefixtures("adjusting")
+def test_a_cancel_does_not_wait_for_the_answer(play):
+    async def story(world: World):
+        run = await adjusted(world)
+        restarted = mission(sequence(("Go1", behavior("Go1", "drive_stop", "ugv1"))))
+        assert await revised(world, run, restarted) == "restarts"
+        await world.fake.until_called("cancel", "r1.b1")
+        assert not world.fake.answers[-1].done()
+        world.fake.answers[-1].set_result("its motors are hot")
+        await world.clock.sleep(0.1)
+        assert await listed(world) == [], "it is over"
+        world.fake.report("r1.b1", BehaviorState.CANCELLED)
+        await world.clock.sleep(0.1)
+
+    play(story, "ugv1")
+
+
+@pytest.mark.usefixtures("adjusting")
+def test_what_has_ended_need_not_answer(play):
+    async def story(world: World):
+        run = await adjusted(world)
+        world.fake.report("r1.b1", BehaviorState.SUCCEEDED)
+        await world.executive.control.wait(run)
+        assert world.fake.answers[-1].cancelled()
+        return await listed(world)
+
+    assert play(story, "ugv1") == []
 
 
 @pytest.mark.usefixtures("adjusting")

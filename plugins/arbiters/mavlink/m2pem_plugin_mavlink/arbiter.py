@@ -2,7 +2,7 @@
 connection."""
 
 import asyncio
-from collections.abc import AsyncIterator, Callable, Mapping, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Protocol
 
@@ -239,15 +239,16 @@ class MavlinkArbiter:
 
     async def adjust(
         self, behavior: BehaviorId, epoch: int, parameters: Mapping[str, ResolvedValue]
-    ) -> None:
-        """Change the `speed` of a behavior; other parameters stay."""
+    ) -> Awaitable[str] | None:
+        """Change the `speed` of a behavior; other parameters stay. Return the vehicle's answer."""
         speed_m_s = parameters.get("speed")
         if not isinstance(speed_m_s, int | float) or speed_m_s <= 0:
-            return
+            return None
         if self._tracker.may_adjust(behavior, epoch):
             for resource, controller in self._controllers.items():
                 if self._tracker.holder(resource) == behavior:
-                    controller.adjust(behavior, float(speed_m_s))
+                    return controller.adjust(behavior, float(speed_m_s))
+        return None
 
     async def hold(self, resource: ResourceId) -> None:
         """Stop a vehicle at once; it keeps its behavior."""

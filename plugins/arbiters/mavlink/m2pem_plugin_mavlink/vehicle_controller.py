@@ -18,7 +18,7 @@ from m2pem_plugin_mavlink.behaviors.arrival import (
 )
 from m2pem_plugin_mavlink.behaviors.behavior import Behavior, BehaviorFailedError
 from m2pem_plugin_mavlink.behaviors.takeoff_landing import Land, ReturnToLaunch, SetSpeed
-from m2pem_plugin_mavlink.protocol.transaction import ExchangeError
+from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, NoAnswerError
 from m2pem_plugin_mavlink.vehicle.autopilot import ModeLeftError
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode
 from m2pem_plugin_mavlink.vehicle.takeover_monitor import (
@@ -46,17 +46,30 @@ _FAIL_SAFE = frozenset({FlightMode.RETURN, FlightMode.LAND})
 
 
 @dataclass(slots=True)
+class _NewSpeed:
+    """A speed for a behavior that goes on. `answer`: "" when the vehicle has taken it, or need not
+    any more; else why it goes on at another one."""
+
+    m_s: float
+    answer: asyncio.Future[str]
+
+    def answered(self, wrong: str = "") -> None:
+        if not self.answer.done():
+            self.answer.set_result(wrong)
+
+
+@dataclass(slots=True)
 class _ActiveBehavior:
     """The behavior that is active. `begun`: the vehicle executes it; `reattached`: it was found on
-    the vehicle after a restart, and nothing need be sent. `speed_m_s`: to be sent to the vehicle;
-    None: nothing is."""
+    the vehicle after a restart, and nothing need be sent. `speed`: to be sent to the vehicle; None:
+    nothing is."""
 
     id: BehaviorId
     behavior: Behavior
     begun: bool = False
     reattached: bool = False
     cancelled: bool = False
-    speed_m_s: float | None = None
+    speed: _NewSpeed | None = None
 
 
 class VehicleController:
@@ -124,12 +137,20 @@ class VehicleController:
             active.cancelled = True
             self._work.replace(lambda: self._cancel(active))
 
-    def adjust(self, id_: BehaviorId, speed_m_s: float) -> None:
+    def adjust(self, id_: BehaviorId, speed_m_s: float) -> asyncio.Future[str]:
         """Change the speed of the behavior; while it is held, the change takes effect when it is
-        resumed."""
+        resumed. Return the vehicle's answer: "", or why it goes on at another speed."""
+        new = _NewSpeed(speed_m_s, asyncio.get_running_loop().create_future())
         active = self._active
-        if active is not None and active.id == id_ and active.behavior.adjust(speed_m_s):
-            active.speed_m_s = speed_m_s
+        if active is None or active.id != id_:
+            new.answered()  # it is over
+        elif not active.behavior.adjust(speed_m_s):
+            new.answered(f"{active.behavior.name} has no speed that could be changed")
+        else:
+            if active.speed is not None:
+                active.speed.answered()  # the new one counts
+            active.speed = new
+        return new.answer
 
     def hold(self) -> None:
         """Stop the vehicle, and keep the behavior."""
@@ -284,13 +305,23 @@ class VehicleController:
         """Send new speeds beside the behavior, whose end must not wait for them; the newest
         counts."""
         while True:
-            speed_m_s, active.speed_m_s = active.speed_m_s, None
-            if speed_m_s is not None:
+            speed, active.speed = active.speed, None
+            if speed is not None:
                 try:
-                    await self.vehicle.driver.set_speed(speed_m_s)
-                except ExchangeError as error:
-                    self._logger.warning("%s keeps its speed: %s", self.vehicle.resource, error)
+                    speed.answered(await self._speed_refusal(speed.m_s))
+                finally:
+                    speed.answered()  # the behavior is over, or held: then it is sent again
             await self.vehicle.sleep(LOOK_EVERY_S)
+
+    async def _speed_refusal(self, speed_m_s: float) -> str:
+        """Send a speed; return "", or why the vehicle goes on at another one."""
+        try:
+            await self.vehicle.driver.set_speed(speed_m_s)
+        except NoAnswerError as error:
+            return f"it has not acknowledged {speed_m_s:g} m/s ({error})"
+        except ExchangeError as error:
+            return f"it does not take {speed_m_s:g} m/s, and goes on at its old speed ({error})"
+        return ""
 
     def _report_left(self, active: _ActiveBehavior, least_m: float | None = None) -> None:
         left = active.behavior.left(least_m)

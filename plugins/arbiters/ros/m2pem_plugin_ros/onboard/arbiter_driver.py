@@ -5,7 +5,7 @@ It makes a node of any arbiter of one vehicle or payload.
 
 import asyncio
 import logging
-from collections.abc import Coroutine, Mapping
+from collections.abc import Awaitable, Coroutine, Mapping
 from contextlib import suppress
 from typing import Any
 from uuid import UUID
@@ -52,8 +52,9 @@ class ArbiterDriver:
         self._logger = logger
         self._state: VehicleState | PayloadState | None = None
         self._current: UUID | None = None
-        self._calls: asyncio.Queue[Coroutine[Any, Any, None]] = asyncio.Queue()
+        self._calls: asyncio.Queue[Coroutine[Any, Any, Awaitable[str] | None]] = asyncio.Queue()
         self._tasks: list[asyncio.Task[None]] = []
+        self._answers: set[asyncio.Task[None]] = set()
 
     # --- life -----------------------------------------------------------------------------------
 
@@ -65,9 +66,10 @@ class ArbiterDriver:
         self._tasks = [create(work) for work in works]
 
     async def close(self) -> None:
-        for task in self._tasks:
+        tasks = (*self._tasks, *self._answers)
+        for task in tasks:
             task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
+        await asyncio.gather(*tasks, return_exceptions=True)
         while not self._calls.empty():
             self._calls.get_nowait().close()
         await self._arbiter.close()
@@ -135,9 +137,19 @@ class ArbiterDriver:
         while True:
             call = await self._calls.get()
             try:
-                await call
+                answer = await call
             except Exception:  # an error of the arbiter must not end the node
                 self._logger.exception("%s: its arbiter failed", self._resource)
+                continue
+            if answer is not None:
+                task = asyncio.get_running_loop().create_task(self._answered(answer))
+                self._answers.add(task)
+                task.add_done_callback(self._answers.discard)
+
+    async def _answered(self, answer: Awaitable[str]) -> None:
+        """Log that parameters were not taken. The next call does not wait for the answer."""
+        if wrong := await answer:
+            self._logger.warning("%s may go on as before: %s", self._resource, wrong)
 
     async def _start(self, request: BehaviorRequest, goal: UUID) -> None:
         try:
