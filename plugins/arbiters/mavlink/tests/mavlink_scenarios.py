@@ -405,6 +405,23 @@ def second_mission(s: Station) -> None:
     _flown(s)
 
 
+@of("px4copter")
+def mission_replaced_on_the_way(s: Station) -> None:
+    """By one whose first item is marked as current, then by one without such a mark."""
+    s.airborne()
+    s.mission("upload", _leg(s, 80.0)[1:])
+    _start(s)
+    s.until("at the second waypoint", lambda: s.known.get("current") == 2)
+    s.watch(0.5)
+    s.mission("upload another", _leg(s, 20.0)[1:])
+    s.begin("fly it")
+    s.until("at the second waypoint of the other", lambda: s.known.get("current") == 2)
+    s.watch(0.5)
+    s.mission("upload a third without a mark", _leg(s, -30.0)[1:], current=None)
+    s.begin("fly it")
+    _flown(s, 60.0)
+
+
 @of(*GROUNDED)
 def mission_paused(s: Station) -> None:
     s.airborne()

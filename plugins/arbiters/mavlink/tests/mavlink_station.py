@@ -377,18 +377,28 @@ class Station(Recording):
             *(round(latitude * 1e7), round(longitude * 1e7), 0.0 if at is None else at[2], plan),
         )
 
-    def mission(self, what: str, items: Sequence[Any], system: int = OWN) -> None:
+    def mission(
+        self, what: str, items: Sequence[Any], system: int = OWN, current: int | None = 0
+    ) -> None:
         """A step: upload a mission; ArduPilot's has home as its first item."""
         if not self.px4:
             items = [self.item(dialect.MAV_CMD_NAV_WAYPOINT, (0.0, 0.0, 0.0)), *items]
-        self.upload(what, items, system)
+        self.upload(what, items, system, current=current)
 
-    def upload(self, what: str, items: Sequence[Any], system: int = OWN, plan: int = 0) -> None:
-        """A step: upload a plan as a well-behaved station does."""
+    def upload(
+        self,
+        what: str,
+        items: Sequence[Any],
+        system: int = OWN,
+        plan: int = 0,
+        current: int | None = 0,
+    ) -> None:
+        """A step: upload a plan as a well-behaved station does; `current`: the item that it marks
+        as the current one."""
         self.begin(what)
         self._heard.clear()
         for seq, item in enumerate(items):
-            item.seq, item.current = seq, int(seq == 0)
+            item.seq, item.current = seq, int(seq == current)
         self.send(dialect.MAVLink_mission_count_message(self.system, 1, len(items), plan), system)
         while True:
             message = self.answer("MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_ACK")

@@ -98,12 +98,15 @@ class MissionProgress(Component):
         self.begun = self.complete = False
         self._jumps.clear()
 
-    def replaced(self) -> None:
-        """Another mission was uploaded: PX4 begins it, at once if it flies the mission."""
+    def replaced(self, marked: int | None) -> None:
+        """Another mission was uploaded: PX4 is at the item that the ground station has marked as
+        current, else at the number of the item that it was at, at once if it flies the mission."""
+        at = self.resume_at if marked is None else marked
         self.restart()
+        self.current = self.resume_at = max(0, min(at, len(self.items) - 1))
         maneuver = self.autopilot.modes.maneuver
         if self.running and isinstance(maneuver, AutoMission):
-            maneuver.go_on(self.first)
+            maneuver.go_on(self.resume_at)
 
     def clear(self) -> None:
         """There is no mission any more."""

@@ -24,7 +24,7 @@ from m2pem_plugin_mavlink.simulator.missions.plan import (
 @dataclass(slots=True)
 class Upload:
     """Who uploads which kind of plan of how many items, and the items that came. They become the
-    plan of PX4 all at once."""
+    plan of PX4 all at once. `marked`: the item that the ground station has marked as current."""
 
     uploader: Sender
     kind: int
@@ -32,6 +32,7 @@ class Upload:
     asked_s: float
     received_s: float
     items: list[Item] = field(default_factory=list)
+    marked: int | None = None
 
     @property
     def next(self) -> int:
@@ -117,7 +118,7 @@ class MissionServer(Component):
             plans[kind] = plans[kind][:count]
             self._counted(kind)
         if count == 0:
-            self._replace(kind, ())
+            self._replace(kind, (), None)
             self._complete(sender, kind)
         else:
             now_s = self.autopilot.now_s
@@ -166,6 +167,8 @@ class MissionServer(Component):
         if self._ardupilot:
             self.autopilot.plans.put(kind, upload.next, item)
             self._counted(kind)
+        if message.current:
+            upload.marked = upload.next
         upload.items.append(item)
         upload.received_s = self.autopilot.now_s
         if upload.next < upload.count:
@@ -173,17 +176,17 @@ class MissionServer(Component):
         else:
             self.upload = None
             self._last = (sender, kind, message.seq)
-            self._replace(kind, tuple(upload.items))
+            self._replace(kind, tuple(upload.items), upload.marked)
             self._complete(sender, kind)
 
-    def _replace(self, kind: int, items: tuple[Item, ...]) -> None:
+    def _replace(self, kind: int, items: tuple[Item, ...], marked: int | None) -> None:
         """PX4 takes a plan as a whole, and only one that differs."""
         autopilot = self.autopilot
         if self._ardupilot or items == autopilot.plans[kind]:
             return
         autopilot.plans[kind] = items
         if kind == MISSION:
-            autopilot.mission.replaced()
+            autopilot.mission.replaced(marked)
 
     def _complete(self, sender: Sender, kind: int) -> None:
         autopilot = self.autopilot
