@@ -16,6 +16,7 @@ from mavlink_vehicle_world import (
     ScriptedLink,
     fail_its_checks,
     fly,
+    make,
     px4,
 )
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -222,5 +223,25 @@ def test_items_are_counted_from_the_first_real_one(virtual: Run) -> None:
             await vehicle.until(lambda: vehicle.driver.current_item == 0, 3.0)
             await vehicle.driver.start_mission(2)
             assert (link.custom_mode, link.armed) == (AUTO_MISSION, True)
+
+    virtual(main)
+
+
+def test_an_item_of_the_mission_before_that_it_still_repeats_does_not_count(virtual: Run) -> None:
+    async def main(clock: Clock) -> None:
+        async with Playing(px4(clock)) as (link, vehicle):
+            await in_the_air(link, vehicle)
+            set_current = dialect.MAV_CMD_DO_SET_MISSION_CURRENT
+
+            def obey(_: Any) -> int:
+                link.hear(make("MISSION_ITEM_REACHED", seq=1))
+                link.says["MISSION_CURRENT"] = {"seq": 0, "total": 2, "mission_state": 3}
+                return ACCEPTED
+
+            link.obey[set_current] = obey
+            await vehicle.driver.start_mission()
+            assert vehicle.driver.reached_item is None
+            link.hear(make("MISSION_ITEM_REACHED", seq=1))
+            assert vehicle.driver.reached_item == 1
 
     virtual(main)

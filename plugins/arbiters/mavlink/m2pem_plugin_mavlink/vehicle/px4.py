@@ -189,8 +189,15 @@ class Px4Driver(Autopilot):
     # --- missions -------------------------------------------------------------------------------
 
     async def start_mission(self, first: int = 0) -> None:
+        """Start the mission at an item. It has begun already, at its first item, if the vehicle
+        flew the mission before it: PX4 turns to the item that an upload marks as the current one
+        (without such a mark, it would go on at the number of the item that it was at).
+
+        PX4 repeats ten times which item was reached last, and acknowledges an upload before it
+        looks at the mission: until it has begun, that is an item of the mission before.
+        """
         await self.arm()
-        self.state.reached_sequence = None
         await exchanges.set_current(self.link, first)
         await self.set_mode(FlightMode.MISSION)
         await self._mission_begins()
+        self.state.reached_sequence = None
