@@ -11,11 +11,21 @@ from m2pem_plugin_mavlink.vehicle.driver import FlightMode
 from mavlink_double import Body, DoubleStation, at, connections
 from mavlink_play import START_US, Bench, V
 
-from m2pem.api import BehaviorReport, BehaviorState, Point
+from m2pem.api import BehaviorReport, BehaviorRequest, BehaviorState, Clock, Point, Route
 from m2pem.api.clock import run_virtual
 from m2pem.testing.contracts.arbiter_harness import context
 
 GOTO = {"target": Point((*at(200.0, 0.0), None))}
+WAY = Route(tuple((*at(east, 0.0), 20.0) for east in (50.0, 300.0, 600.0)))
+
+
+def benches(body: Body, clock: Clock) -> Bench:
+    """A new arbiter for a vehicle, as after a restart."""
+    lent, bodies = context(clock), {V: body}
+    made = MavlinkArbiter(connections(bodies), lent, lambda *_: DoubleStation(bodies, lent))
+    bench = Bench(made, clock)
+    bench.bodies, bench.bus = bodies, lent.bus
+    return bench
 
 
 def asked_after(
@@ -31,16 +41,9 @@ def asked_after(
     """Close an arbiter whose vehicle never gets a call of its driver; what the next one answers."""
     found: list[BehaviorReport] = []
 
-    async def run(clock) -> None:
-        def bench() -> Bench:
-            lent, bodies = context(clock), {V: body}
-            made = MavlinkArbiter(connections(bodies), lent, lambda *_: DoubleStation(bodies, lent))
-            bench = Bench(made, clock)
-            bench.bodies, bench.bus = bodies, lent.bus
-            return bench
-
+    async def run(clock: Clock) -> None:
         body.stuck = {call}
-        async with bench() as before:
+        async with benches(body, clock) as before:
             await before.start("r1.b1", behavior, V, **parameters)
             while call not in before.told:
                 await clock.sleep(0.1)
@@ -48,7 +51,7 @@ def asked_after(
         body.stuck = set()
         meanwhile(body)
         await clock.sleep(after_s)
-        async with bench() as after:
+        async with benches(body, clock) as after:
             found.append(await after.arbiter.query("r1.b1", accepted.native_ref))
             if then is not None:
                 await then(after, found[0])
@@ -126,6 +129,57 @@ def test_nobody_expects_a_takeoff_that_was_accepted_long_ago() -> None:
 def test_an_actuator_leaves_nothing_to_see() -> None:
     found = asked_after(Body(), "command", "deploy", actuator="9", value=1000.0)
     assert not found.not_begun
+
+
+def flown_again(
+    *, begun: bool, meanwhile: Callable[[Body], None] = lambda _: None, after_s: float = 0.0
+) -> BehaviorReport:
+    """A vehicle on its way to the last waypoint of a route flies the same route again; m2pem is
+    closed before it has sent anything, or (`begun`) once the vehicle is on its way again. What the
+    next arbiter answers."""
+    found: list[BehaviorReport] = []
+    body = Body().fly()
+
+    async def run(clock: Clock) -> None:
+        async with benches(body, clock) as before:
+            await before.start("r1.b1", "single_vehicle_routing", V, route=WAY)
+            await before.until(lambda: body.current == 2, 300)
+            body.stuck = set() if begun else {"upload"}
+            request = BehaviorRequest(
+                "r1.b2", 1, "single_vehicle_routing", {"route": WAY}, (V,), {}, ("r1.b1",)
+            )
+            await before.arbiter.start(request)
+            if begun:
+                await before.running("r1.b2")
+                await before.until(lambda: body.current == 0, 10)
+            else:
+                await before.until(lambda: before.told.count("upload") == 2, 10)
+            accepted = before.of("r1.b2")[0]
+        body.stuck = set()
+        meanwhile(body)
+        await clock.sleep(after_s)
+        async with benches(body, clock) as after:
+            found.append(await after.arbiter.query("r1.b2", accepted.native_ref))
+
+    run_virtual(run, START_US)
+    return found[0]
+
+
+def test_the_same_route_from_before_is_not_taken_for_the_one_that_was_to_begin() -> None:
+    found = flown_again(begun=False)
+    assert found.state is BehaviorState.UNKNOWN, "its first waypoints would be skipped"
+    assert not found.not_begun
+
+
+def test_a_route_that_was_flown_before_and_has_begun_again_goes_on() -> None:
+    assert flown_again(begun=True).state is BehaviorState.RUNNING
+
+
+def test_a_route_that_was_completed_before_is_not_taken_for_completed_again() -> None:
+    def at_the_end(body: Body) -> None:
+        body.east, body.north, body.reached = 600.0, 0.0, 2
+
+    assert flown_again(begun=False, meanwhile=at_the_end).state is BehaviorState.UNKNOWN
 
 
 def test_a_reference_of_an_earlier_release_is_read() -> None:

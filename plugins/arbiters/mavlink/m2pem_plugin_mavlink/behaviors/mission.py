@@ -96,6 +96,9 @@ FRAMES = {
 GROUND_SPEED = 1.0
 AS_IT_IS = -1.0
 
+CURRENT_WITHIN_S = 3.0
+"""Autopilots send MISSION_CURRENT once in a second."""
+
 STANDS_AT_END_S = 2.0
 """The message that the last item was reached comes once, and may be lost."""
 
@@ -133,6 +136,7 @@ class MissionFlight(Behavior):
         self._items: tuple[MissionItem, ...] | None = None
         self._kept: Fingerprint | None = None
         self._end: tuple[int, LatLon] | None = None
+        self._already_at: int | None = None
         self._stillness = StillnessTimer(context)
         self._work: RemainingWork | None = None
         self._moves: tuple[int, ...] = ()
@@ -303,7 +307,9 @@ class MissionFlight(Behavior):
         return not self.loop and self.at_the_end()
 
     async def reattach(self) -> BehaviorState:
-        """Judge by the stored mission, the mode, the current item and the position."""
+        """Judge by the stored mission, the mode, the current item and the position. If the vehicle
+        flew the same mission when this behavior was requested, it has begun again only if it is at
+        an earlier item than then."""
         if self._kept is None or self._end is None:
             return BehaviorState.UNKNOWN
         stored = await self.vehicle.driver.downloaded()
@@ -313,10 +319,29 @@ class MissionFlight(Behavior):
             self._learn(stored[: self._end[0] + 1])
             self._counts = True
             self._work = self.work([stored[index] for index in self._moves])
+        before, driver = self._already_at, self.vehicle.driver
         if self.finished() or await self._stands_at_the_end():
-            return BehaviorState.SUCCEEDED
+            return BehaviorState.SUCCEEDED if before is None else BehaviorState.UNKNOWN
+        if before is not None:
+            await self.vehicle.until(lambda: driver.current_item is not None, CURRENT_WITHIN_S)
+            if driver.current_item is None or driver.current_item >= before:
+                return BehaviorState.UNKNOWN
         flies = self.vehicle.state.mode is FlightMode.MISSION and self.vehicle.state.armed
         return BehaviorState.RUNNING if flies else BehaviorState.UNKNOWN
+
+    def _item_before(self) -> int | None:
+        """Return at which item of the same mission the vehicle is before this behavior begins; that
+        behind the last one if it has completed the mission, None if it flies another one."""
+        vehicle, current = self.vehicle, self.vehicle.driver.current_item
+        if current is None or self._kept is None or self._end is None:
+            return None
+        stored = vehicle.commanded.mission  # None: it is not known here after a restart
+        if stored is not None and not fingerprint(remove_landing(stored)).fits(self._kept):
+            return None
+        if self.at_the_end():
+            return self._end[0] + 1
+        flies = vehicle.state.mode is FlightMode.MISSION and vehicle.state.armed
+        return current if flies and current > self._moves[0] else None
 
     async def _stands_at_the_end(self) -> bool:
         current = self.vehicle.driver.current_item
@@ -325,18 +350,22 @@ class MissionFlight(Behavior):
         return await self.vehicle.until(self.at_the_end, STANDS_AT_END_S + 0.5)
 
     def checkpoint(self) -> CheckpointState:
-        """Return the mission's fingerprint, its last item and the position of that."""
+        """Return the mission's fingerprint, its last item and the position of that, and the item of
+        the same mission at which the vehicle is already."""
         if not self.items or self._kept is None or self._end is None:
             raise BehaviorFailedError("the mission has no waypoints")
         last, place = self._end
-        kept = self._kept
+        kept, before = self._kept, self._item_before()
         return {
             "mission": [float(kept.count), float(kept.places), round(kept.height_m, 3)],
             "end": [float(last), *place],
+            "already_at": None if before is None else float(before),
         }
 
     def restore(self, checkpoint: CheckpointState) -> None:
         mission, end = checkpoint.get("mission"), checkpoint.get("end")
+        before = checkpoint.get("already_at")
+        self._already_at = int(before) if isinstance(before, float) else None
         if isinstance(mission, list) and isinstance(end, list):
             self._kept = Fingerprint(int(mission[0]), int(mission[1]), mission[2])
             self._end = (int(end[0]), (end[1], end[2]))
