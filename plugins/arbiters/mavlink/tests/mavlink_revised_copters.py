@@ -1,27 +1,32 @@
-"""Two copters of ArduPilot that fly a mission which is revised, and what they do as they say
-themselves: a ground station looks on at each and commands nothing, and their logs are read."""
+"""Copters that fly a mission which is revised, and what they do as they say themselves: a ground
+station looks on at each and commands nothing, and the logs of ArduPilot are read."""
 
 import asyncio
+import json
 import math
 import threading
-from collections.abc import AsyncIterator, Callable, Mapping
+from collections.abc import AsyncIterator, Callable, Coroutine, Mapping, Sequence
 from contextlib import ExitStack, asynccontextmanager
 from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import mavlink_sitl as sitl
 from m2pem_plugin_mavlink.simulator.specification import Kind
+from m2pem_plugin_mavlink.sitl.launch import px4_port
+from mavlink_failsafes import GROUND_STATION_PORT
 from mavlink_station import Station
 from mavlink_wires import UdpWire
 from pymavlink import DFReader
 
 from m2pem import load_fleet
-from m2pem.api import Area, Point, Route, SystemClock, offset
+from m2pem.api import Area, MissionControl, Point, Route, SystemClock, offset
 from m2pem.executive.executive import Executive
 from m2pem.journal import MemoryJournal
 from m2pem.plugins import PluginManager
 from m2pem.testing import scenarios
+from tests.command_line import CommandLine
 
 WITHIN_S = 200.0
 """Of the wall clock, for one condition."""
@@ -36,18 +41,14 @@ version: 1
 debugging: true
 origin: {{lat: {home[0]}, lon: {home[1]}, alt: {home[2]}}}
 vehicles:
-  uav1:
+"""
+VEHICLE = """
+  {name}:
     domain: air
     arbiter: mavlink
     sitl: true
     lost_after: 60 s
-    connection: {{url: "udpin://127.0.0.1:{ports[0]}", system_id: 1}}
-  uav2:
-    domain: air
-    arbiter: mavlink
-    sitl: true
-    lost_after: 60 s
-    connection: {{url: "udpin://127.0.0.1:{ports[1]}", system_id: 2}}
+    connection: {{url: "udpin://127.0.0.1:{port}", system_id: {system}}}
 """
 
 Place = tuple[float, float]
@@ -73,9 +74,11 @@ def flies(route: str, altitude: str, speed: str = CRUISE) -> tuple[str, Mapping[
     return "single_vehicle_routing", {"route": route, "altitude": altitude, "speed": speed}
 
 
-def drawn(first: Steps, second: Steps, **geometries: Point | Route | Area) -> bytes:
-    """A mission of both, with tasks A1, A2, ... and B1, B2, ..., and their geometries."""
-    return scenarios.drawn(scenarios.side_by_side(("uav1", first), ("uav2", second)), **geometries)
+def drawn(*each: Steps, **geometries: Point | Route | Area) -> bytes:
+    """A mission of uav1 and, if it is in it, uav2, with tasks A1, A2, ... and B1, B2, ..., and
+    their geometries."""
+    branches = ((f"uav{number}", steps) for number, steps in enumerate(each, 1))
+    return scenarios.drawn(scenarios.side_by_side(*branches), **geometries)
 
 
 class Sample(NamedTuple):
@@ -86,6 +89,8 @@ class Sample(NamedTuple):
     place: Place
     height_m: float
     speed_m_s: float
+    mission: int
+    """A number of its stored mission, by which PX4 distinguishes missions; 0: it has none."""
 
 
 @dataclass
@@ -101,6 +106,16 @@ class Copter:
     def now(self) -> Sample:
         return self.samples[-1]
 
+    @property
+    def missions(self) -> list[int]:
+        """The stored missions of a PX4, one after the other, by their numbers."""
+        return [number for number, _ in groupby(each.mission for each in self.samples) if number]
+
+    @property
+    def modes(self) -> list[str]:
+        """Its modes, one after the other, as its heartbeats had them: not those of a moment."""
+        return [mode for mode, _ in groupby(each.mode for each in self.samples)]
+
     def since(self, at_s: float) -> list[Sample]:
         """What it has said from a time of its clock on."""
         return [each for each in self.samples if each.at_s >= at_s]
@@ -108,6 +123,11 @@ class Copter:
     def nearest_m(self, place: Place, since_s: float = 0.0) -> float:
         """How near it has come to a place."""
         return min(math.dist(each.place, place) for each in self.since(since_s))
+
+    def first_at_s(self, place: Place, within_m: float, since_s: float = 0.0) -> float:
+        """When it was so near to a place first; infinite: never."""
+        near = (each for each in self.since(since_s) if math.dist(each.place, place) < within_m)
+        return next((each.at_s for each in near), math.inf)
 
     def slowest_m_s(self, begin: Callable[[Sample], bool], end: Callable[[Sample], bool]) -> float:
         """The lowest speed between two moments: the first of each."""
@@ -123,6 +143,7 @@ class Copter:
         message = station.latest.get("GLOBAL_POSITION_INT")
         if message is None or message is before:
             return
+        mission = station.latest.get("MISSION_CURRENT")
         shrink = math.cos(math.radians(sitl.HOME[0]))
         place = (
             (message.lon / 1e7 - sitl.HOME[1]) * METRES_IN_A_DEGREE * shrink,
@@ -135,6 +156,7 @@ class Copter:
                 place,
                 message.relative_alt / 1e3,
                 math.hypot(message.vx, message.vy) / 100,
+                0 if mission is None else _mission_id(mission),
             )
         )
 
@@ -151,6 +173,13 @@ class Copter:
         return found
 
 
+def _mission_id(current: Any) -> int:
+    """Of MISSION_CURRENT, which the dialect knows only up to `mission_mode`."""
+    frame = bytes(current.get_msgbuf())
+    payload = frame[MAVLINK2_HEADER : MAVLINK2_HEADER + frame[1]]
+    return int.from_bytes(payload[6:10], "little")
+
+
 class Logged(NamedTuple):
     """`texts`: what it has said to ground stations; `modes`: their numbers, in order."""
 
@@ -163,43 +192,85 @@ class Logged(NamedTuple):
         return self.texts.count("Flight plan received")
 
 
+MAVLINK2_HEADER = 10
 METRES_IN_A_DEGREE = 111_194.9
 GUIDED, AUTO, RTL, BRAKE = 4, 3, 6, 17
 
 
-class Copters:
-    """Both copters, with a thread that listens to them."""
+PX4_SPEED = 3.0
+_World = tuple[list[Copter], list[sitl.Launch], str]
+"""Copters, their programs, and their part of the fleet file."""
 
-    def __init__(self, folder: Path) -> None:
+
+class Copters:
+    """Copters of ArduPilot or PX4, with a thread that listens to them. Two PX4s on two processors
+    fall behind the clock: there is one, and it is slower."""
+
+    def __init__(self, folder: Path, firmware: str = "ardupilot") -> None:
         folder.mkdir()
         self._stack = ExitStack()
+        self.speed = float(sitl.SPEED) if firmware == "ardupilot" else PX4_SPEED
         with ExitStack() as started:
-            wires = [UdpWire(Kind.COPTER, "ardupilot") for _ in range(2)]
-            ports = [sitl.free_port(), sitl.free_port()]
-            for wire in wires:
-                started.callback(wire.close)
+            begin = self._ardupilots if firmware == "ardupilot" else self._px4
+            self.all, launches, vehicles = begin(folder, started)
             self.fleet = folder / "fleet.yaml"
-            self.fleet.write_text(FLEET.format(home=sitl.HOME, ports=ports), encoding="utf-8")
-            launches = [_launch(n, (ports[n], wire.port)) for n, wire in enumerate(wires)]
-            self.both = [
-                Copter(f"uav{n + 1}", Station(wire, n + 1), folder / launch.name, [])
-                for n, (wire, launch) in enumerate(zip(wires, launches, strict=True))
-            ]
+            self.fleet.write_text(FLEET.format(home=sitl.HOME) + vehicles, encoding="utf-8")
             started.enter_context(sitl.running(launches, folder))
-            for copter in self.both:
+            for copter in self.all:
                 copter.station.beats = False
                 copter.station.connect()
-            for copter in self.both:
+            for copter in self.all:
                 copter.station.ready()
+                while not copter.samples:
+                    copter.take_in()
             self._listen(started)
             self._stack = started.pop_all()
+
+    @property
+    def both(self) -> tuple[Copter, Copter]:
+        first, second = self.all
+        return first, second
+
+    @property
+    def of_fleet(self) -> tuple[str, ...]:
+        """The options of the command line for the fleet."""
+        return ("--fleet", str(self.fleet), "--speed", f"{self.speed:g}")
+
+    def _ardupilots(self, folder: Path, started: ExitStack) -> _World:
+        binary = sitl.program("M2PEM_ARDUCOPTER")
+        assert binary is not None
+        copters, launches, vehicles = [], [], ""
+        for number in range(2):
+            wire, port, system = UdpWire(Kind.COPTER, "ardupilot"), sitl.free_port(), number + 1
+            started.callback(wire.close)
+            # The log begins with the program; a ground station that is killed is no failsafe here.
+            parameters = {"LOG_DISARMED": 1, "FS_GCS_ENABLE": 0}
+            instance = sitl.first_instance(2) + number
+            ports = (port, wire.port)
+            launches.append(sitl.ardupilot(binary, "quad", instance, ports, system, parameters))
+            name = f"uav{system}"
+            copters.append(Copter(name, Station(wire, system), folder / launches[-1].name, []))
+            vehicles += VEHICLE.format(name=name, port=port, system=system)
+        return copters, launches, vehicles
+
+    def _px4(self, folder: Path, started: ExitStack) -> _World:
+        binary = sitl.program("M2PEM_PX4")
+        assert binary is not None
+        instance = sitl.first_instance(1)
+        wire = UdpWire(Kind.COPTER, "px4", GROUND_STATION_PORT)
+        started.callback(wire.close)
+        launch = sitl.px4(binary, instance, folder, speed=self.speed)
+        system = instance + 1
+        copter = Copter("uav1", Station(wire, system), folder / launch.name, [])
+        vehicle = VEHICLE.format(name="uav1", port=px4_port(instance), system=system)
+        return [copter], [launch], vehicle
 
     def _listen(self, started: ExitStack) -> None:
         ended = threading.Event()
 
         def listen() -> None:
             while not ended.is_set():
-                for copter in self.both:
+                for copter in self.all:
                     copter.take_in()
 
         thread = threading.Thread(target=listen, daemon=True)
@@ -212,15 +283,6 @@ class Copters:
         self._stack.close()
 
 
-def _launch(number: int, ports: tuple[int, int]) -> sitl.Launch:
-    binary = sitl.program("M2PEM_ARDUCOPTER")
-    assert binary is not None
-    # The log begins with the program; a ground station that is killed is no failsafe here.
-    parameters = {"LOG_DISARMED": 1, "FS_GCS_ENABLE": 0}
-    instance = sitl.first_instance(2) + number
-    return sitl.ardupilot(binary, "quad", instance, ports, number + 1, parameters)
-
-
 async def until(condition: Callable[[], bool]) -> None:
     """Wait until something is so."""
     async with asyncio.timeout(WITHIN_S):
@@ -228,12 +290,95 @@ async def until(condition: Callable[[], bool]) -> None:
             await asyncio.sleep(0.02)
 
 
+async def landed(copters: Copters) -> None:
+    """Wait until all of them have stopped their motors, as their heartbeats say."""
+    await until(lambda: not any(copter.station.armed for copter in copters.all))
+
+
 @asynccontextmanager
 async def executive(copters: Copters) -> AsyncIterator[Any]:
     """What commands the copters; yields its `MissionControl`."""
-    clock = SystemClock(sitl.SPEED)
+    clock = SystemClock(copters.speed)
     fleet = load_fleet(copters.fleet)
     async with Executive(
-        fleet, MemoryJournal(), PluginManager(), clock, speed=sitl.SPEED
+        fleet, MemoryJournal(), PluginManager(), clock, speed=copters.speed
     ) as commands:
         yield commands.control
+
+
+async def revise(control: MissionControl, run: str, new: bytes, **moves: str) -> None:
+    """Do what the plan says, which refuses nothing."""
+    plan = await control.plan_revision(run, new, moves=moves)
+    assert not plan.refusals
+    await control.revise(run, new, plan.plan, moves=moves)
+
+
+def flown(copter: Copter, north_m: float) -> Callable[[], bool]:
+    """Whether it flies its route, and is so far north."""
+    return lambda: copter.now.mode == copter.station.auto and copter.now.place[1] > north_m
+
+
+async def goes_on_at(copter: Copter, speed_m_s: float) -> None:
+    """Return when it has been that fast for ten seconds, and has not stopped on the way."""
+    at_s = copter.now.at_s
+
+    def is_steady() -> bool:
+        now = copter.now
+        last = [each.speed_m_s for each in copter.since(max(at_s, now.at_s - 10.0))]
+        long = now.at_s > at_s + 10.0
+        return long and max(abs(each - speed_m_s) for each in last) < 0.5
+
+    await until(is_steady)
+    assert min(each.speed_m_s for each in copter.since(at_s)) > 2.0
+
+
+MOMENTS_OF_A_KILL = ("MissionRevised", "BehaviorRequested", "RUNNING")
+"""When the revision is committed, when the task A2 that begins again is requested, and when it is
+under way."""
+
+
+def killed_and_resumed(
+    copters: Copters,
+    folder: Path,
+    missions: Sequence[bytes],
+    flying: Callable[[], Coroutine[Any, Any, None]],
+    wait_for: str,
+    moves: Sequence[str] = (),
+) -> int:
+    """Run the first mission, revise it to the second one when the copters are `flying`, kill m2pem
+    (SIGKILL) at a moment, and resume the run to its end. `moves`: tokens to elements, "A2=A3".
+
+    An operator has the copter go on where m2pem cannot tell; returns how often that was.
+    """
+    begun, new = folder / "begun.bpmn", folder / "new.bpmn"
+    for file, mission in zip((begun, new), missions, strict=True):
+        file.write_bytes(mission)
+    m2pem = CommandLine(folder)
+    printed = ("--format", "json", "--ocu", "none")
+    run = m2pem.start("run", begun, *copters.of_fleet, *printed)
+    asyncio.run(flying())
+    moved = (f"--move={each}" for each in moves)
+    status, _, errors = m2pem.run("revise", "r1", new, "--yes", *moved)
+    assert status == 0, errors
+    run.until_record("MissionRevised")
+    if wait_for != "MissionRevised":
+        again = run.until_record("BehaviorRequested", element="A2")["behavior"]
+    if wait_for in ("ACCEPTED", "RUNNING"):
+        run.until_record("BehaviorProgressed", behavior=again, state=wait_for)
+    run.kill()
+    resumed = m2pem.start("resume", "r1", *printed)
+    asked = 0
+
+    def is_over(line: str) -> bool:
+        nonlocal asked
+        record = json.loads(line)
+        if record["record"] == "PromptOpened":
+            asked += 1
+            assert m2pem.run("answer", "r1", record["prompt"], "resume")[0] == 0
+        return bool(record["record"] == "RunEnded")
+
+    assert json.loads(resumed.until(is_over))["outcome"] == "completed"
+    m2pem.end()
+    asyncio.run(landed(copters))
+    copters.close()
+    return asked

@@ -2,9 +2,8 @@
 another ground station and in their logs, is what counts."""
 
 import asyncio
-import json
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -12,6 +11,7 @@ from mavlink_revised_copters import (
     AUTO,
     BRAKE,
     GUIDED,
+    MOMENTS_OF_A_KILL,
     RTL,
     STEADY_M_S,
     STILL_M_S,
@@ -22,16 +22,18 @@ from mavlink_revised_copters import (
     drawn,
     executive,
     flies,
+    flown,
+    goes_on_at,
     goes_to,
+    killed_and_resumed,
     lane,
+    revise,
     until,
 )
-from mavlink_sitl import SPEED
 
 from m2pem.api import MissionControl, RunStatus, StampedRecord
 from m2pem.engine import records as r
 from m2pem.errors import OperatorError
-from tests.command_line import CommandLine
 from tests.executive import conftest
 
 pytestmark = [pytest.mark.timeout(600), pytest.mark.sitl("M2PEM_ARDUCOPTER")]
@@ -67,22 +69,11 @@ def copters(tmp_path: Path) -> Iterator[Copters]:
         started.close()
 
 
-def flown(copter: Copter, north_m: float) -> Callable[[], bool]:
-    """Whether it flies its route, and is so far north."""
-    return lambda: copter.now.mode == "AUTO" and copter.now.place[1] > north_m
-
-
 async def both_fly(copters: Copters) -> None:
     """Return when both are on the long lines of their routes."""
     first, second = copters.both
     await until(flown(first, OLD[0][1] + 20))
     await until(flown(second, EAST[0][1] + 20))
-
-
-async def revise(control: MissionControl, run: str, new: bytes, **moves: str) -> None:
-    plan = await control.plan_revision(run, new, moves=moves)
-    assert not plan.refusals
-    await control.revise(run, new, plan.plan, moves=moves)
 
 
 def assert_was_not_disturbed(copter: Copter) -> None:
@@ -135,19 +126,6 @@ def test_a_copter_on_its_route_goes_on_at_another_speed(copters: Copters) -> Non
         for speed in (3, 9)
     )
 
-    async def goes_on_at(speed_m_s: float) -> None:
-        """Return when it has been that fast for ten seconds, and has not stopped on the way."""
-        at_s = first.now.at_s
-
-        def is_steady() -> bool:
-            now = first.now
-            last = [each.speed_m_s for each in first.since(max(at_s, now.at_s - 10.0))]
-            long = now.at_s > at_s + 10.0
-            return long and max(abs(each - speed_m_s) for each in last) < 0.5
-
-        await until(is_steady)
-        assert min(each.speed_m_s for each in first.since(at_s)) > 2.0
-
     async def main() -> None:
         async with executive(copters) as control:
             run = await control.start(BEGUN)
@@ -156,8 +134,10 @@ def test_a_copter_on_its_route_goes_on_at_another_speed(copters: Copters) -> Non
                 plan = await control.plan_revision(run, new)
                 assert [(each.kind, each.element) for each in plan.effects] == [("adjusts", "A2")]
                 await control.revise(run, new, plan.plan)
-                await goes_on_at(speed_m_s)
+                await goes_on_at(first, speed_m_s)
             assert (await control.wait(run)).status is RunStatus.COMPLETED
+            alerts = await control.alerts()
+            assert not [each for each in alerts if each.code == "NOT_ADJUSTED"]
 
     asyncio.run(main())
     copters.close()
@@ -244,42 +224,13 @@ def test_a_subprocess_that_holds_a_token_is_replaced(copters: Copters) -> None:
     assert not copter.station.armed, "it has not landed"
 
 
-@pytest.mark.parametrize("wait_for", ["MissionRevised", "BehaviorRequested", "RUNNING"])
+@pytest.mark.parametrize("wait_for", MOMENTS_OF_A_KILL)
 def test_m2pem_is_killed_right_after_a_revision_and_resumed(
     copters: Copters, tmp_path: Path, wait_for: str
 ) -> None:
     first, second = copters.both
-    begun, new = tmp_path / "begun.bpmn", tmp_path / "new.bpmn"
-    begun.write_bytes(BEGUN)
-    new.write_bytes(TURNED)
-    m2pem = CommandLine(tmp_path)
-    printed = ("--format", "json", "--ocu", "none")
-    fleet = ("--fleet", copters.fleet, "--speed", str(SPEED))
-    run = m2pem.start("run", begun, *fleet, *printed)
-    asyncio.run(both_fly(copters))
-    status, _, errors = m2pem.run("revise", "r1", new, "--yes")
-    assert status == 0, errors
-    run.until_record("MissionRevised")
-    if wait_for != "MissionRevised":
-        again = run.until_record("BehaviorRequested", element="A2")["behavior"]
-    if wait_for == "RUNNING":
-        run.until_record("BehaviorProgressed", behavior=again, state="RUNNING")
-    run.kill()
-    resumed = m2pem.start("resume", "r1", *printed)
-    asked = 0
-
-    def is_over(line: str) -> bool:
-        """Whether the run has ended; an operator has the copter go on if m2pem cannot tell."""
-        nonlocal asked
-        record = json.loads(line)
-        if record["record"] == "PromptOpened":
-            asked += 1
-            assert m2pem.run("answer", "r1", record["prompt"], "resume")[0] == 0
-        return bool(record["record"] == "RunEnded")
-
-    assert json.loads(resumed.until(is_over))["outcome"] == "completed"
-    m2pem.end()
-    copters.close()
+    missions = (BEGUN, TURNED)
+    asked = killed_and_resumed(copters, tmp_path, missions, lambda: both_fly(copters), wait_for)
     assert_was_not_disturbed(second)
     for place in (*NEW, EXTRA):
         assert first.nearest_m(place) < 5.0, place
