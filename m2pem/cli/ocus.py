@@ -28,6 +28,9 @@ NO_UNIT = "none"
 PLAIN = "plain"
 TERMINAL = "terminal"
 
+LEAVES_WITHIN_S = 2.0
+"""An executive that has not taken the leave of an operator by then is silent."""
+
 
 def chosen(names: str | None, plugins: PluginManager) -> tuple[str, ...]:
     """The units that `--ocu` names, or the default: `terminal` where there is one, else `plain`.
@@ -146,5 +149,7 @@ async def _present(control: MissionControl, unit: str, serving: Awaitable[None])
         await serving
     finally:
         announcing.cancel()
-        with suppress(M2pemError):
-            await control.end_presence(client)
+        # A remote executive that is silent would keep the operator from reading who serves now.
+        with suppress(M2pemError, TimeoutError):
+            async with asyncio.timeout(LEAVES_WITHIN_S):
+                await control.end_presence(client)

@@ -8,8 +8,9 @@ import click
 import pytest
 
 from m2pem.api.capabilities import OcuCapabilities
+from m2pem.api.clock import Clock, run_virtual
 from m2pem.api.control import MissionControl
-from m2pem.cli.ocus import Operators, chosen
+from m2pem.cli.ocus import LEAVES_WITHIN_S, Operators, chosen
 from m2pem.errors import PluginError
 from m2pem.plugins import PluginManager
 
@@ -110,4 +111,29 @@ async def test_a_unit_that_breaks_is_told_of_and_stops_nothing(
         assert "the operator control unit bad broke" in caplog.text
         assert Unit.became == {}
         await operators.end()
+    assert Unit.became == {"good": "cancelled"}
+
+
+class Silent:
+    """A remote executive that does not answer any more."""
+
+    async def announce_presence(self, client: str, *, unit: str, by: str) -> None:
+        pass
+
+    async def end_presence(self, client: str) -> None:
+        await asyncio.get_running_loop().create_future()
+
+
+def test_an_operator_leaves_an_executive_that_does_not_answer() -> None:
+    Unit.became = {}
+
+    async def main(clock: Clock) -> float:
+        operators = Operators(["plain"], plugins(plain=Unit))
+        operators.begin(cast("MissionControl", Silent()), lambda: None)
+        await clock.sleep(1.0)
+        began_us = clock.now_us()
+        await operators.end()
+        return (clock.now_us() - began_us) / 1e6
+
+    assert run_virtual(main, 0) == pytest.approx(LEAVES_WITHIN_S)
     assert Unit.became == {"good": "cancelled"}
