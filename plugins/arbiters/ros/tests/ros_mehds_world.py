@@ -182,7 +182,10 @@ class Play:
         self._visits: Counter[str] = Counter()
         self._tasks: set[asyncio.Task[None]] = set()
         script = load_answers(MISSIONS / "answers" / f"{story.answers}.yaml")
-        self._decisions = {key: list(each) for key, each in script.model.answers.items()}
+        self._decisions = {
+            key: [each.decision for each in entries]
+            for key, entries in script.model.answers.items()
+        }
         services = {k: v for k, v in script.model.services.items() if k not in story.live}
         signals = [] if any(each.signal for each in story.problems) else script.model.signals
         self._script = Answers(
