@@ -14,7 +14,7 @@ What is true on the way is read by a `MomentReader`, for requirements.
 
 import copy
 import time
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -183,6 +183,8 @@ class _Explorer:
         mission = run.state.mission
         shared = [mission, *mission.elements.values()]
         self._shared = {id(each): each for each in shared}
+        self._labels = {node.id: node.label for node in mission.nodes}
+        self._alike = Counter(self._labels.values())
         self._codes = list(dict.fromkeys(["FAILED", *(e.code for e in mission.errors.values())]))
         found, letter = self.found, self._reader.reading(run.state).letter
         found.add(letter)
@@ -205,7 +207,7 @@ class _Explorer:
             if not steps:
                 found.final.add(number)
                 bad[number] = _where_it_stops(run.state)
-            texts = [_said(run.state, item) for item, _ in steps]
+            texts = [self._said(run.state, item) for item, _ in steps]
             for (item, at_us), text in zip(steps, texts, strict=True):
                 following = copy.deepcopy(run, dict(self._shared)) if len(steps) > 1 else run
                 reading = self._reader.reading(following.state)
@@ -274,6 +276,30 @@ class _Explorer:
             found.append((i.Tick(), max(now_us, due_us)))
         return found
 
+    def _said(self, state: RunState, item: i.Input) -> str:
+        """Return what comes, for people."""
+        match item:
+            case i.BehaviorReported(behavior, _, now, code):
+                label = self._label(state.behaviors[behavior].element)
+                if now is BehaviorState.FAILED:
+                    return f"{label} fails with {code}"
+                done = now is BehaviorState.SUCCEEDED
+                return f"{label} {'succeeds' if done else 'is cancelled'}"
+            case i.PromptAnswer(prompt, value):
+                return f"{self._label(state.prompts[prompt].token.node.id)} is answered {value}"
+            case i.SignalReceived(ref):
+                signal = state.mission.signals.get(ref)
+                return f"signal {signal.name if signal else ref} comes"
+            case i.ResolveIncident(incident):
+                return f"{self._label(state.incidents[incident].token.node.id)} is skipped"
+            case _:
+                return "a timer ends"
+
+    def _label(self, element: str) -> str:
+        """Return what to call an element of the run; with its id where others are called so."""
+        label = self._labels.get(element, element)  # a revision may have removed it
+        return label if self._alike[label] <= 1 else f"{label} ({element})"
+
     def _caught_at(self, token: Token) -> list[str]:
         return [code for code in self._codes if catcher_of_error(token, code) is not None]
 
@@ -333,28 +359,6 @@ def leading_to(states: Iterable[int], following: Sequence[Sequence[int]]) -> set
                 reaches.add(earlier)
                 waiting.append(earlier)
     return reaches
-
-
-def _said(state: RunState, item: i.Input) -> str:
-    """Return what comes, for people."""
-    match item:
-        case i.BehaviorReported(behavior, _, now, code):
-            element = state.behaviors[behavior].element
-            node = state.mission.elements.get(element)  # a revision may have removed it
-            label = node.label if node is not None else element
-            if now is BehaviorState.FAILED:
-                return f"{label} fails with {code}"
-            return f"{label} {'succeeds' if now is BehaviorState.SUCCEEDED else 'is cancelled'}"
-        case i.PromptAnswer(prompt, value):
-            label = state.prompts[prompt].token.node.label
-            return f"{label} is answered {value}"
-        case i.SignalReceived(ref):
-            signal = state.mission.signals.get(ref)
-            return f"signal {signal.name if signal else ref} comes"
-        case i.ResolveIncident(incident):
-            return f"{state.incidents[incident].token.node.label} is skipped"
-        case _:
-            return "a timer ends"
 
 
 # --- states ---------------------------------------------------------------------------------------

@@ -109,6 +109,14 @@ def test_a_requirement_is_judged_from_the_present_on() -> None:
     assert looked_at(ASKED, formula, *there).verdict is HOLDS
 
 
+def test_elements_that_are_called_alike_are_given_with_their_ids() -> None:
+    alike = ASKED.replace('id="first"', 'id="first" name="GO"').replace(
+        'id="ask"', 'id="ask" name="GO"'
+    )
+    found = looked_at(alike, "[] !active(climb)")
+    assert found.reason == "after GO (first) is answered done, GO (ask) is answered no"
+
+
 def test_what_came_before_counts() -> None:
     formula = "[](completed(land) -> once(completed(first)))"
     assert looked_at(ASKED, formula, ("first", "done")).verdict is HOLDS
