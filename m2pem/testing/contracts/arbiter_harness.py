@@ -284,7 +284,7 @@ async def start(
     await harness.start(id_, name, *resources, **options, **dict[str, Any](parameters))
 
 
-async def refusal(call: Awaitable[None]) -> str:
+async def refusal(call: Awaitable[object]) -> str:
     """Make a call of a past epoch; returns the text of its refusal.
 
     Raises:
