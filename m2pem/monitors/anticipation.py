@@ -84,7 +84,7 @@ class _Language:
         return self.accepts_some(number, 0, lambda _: letters)
 
     def accepts_some(self, number: int, run: int, transitions: Transitions) -> bool:
-        """Whether a run is accepted that goes on for ever from a state of its own."""
+        """Whether one of the runs is accepted that go on for ever from a state `run`."""
         order = [(run, state) for state in self._sets[number]]
         index = {pair: at for at, pair in enumerate(order)}
         edges: list[list[tuple[int, int]]] = []
@@ -227,8 +227,8 @@ class Anticipation:
         return verdict
 
     def in_loops(self, state: int, run: int, transitions: Transitions) -> Verdict:
-        """The verdict on all runs that go on for ever from a state of theirs; OPEN if it differs
-        from run to run."""
+        """The verdict on all runs that go on for ever from a state `run`, if the monitor is in
+        `state` there; OPEN if it differs from run to run."""
         yes, no = self._pairs[state]
         return self._verdict(
             int(self._yes.accepts_some(yes, run, transitions)),

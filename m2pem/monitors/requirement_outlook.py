@@ -21,6 +21,7 @@ from m2pem.monitors.anticipation import Verdict
 from m2pem.monitors.moments import Moments, MomentTables
 from m2pem.monitors.product import Position, own_letter
 from m2pem.monitors.run_monitors import RunMonitors
+from m2pem.verify.ltl import Proposition
 from m2pem.verify.outlook import ROUND_AND_ROUND, StateSpace, leading_to
 
 MOST_STEPS_SHOWN = 8
@@ -31,20 +32,25 @@ READS_TELEMETRY = "what telemetry will say is not known"
 class _Reading:
     """The letters of what follows one state."""
 
-    def __init__(self) -> None:
+    def __init__(
+        self,
+        state: RunState,
+        propositions: Sequence[Proposition],
+        fleet: Fleet | None,
+        tables: MomentTables,
+    ) -> None:
         self.letters: list[int] = []
-        self.moments: Moments | None = None
+        self._moments = Moments.after(state, propositions, fleet, self._add, tables)
 
-    def add(self, letter: int, _: int) -> None:
+    def _add(self, letter: int, _: int) -> None:
         self.letters.append(letter)
 
     def read(self, records: Sequence[r.Record]) -> None:
-        if self.moments is not None:
-            self.moments.read(records)
+        self._moments.read(records)
 
     @property
     def letter(self) -> int:
-        return self.moments.letter if self.moments is not None else 0
+        return self._moments.letter
 
 
 class OpenRequirements:
@@ -65,13 +71,10 @@ class OpenRequirements:
 
     def reading(self, state: RunState) -> _Reading:
         """Read what follows a state."""
-        reading = _Reading()
         known = self._monitors.propositions
-        if known:
-            if self._tables is None:
-                self._tables = MomentTables(known, state.mission)
-            reading.moments = Moments.after(state, known, self._fleet, reading.add, self._tables)
-        return reading
+        if self._tables is None:
+            self._tables = MomentTables(known, state.mission)
+        return _Reading(state, known, self._fleet, self._tables)
 
     def judge(self, explored: StateSpace) -> tuple[RequirementOutlook, ...]:
         """Return what follows for each requirement that nothing had decided before the choice."""

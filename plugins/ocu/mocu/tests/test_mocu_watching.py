@@ -48,7 +48,9 @@ def statuses(status: Message) -> list[int]:
     return [each["status"] for each in status["runs"]]
 
 
-async def test_a_violated_requirement_is_told_at_once(world: World, client: Client) -> None:
+async def test_operators_read_at_once_that_a_requirement_is_violated(
+    world: World, client: Client
+) -> None:
     await world.has_listeners(client)
     run = await world.control.start(NEVER_COUNTS)
     alert = await client.hears("rosout", lambda each: "requirement still" in each["msg"])

@@ -74,17 +74,19 @@ export function PlanView({ plan, choices, moves, move, compare }: PlanViewProps)
             <section aria-label={words.follows}>
               <h3>{words.follows}</h3>
               <p>{plan.outlook.text}</p>
-              <ul>
-                {plan.outlook.requirements.map((each) => (
-                  <li
-                    key={each.requirement}
-                    title={each.english}
-                    class={each.verdict === "will be violated" ? "rev-bad" : ""}
-                  >
-                    {each.text}
-                  </li>
-                ))}
-              </ul>
+              {plan.outlook.requirements.length > 0 && (
+                <ul>
+                  {plan.outlook.requirements.map((each) => (
+                    <li
+                      key={each.requirement}
+                      title={each.english}
+                      class={each.verdict === "will be violated" ? "rev-bad" : ""}
+                    >
+                      {each.text}
+                    </li>
+                  ))}
+                </ul>
+              )}
             </section>
           )}
         </div>
