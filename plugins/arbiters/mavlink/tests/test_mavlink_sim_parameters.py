@@ -1,4 +1,5 @@
 import math
+from struct import pack, unpack_from
 
 from m2pem_plugin_mavlink.simulator.specification import Kind
 from mavlink_bench import Bench
@@ -56,3 +57,15 @@ def test_each_kind_has_its_own_failsafe_parameters() -> None:
     assert "THR_FAILSAFE" in Bench(Kind.PLANE).autopilot.parameters
     assert Bench(Kind.BOAT).autopilot.parameters["FRAME_CLASS"] == 2
     assert Bench(system=7).autopilot.parameters["MAV_SYSID"] == 7
+
+
+def test_the_list_as_a_file_is_refused_at_once() -> None:
+    bench = Bench()
+    request = pack("<HBBBBBxI", 3, 9, 4, 19, 0, 0, 0) + b"@PARAM/param.pck?wi"
+    ask = dialect.MAVLink_file_transfer_protocol_message(0, 1, 1, [*request.ljust(251, b"\0")])
+    (answer,) = bench.tell(ask)
+    assert (answer.target_system, answer.target_component) == (255, 190)
+    nak, unknown_command = 129, 7
+    assert unpack_from("<HBBBB", bytes(answer.payload)) == (4, 9, nak, 1, 4)
+    assert answer.payload[12] == unknown_command
+    assert bench.tell(answer) == []

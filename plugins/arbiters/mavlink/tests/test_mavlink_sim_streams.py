@@ -1,5 +1,6 @@
 from m2pem_plugin_mavlink.simulator.specification import Kind
 from mavlink_bench import Bench
+from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 SET, REQUEST = 511, 512
 
@@ -55,3 +56,21 @@ def test_every_report_can_be_requested() -> None:
     bench = Bench(parameters={"FENCE_ENABLE": 1}).airborne()
     for id_ in bench.autopilot.streams.makers:
         assert bench.report(id_).get_msgId() == id_
+
+
+def test_a_data_stream_of_ardupilot_sets_the_intervals_of_its_messages() -> None:
+    bench = Bench()
+    position, all_, attitude = 6, 0, 30
+    bench.tell(dialect.MAVLink_request_data_stream_message(1, 1, position, 5, 1))
+    bench.run(20)
+    assert 99 <= heard(bench, 33) <= 102
+    assert heard(bench, attitude) == 0
+    bench.tell(dialect.MAVLink_request_data_stream_message(1, 1, all_, 2, 1))
+    bench.received.clear()
+    bench.run(10)
+    assert 19 <= heard(bench, 33) <= 22
+    assert 19 <= heard(bench, attitude) <= 22
+    bench.tell(dialect.MAVLink_request_data_stream_message(1, 1, all_, 0, 0))
+    bench.received.clear()
+    bench.run(5)
+    assert heard(bench, 33) == heard(bench, attitude) == 0

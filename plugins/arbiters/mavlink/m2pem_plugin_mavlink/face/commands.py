@@ -11,6 +11,7 @@ from m2pem_plugin_mavlink.face import modes
 from m2pem_plugin_mavlink.face.vehicle import Camera, ShownVehicle
 from m2pem_plugin_mavlink.protocol.messages import Message
 from m2pem_plugin_mavlink.protocol.raw_frames import RawFrame
+from m2pem_plugin_mavlink.vehicle.modes import px4_mode
 
 REQUEST_OPERATOR_CONTROL = 32100
 """MAV_CMD_REQUEST_OPERATOR_CONTROL, which pymavlink 2.4.50 does not have. Parameter 1: 1 asks for
@@ -197,13 +198,18 @@ def _loiter(command: Command, vehicle: ShownVehicle) -> Order:
 
 
 def _set_mode(command: Command, vehicle: ShownVehicle) -> Order:
-    base, main, sub = (each if math.isfinite(each) else 0.0 for each in command.params[:3])
-    number = int(main)
-    if 0 < main < 256:  # PX4's notation: main mode and sub mode
-        number = int(main) << 16 | (int(sub) & 255) << 24
-    mode = modes.BY_NUMBER.get(number)
-    if mode is None or not int(base) & dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
-        raise RefusedCommandError(f"there is no mode {number:#x}")
+    base, main, sub = (int(each) if math.isfinite(each) else 0 for each in command.params[:3])
+    if not base & dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
+        raise RefusedCommandError(f"modes are set by their numbers, not by base mode {base}")
+    if 0 <= main < 256 and not sub and not math.isnan(command.params[3]):
+        # PX4's modes without a sub mode are manual ones and Offboard. MAVSDK sets them with NaN in
+        # what it does not use; pymavlink sends zeros, and ArduPilot's numbers.
+        name, mode = modes.by_ardupilot_number(main, vehicle.type)
+    else:
+        number = main if main >= 256 else px4_mode(main & 255, sub & 255)
+        name, mode = f"{number:#x}", modes.BY_NUMBER.get(number)
+    if mode is None:
+        raise RefusedCommandError(f"the mode {name} cannot be commanded")
     return _of_mode(mode, vehicle)
 
 

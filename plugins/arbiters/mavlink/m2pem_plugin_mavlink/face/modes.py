@@ -2,7 +2,9 @@
 
 The autopilot is MAV_AUTOPILOT_GENERIC: m2pem is neither ArduPilot nor PX4. MAVSDK reads the modes
 of all autopilots but ArduPilot as those of PX4, so the numbers are PX4's; QGroundControl asks for
-AVAILABLE_MODES and shows the names. pymavlink has that message in the dialect `development` only.
+AVAILABLE_MODES and shows the names. pymavlink and MAVProxy read the modes of all autopilots but PX4
+as those of ArduPilot: stations that ask for data streams, which only ArduPilot has, are sent
+ArduPilot's numbers. pymavlink has AVAILABLE_MODES in the dialect `development` only.
 """
 
 from collections.abc import Mapping
@@ -10,7 +12,16 @@ from dataclasses import dataclass
 from functools import cache
 
 from m2pem_plugin_mavlink.protocol.messages import Message, MessageType, message_type_of
-from m2pem_plugin_mavlink.vehicle.modes import PX4_AUTO, PX4_MANUAL, PX4_OFFBOARD, px4_mode
+from m2pem_plugin_mavlink.vehicle.driver import FlightMode
+from m2pem_plugin_mavlink.vehicle.identity import Firmware, Identity, kind_of
+from m2pem_plugin_mavlink.vehicle.modes import (
+    PX4_AUTO,
+    PX4_MANUAL,
+    PX4_OFFBOARD,
+    Modes,
+    modes_of,
+    px4_mode,
+)
 
 AVAILABLE_MODES = 435
 CURRENT_MODE = 436
@@ -20,22 +31,23 @@ NOT_USER_SELECTABLE = 2
 
 @dataclass(frozen=True, slots=True)
 class Mode:
-    """`standard`: MAV_STANDARD_MODE, 0: none. `behavior`: what commanding it means; "": it cannot
-    be commanded."""
+    """`number`: PX4's. `standard`: MAV_STANDARD_MODE, 0: none. `purpose`: by which ArduPilot's
+    number is found. `behavior`: what commanding it means; "": it cannot be commanded."""
 
     number: int
     name: str
     standard: int
+    purpose: FlightMode
     behavior: str = ""
 
 
-HOLD = Mode(px4_mode(PX4_AUTO, 3), "Hold", 0, "hold")
-MISSION = Mode(px4_mode(PX4_AUTO, 4), "Mission", 6)
-RETURN = Mode(px4_mode(PX4_AUTO, 5), "Return", 5, "return_to_launch")
-LAND = Mode(px4_mode(PX4_AUTO, 6), "Land", 7, "land")
-TAKEOFF = Mode(px4_mode(PX4_AUTO, 2), "Takeoff", 8)
-GUIDED = Mode(px4_mode(PX4_OFFBOARD), "Guided", 0)
-MANUAL = Mode(px4_mode(PX4_MANUAL), "Manual", 0)
+HOLD = Mode(px4_mode(PX4_AUTO, 3), "Hold", 0, FlightMode.HOLD, "hold")
+MISSION = Mode(px4_mode(PX4_AUTO, 4), "Mission", 6, FlightMode.MISSION)
+RETURN = Mode(px4_mode(PX4_AUTO, 5), "Return", 5, FlightMode.RETURN, "return_to_launch")
+LAND = Mode(px4_mode(PX4_AUTO, 6), "Land", 7, FlightMode.LAND, "land")
+TAKEOFF = Mode(px4_mode(PX4_AUTO, 2), "Takeoff", 8, FlightMode.TAKEOFF)
+GUIDED = Mode(px4_mode(PX4_OFFBOARD), "Guided", 0, FlightMode.GUIDED)
+MANUAL = Mode(px4_mode(PX4_MANUAL), "Manual", 0, FlightMode.MANUAL)
 
 MODES = (HOLD, MISSION, RETURN, LAND, TAKEOFF, GUIDED, MANUAL)
 BY_NUMBER: Mapping[int, Mode] = {mode.number: mode for mode in MODES}
@@ -59,6 +71,23 @@ def mode_of(behavior: str, operator: str) -> Mode:
     if behavior:
         return _BY_BEHAVIOR.get(behavior, GUIDED)
     return MANUAL if operator else HOLD
+
+
+OTHER_WAYS = ("SMART_RTL", "AUTO_RTL", "QRTL", "AUTOLAND", "LOITER_ALT_QLAND")
+"""Modes of ArduPilot that return or land in another way than m2pem's behaviors."""
+
+
+def _ardupilot(type_: int) -> Modes:
+    return modes_of(Identity(Firmware.ARDUPILOT, kind_of(type_)))
+
+
+def by_ardupilot_number(number: int, type_: int) -> tuple[str, Mode | None]:
+    """Return ArduPilot's name of a mode of a MAV_TYPE, and what commanding it means; None:
+    nothing."""
+    modes = _ardupilot(type_)
+    name, purpose = modes.name(number), modes.purpose(number)
+    means = next((each for each in MODES if each.purpose is purpose and each.behavior), None)
+    return name, None if name in OTHER_WAYS else means
 
 
 @cache
@@ -88,4 +117,15 @@ def current_mode(mode: Mode) -> Message:
     made: Message = _types()[1].make(
         standard_mode=mode.standard, custom_mode=mode.number, intended_custom_mode=mode.number
     )
+    return made
+
+
+def renumbered(message: Message, type_: int) -> Message:
+    """Return HEARTBEAT, CURRENT_MODE or AVAILABLE_MODES with ArduPilot's number of the mode for a
+    MAV_TYPE; that of GUIDED where it has no such mode."""
+    modes = _ardupilot(type_)
+    number = modes.for_purpose(BY_NUMBER[message.custom_mode].purpose)
+    number = modes.number("GUIDED") if number is None else number
+    fields = ("custom_mode", "intended_custom_mode")
+    made: Message = message._replace(**{name: number for name in fields if hasattr(message, name)})
     return made

@@ -2,7 +2,7 @@
 changes what a vehicle does; what would is refused."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -17,6 +17,7 @@ from m2pem_plugin_mavlink.face.telemetry import heartbeat
 from m2pem_plugin_mavlink.face.vehicle import Camera, ShownVehicle
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
 from m2pem_plugin_mavlink.protocol.raw_frames import RawFrame
+from m2pem_plugin_mavlink.protocol.station_requests import refusal_of_ftp, requested_intervals
 
 ACCEPTED: int = dialect.MAV_RESULT_ACCEPTED
 DENIED: int = dialect.MAV_RESULT_DENIED
@@ -25,6 +26,9 @@ TEMPORARILY_REJECTED: int = dialect.MAV_RESULT_TEMPORARILY_REJECTED
 
 MISSION, FENCE = 0, 1
 """MAV_MISSION_TYPE."""
+
+KEEP_IN: int = dialect.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION
+KEEP_OUT: int = dialect.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION
 
 MOST_DOWNLOADS = 64
 
@@ -40,8 +44,12 @@ _ONE_MESSAGE: Mapping[int, int] = {
     dialect.MAV_CMD_REQUEST_CAMERA_SETTINGS: dialect.MAVLINK_MSG_ID_CAMERA_SETTINGS,
     dialect.MAV_CMD_REQUEST_STORAGE_INFORMATION: dialect.MAVLINK_MSG_ID_STORAGE_INFORMATION,
     dialect.MAV_CMD_REQUEST_CAMERA_CAPTURE_STATUS: dialect.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS,
+    dialect.MAV_CMD_REQUEST_PROTOCOL_VERSION: 300,  # PROTOCOL_VERSION
+    dialect.MAV_CMD_REQUEST_FLIGHT_INFORMATION: dialect.MAVLINK_MSG_ID_FLIGHT_INFORMATION,
+    dialect.MAV_CMD_REQUEST_VIDEO_STREAM_INFORMATION: 269,  # VIDEO_STREAM_INFORMATION
+    dialect.MAV_CMD_REQUEST_VIDEO_STREAM_STATUS: dialect.MAVLINK_MSG_ID_VIDEO_STREAM_STATUS,
 }
-"""Commands that ask for one message."""
+"""Commands that ask for one message; the last four are UNSUPPORTED."""
 
 
 class Requests:
@@ -51,9 +59,11 @@ class Requests:
         self._streams = streams
         self._say = say
         area = fleet.geometries.get(fleet.fence)
-        self._fence = (
-            [corner[:2] for corner in area.rings[0][:-1]] if isinstance(area, Area) else []
-        )
+        self._fence = [
+            (corner[:2], len(ring) - 1, KEEP_OUT if hole else KEEP_IN)
+            for hole, ring in enumerate(area.rings if isinstance(area, Area) else ())
+            for corner in ring[:-1]
+        ]
         self._downloads: dict[tuple[str, Address, int, int], Sequence[Message]] = {}
         self._commands: Mapping[int, Answer] = {
             dialect.MAV_CMD_REQUEST_MESSAGE: self._request_message,
@@ -65,6 +75,9 @@ class Requests:
             "PARAM_REQUEST_LIST": self._list_parameters,
             "PARAM_REQUEST_READ": self._read_parameter,
             "PARAM_SET": self._set_parameter,
+            "REQUEST_DATA_STREAM": self._set_streams,
+            "FILE_TRANSFER_PROTOCOL": self._refuse_file,
+            "LOG_REQUEST_LIST": self._list_logs,
             "MISSION_REQUEST_LIST": self._list_items,
             "MISSION_REQUEST": self._send_item,
             "MISSION_REQUEST_INT": self._send_item,
@@ -127,7 +140,7 @@ class Requests:
             return self._send_modes(_whole(command.params[1]), station, vehicle)
         if not is_known(id_):
             return UNSUPPORTED
-        found = messages_of(vehicle, id_)
+        found = messages_of(vehicle, id_, station.ardupilot_modes)
         for message, source in found:
             station.send(message, source)
         return ACCEPTED if found else DENIED
@@ -136,7 +149,10 @@ class Requests:
         if not 0 <= index <= len(modes.MODES):
             return DENIED
         for each in [index] if index else range(1, len(modes.MODES) + 1):
-            station.send(modes.available_mode(each), vehicle.autopilot)
+            made = modes.available_mode(each)
+            if station.ardupilot_modes:
+                made = modes.renumbered(made, vehicle.type)
+            station.send(made, vehicle.autopilot)
         return ACCEPTED
 
     def _set_interval(
@@ -165,6 +181,45 @@ class Requests:
         station.send(made, vehicle.autopilot)
         return ACCEPTED
 
+    def _set_streams(
+        self, message: Message, frame: RawFrame, station: Station, vehicle: ShownVehicle
+    ) -> None:
+        station.ardupilot_modes = True
+        for id_, interval_s in requested_intervals(message).items():
+            if is_known(id_):
+                self._streams.set_interval(station, vehicle, id_, interval_s)
+
+    def clock(
+        self, message: Message, frame: RawFrame, station: Station, vehicles: Iterable[ShownVehicle]
+    ) -> None:
+        """Answer PING and TIMESYNC for all vehicles that are present; each answer counts as a frame
+        of the station."""
+        is_ping = message.TYPE.name == "PING"
+        if frame.target.system if is_ping else message.tc1:
+            return  # it is an answer itself
+        now_s = self._streams.now_s()
+        for vehicle in vehicles:
+            if (state := vehicle.state) is None or not vehicle.present(now_s):
+                continue
+            if is_ping:
+                to = frame.source
+                made = message._replace(target_system=to.system, target_component=to.component)
+            else:
+                since_ns = round((now_s - vehicle.received_s) * 1e9)
+                made = message._replace(tc1=state.time_us * 1000 + since_ns)
+            if station.may_send(now_s):
+                station.send(made, vehicle.autopilot)
+
+    def _refuse_file(
+        self, message: Message, frame: RawFrame, station: Station, vehicle: ShownVehicle
+    ) -> None:
+        refuse_file(message, frame, station, vehicle.autopilot)
+
+    def _list_logs(
+        self, message: Message, frame: RawFrame, station: Station, vehicle: ShownVehicle
+    ) -> None:
+        station.send(message_type("LOG_ENTRY").make(num_logs=0), vehicle.autopilot)
+
     # --- parameters -------------------------------------------------------------------------------
 
     def _list_parameters(
@@ -179,8 +234,17 @@ class Requests:
         index = message.param_index
         if index < 0:
             index = _index_of(message.param_id)
-        if 0 <= index < len(_PARAMETERS):  # of others nothing is said, as autopilots do
+        if 0 <= index < len(_PARAMETERS):
             station.send(_parameter(index, vehicle), vehicle.autopilot)
+        else:
+            made = message_type("PARAM_ERROR").make(
+                target_system=frame.source.system,
+                target_component=frame.source.component,
+                param_id=message.param_id,
+                param_index=message.param_index,
+                error=dialect.MAV_PARAM_ERROR_DOES_NOT_EXIST,
+            )
+            station.send(made, vehicle.autopilot)
 
     def _set_parameter(
         self, message: Message, frame: RawFrame, station: Station, vehicle: ShownVehicle
@@ -249,11 +313,16 @@ class Requests:
                 for number, item in enumerate(vehicle.plan.items)
             ]
         if type_ == FENCE:
-            return [
-                _corner(number, corner, len(self._fence), to)
-                for number, corner in enumerate(self._fence)
-            ]
+            return [_corner(number, *each, to) for number, each in enumerate(self._fence)]
         return []
+
+
+def refuse_file(message: Message, frame: RawFrame, station: Station, source: Address) -> None:
+    """Answer FILE_TRANSFER_PROTOCOL in the name of a component: there are no files."""
+    if (payload := refusal_of_ftp(bytes(message.payload))) is not None:
+        system, component = frame.source
+        to = {"target_system": system, "target_component": component}
+        station.send(message._replace(payload=tuple(payload), **to), source)
 
 
 def _whole(value: float) -> int:
@@ -278,13 +347,13 @@ def _waypoint(number: int, item: Item, is_current: bool, to: Address) -> Message
     return made
 
 
-def _corner(number: int, corner: LatLon, corners: int, to: Address) -> Message:
+def _corner(number: int, corner: LatLon, corners: int, command: int, to: Address) -> Message:
     made: Message = message_type("MISSION_ITEM_INT").make(
         target_system=to.system,
         target_component=to.component,
         seq=number,
         frame=dialect.MAV_FRAME_GLOBAL_INT,
-        command=dialect.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION,
+        command=command,
         autocontinue=1,
         param1=corners,
         x=round(corner[0] * 1e7),

@@ -9,7 +9,9 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem.api import (
     PRESENCE_EVERY_S,
+    Area,
     EventThrower,
+    Fence,
     MissionControl,
     PayloadState,
     ResourceId,
@@ -31,16 +33,18 @@ from m2pem_plugin_mavlink.face.events import Events
 from m2pem_plugin_mavlink.face.forwarding import COMMAND_INT, COMMAND_LONG, Forwarder
 from m2pem_plugin_mavlink.face.orders import DENIED, Orders, acknowledgement, name_of
 from m2pem_plugin_mavlink.face.received_messages import MessageReceiver
-from m2pem_plugin_mavlink.face.requests import Requests
+from m2pem_plugin_mavlink.face.requests import Requests, refuse_file
 from m2pem_plugin_mavlink.face.sent_messages import MessageSender
 from m2pem_plugin_mavlink.face.settings import Settings, own_system
 from m2pem_plugin_mavlink.face.stations import Station, Stations
 from m2pem_plugin_mavlink.face.streams import Streams
+from m2pem_plugin_mavlink.face.telemetry import TYPES
 from m2pem_plugin_mavlink.face.texts import TextSeverity, status_texts
 from m2pem_plugin_mavlink.face.vehicle import AUTOPILOT, Camera, ShownVehicle
 from m2pem_plugin_mavlink.link.hub import shared_hub
 from m2pem_plugin_mavlink.link.route import Peer
-from m2pem_plugin_mavlink.protocol.messages import Address, types_by_id
+from m2pem_plugin_mavlink.link.vehicle_link import VehicleLink
+from m2pem_plugin_mavlink.protocol.messages import Address, Message, types_by_id
 from m2pem_plugin_mavlink.protocol.raw_frames import RawFrame
 from m2pem_plugin_mavlink.settings import GCS_SYSTEM_ID
 
@@ -56,11 +60,16 @@ MOST_SAID = 256
 LEAST_WAITING = 100
 STATES_PER_VEHICLE = 4
 
+DATA_STREAM: int = dialect.MAVLINK_MSG_ID_REQUEST_DATA_STREAM
+FILE_TRANSFER: int = dialect.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL
+
 SET_MODE: int = dialect.MAVLINK_MSG_ID_SET_MODE
 _NO_REQUEST = frozenset(
     getattr(dialect, f"MAVLINK_MSG_ID_{name}")
-    for name in ("HEARTBEAT", "SYSTEM_TIME", "PING", "TIMESYNC", "MISSION_ACK", "COMMAND_ACK")
+    for name in ("HEARTBEAT", "SYSTEM_TIME", "MISSION_ACK", "COMMAND_ACK", "LOG_REQUEST_END")
 )
+_CLOCK_REQUESTS = (dialect.MAVLINK_MSG_ID_PING, dialect.MAVLINK_MSG_ID_TIMESYNC)
+"""They go to all vehicles."""
 
 
 class FaceServer:
@@ -84,6 +93,8 @@ class FaceServer:
             resource: frozenset(spec.name for spec in specs)
             for resource, specs in control.catalogue().items()
         }
+        area = fleet.geometries.get(fleet.fence)
+        fence = Fence(area) if isinstance(area, Area) else None
         self._vehicles = {
             name: ShownVehicle(
                 name,
@@ -91,6 +102,8 @@ class FaceServer:
                 system,
                 behaviors.get(name, frozenset()),
                 cameras_of(name, fleet, behaviors),
+                type=TYPES.get(fleet.vehicles[name].domain, dialect.MAV_TYPE_GENERIC),
+                fence=fence,
             )
             for name, system in self._settings.systems.items()
             if name not in self._settings.forwarded
@@ -142,6 +155,9 @@ class FaceServer:
         await self._stations.open()
         self._forwarder.open()
         self._receiver.open()
+        shared_hub().link_watchers.append(self._watch_type)
+        for link in shared_hub().links:
+            self._watch_type(link)
         try:
             async with asyncio.TaskGroup() as group:
                 group.create_task(self._follow_telemetry())
@@ -158,10 +174,21 @@ class FaceServer:
                     sent = {each.rule: each for each in self._rules.sent}
                     group.create_task(sender.run(self._thrown, sent))
         finally:
+            shared_hub().link_watchers.remove(self._watch_type)
             self._receiver.close()
             self._forwarder.close()
             await self._orders.close()
             await self._stations.close()
+
+    def _watch_type(self, link: VehicleLink) -> None:
+        """Show a MAVLink vehicle as the MAV_TYPE that it has itself, such as a plane."""
+        vehicle = self._by_system.get(link.address.system)
+
+        def learn(message: Message, sender: Address) -> None:
+            if vehicle is not None and sender == link.address:
+                vehicle.type = message.type
+
+        link.listen({dialect.MAVLINK_MSG_ID_HEARTBEAT}, learn)
 
     async def _announce_holders(self) -> None:
         """Announce the stations that have vehicles as present, for as long as they are received."""
@@ -200,6 +227,10 @@ class FaceServer:
         self._forwarder.from_station(station, frame)
         self._receiver.from_station(frame)
         type_ = types_by_id().get(frame.id)
+        if type_ is not None and frame.id in _CLOCK_REQUESTS:
+            message = type_.unpack(frame.payload)
+            self._requests.clock(message, frame, station, self._vehicles.values())
+            return
         vehicle = self._by_system.get(frame.target.system)
         if type_ is None or vehicle is None or frame.id in _NO_REQUEST:
             return
@@ -214,6 +245,8 @@ class FaceServer:
             params = float(message.base_mode), float(message.custom_mode), 0.0, 0.0
             mode = Command(dialect.MAV_CMD_DO_SET_MODE, params, None, 0.0, "", 0)
             self._orders.command(mode, frame, station, vehicle)
+        elif camera is not None:
+            return  # cameras have neither parameters nor a plan
         elif frame.id == POSITION_TARGET:
             try:
                 order = position_order(message, vehicle)
@@ -274,7 +307,9 @@ class FaceServer:
             assert message is not None
             answer = acknowledgement(message.command, DENIED, frame.source)
             station.send(answer, Address(system, frame.target.component or AUTOPILOT))
-        if frame.target.system:
+        if frame.id == FILE_TRANSFER and frame.target.system and message is not None:
+            refuse_file(message, frame, station, Address(system, frame.target.component))
+        elif frame.target.system and frame.id != DATA_STREAM:  # MAVProxy sends it every 10 s
             what = message.TYPE.name if message is not None else f"message {frame.id}"
             self._tell_as(
                 station,

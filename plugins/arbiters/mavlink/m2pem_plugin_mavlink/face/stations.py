@@ -29,13 +29,15 @@ _logger = logging.getLogger(__name__)
 
 class Station:
     """A peer: one ground station, or a router with several. `addresses`: those that send over it.
-    `ignored`: its frames that were dropped, as there were too many."""
+    `ignored`: its frames that were dropped, as there were too many. `ardupilot_modes`: it is sent
+    ArduPilot's numbers of modes."""
 
     def __init__(self, peer: Peer, now_s: float) -> None:
         self.peer = peer
         self.splitter = FrameSplitter()
         self.addresses: set[Address] = set()
         self.ignored = 0
+        self.ardupilot_modes = False
         self._budget = MOST_FRAMES_AT_ONCE
         self._refilled_s = now_s
 

@@ -7,6 +7,7 @@ from itertools import count
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from m2pem_plugin_mavlink.face import modes
 from m2pem_plugin_mavlink.face.components import GIMBAL_MAKERS, camera_heartbeat
 from m2pem_plugin_mavlink.face.settings import FASTEST_HZ
 from m2pem_plugin_mavlink.face.stations import Station, Stations
@@ -29,10 +30,15 @@ LONGEST_S = 3600.0
 _Entry = tuple[float, int, Station | None, ShownVehicle, int]
 
 
-def messages_of(vehicle: ShownVehicle, id_: int) -> list[tuple[Message, Address]]:
-    """Return the messages of an id that a vehicle's components send now, with their senders."""
+def messages_of(
+    vehicle: ShownVehicle, id_: int, ardupilot_modes: bool
+) -> list[tuple[Message, Address]]:
+    """Return the messages of an id that a vehicle's components send now, with their senders.
+    `ardupilot_modes`: modes have ArduPilot's numbers, not PX4's."""
     found: list[tuple[Message, Address]] = []
     if (maker := MAKERS.get(id_)) is not None and (message := maker(vehicle)) is not None:
+        if ardupilot_modes and id_ in (HEARTBEAT, modes.CURRENT_MODE):
+            message = modes.renumbered(message, vehicle.type)
         found.append((message, vehicle.autopilot))
     if id_ == HEARTBEAT:
         for camera in vehicle.cameras:
@@ -64,7 +70,7 @@ class Streams:
         self._default_s = {message_type(name).id: 1 / rate for name, rate in rates_hz.items()}
         self._own_s: dict[Peer, dict[tuple[int, int], float]] = {}
         self._queued: dict[Peer, dict[tuple[int, int], int]] = {}
-        self._now_s = now_s
+        self.now_s = now_s
         self._queue: list[_Entry] = []
         self._numbers = count()
         self._sent = 0
@@ -89,22 +95,22 @@ class Streams:
             return True
         own[key] = min(max(interval_s, SHORTEST_S), LONGEST_S) if interval_s > 0 else 0.0
         if own[key]:
-            self._push(self._now_s(), station, vehicle, id_)
+            self._push(self.now_s(), station, vehicle, id_)
             self._drop_replaced()
         return True
 
     async def run(self) -> None:
         """Send messages until cancelled."""
-        now_s = self._now_s()
+        now_s = self.now_s()
         for number, vehicle in enumerate(self._vehicles):
             for id_, interval_s in self._default_s.items():
                 self._push(now_s + interval_s * number / len(self._vehicles), None, vehicle, id_)
         while True:
-            now_s = self._now_s()
+            now_s = self.now_s()
             while self._queue and self._queue[0][0] <= now_s:
                 await self._send(heapq.heappop(self._queue), now_s)
             due_s = self._queue[0][0] if self._queue else now_s + LONGEST_WAIT_S
-            await asyncio.sleep(min(max(due_s - self._now_s(), 0.0), LONGEST_WAIT_S))
+            await asyncio.sleep(min(max(due_s - self.now_s(), 0.0), LONGEST_WAIT_S))
             self._forget()
 
     def _push(self, due_s: float, station: Station | None, vehicle: ShownVehicle, id_: int) -> None:
@@ -143,10 +149,12 @@ class Streams:
         if not interval_s:
             return
         if vehicle.present(now_s) and stations:
-            for message, source in messages_of(vehicle, id_):
-                for each in stations:
-                    each.send(message, source)
-                    self._sent += 1
+            for ardupilot_modes in {each.ardupilot_modes for each in stations}:
+                for message, source in messages_of(vehicle, id_, ardupilot_modes):
+                    for each in stations:
+                        if each.ardupilot_modes is ardupilot_modes:
+                            each.send(message, source)
+                            self._sent += 1
         if self._sent >= SENT_AT_ONCE:
             self._sent = 0
             await asyncio.sleep(0)

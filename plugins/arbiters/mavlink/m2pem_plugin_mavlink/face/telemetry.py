@@ -12,7 +12,7 @@ from m2pem_plugin_mavlink.face import modes
 from m2pem_plugin_mavlink.face.vehicle import ShownVehicle
 from m2pem_plugin_mavlink.protocol.messages import Message, message_type
 
-_TYPES: Mapping[str, int] = {
+TYPES: Mapping[str, int] = {
     "ground": dialect.MAV_TYPE_GROUND_ROVER,
     "air": dialect.MAV_TYPE_QUADROTOR,
     "surface": dialect.MAV_TYPE_SURFACE_BOAT,
@@ -71,7 +71,7 @@ def heartbeat(vehicle: ShownVehicle) -> Message:
         if mode is not modes.GUIDED:
             base |= dialect.MAV_MODE_FLAG_AUTO_ENABLED
     made: Message = message_type("HEARTBEAT").make(
-        type=_TYPES.get(vehicle.domain, dialect.MAV_TYPE_GENERIC),
+        type=vehicle.type,
         autopilot=dialect.MAV_AUTOPILOT_GENERIC,
         base_mode=base,
         custom_mode=mode.number,
@@ -137,6 +137,11 @@ def _sys_status(vehicle: ShownVehicle) -> Message | None:
     health = present if state.position is not None else present & ~_POSITION
     if state.ready is False:
         health &= ~_PREARM
+    if vehicle.fence is not None:
+        present |= _GEOFENCE
+    at = state.position
+    if vehicle.fence is None or at is None or vehicle.fence.outside_m(at.latlon) <= BREACH_M:
+        health |= _GEOFENCE  # without a fence, too: MAVProxy says "fence breach" if it is missing
     made: Message = message_type("SYS_STATUS").make(
         onboard_control_sensors_present=present,
         onboard_control_sensors_enabled=present,
@@ -147,6 +152,10 @@ def _sys_status(vehicle: ShownVehicle) -> Message | None:
     )
     return made
 
+
+_GEOFENCE: int = dialect.MAV_SYS_STATUS_GEOFENCE
+BREACH_M = 1.0
+"""A vehicle that is farther than this from where it may be has breached the fence."""
 
 _PREARM: int = dialect.MAV_SYS_STATUS_PREARM_CHECK
 _POSITION: int = dialect.MAV_SYS_STATUS_SENSOR_GPS | dialect.MAV_SYS_STATUS_AHRS

@@ -5,6 +5,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 
 from m2pem.api import (
+    Fence,
     GeoPosition,
     LinkState,
     PayloadState,
@@ -44,7 +45,8 @@ class Camera:
 class ShownVehicle:
     """`behaviors`: the names of those that it has. `received_s`: the time of the last telemetry, by
     the clock of the event loop. `behavior`: the name of what it carries out, and `behavior_id`.
-    `operator`: who has taken it. `home`: where it was first seen on the ground."""
+    `operator`: who has taken it. `home`: where it was first seen on the ground. `type`: MAV_TYPE.
+    `fence`: the fleet's."""
 
     resource: ResourceId
     domain: str
@@ -58,6 +60,8 @@ class ShownVehicle:
     operator: str = ""
     home: GeoPosition | None = None
     plan: Plan = field(default_factory=Plan)
+    type: int = 0
+    fence: Fence | None = None
 
     @property
     def autopilot(self) -> Address:

@@ -1,5 +1,6 @@
 """Parameters: named numbers that set the vehicle up, and their protocol (mavlink.io, "Parameter
-Protocol"). An unknown name gets no answer from ArduPilot, and PARAM_ERROR from PX4."""
+Protocol"). An unknown name gets no answer from ArduPilot, and PARAM_ERROR from PX4. MAVLink FTP, by
+which ground stations ask for the list first, is refused."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -7,6 +8,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from m2pem_plugin_mavlink.protocol.station_requests import refusal_of_ftp
 from m2pem_plugin_mavlink.simulator.interfaces import AutopilotInterface, Component, MessageHandler
 from m2pem_plugin_mavlink.simulator.messages import Peer, Sender
 
@@ -27,7 +29,14 @@ class ParameterServer(Component):
             "PARAM_REQUEST_LIST": self._list,
             "PARAM_REQUEST_READ": self._read,
             "PARAM_SET": self._set,
+            "FILE_TRANSFER_PROTOCOL": self._refuse_file,
         }
+
+    def _refuse_file(self, message: Any, sender: Sender) -> None:
+        if (payload := refusal_of_ftp(bytes(message.payload))) is not None:
+            make = dialect.MAVLink_file_transfer_protocol_message
+            answer = make(0, sender.system, sender.component, list(payload))
+            self.autopilot.send(answer, sender.peer)
 
     def step(self, dt_s: float) -> None:
         """Send more of the lists that were asked for."""

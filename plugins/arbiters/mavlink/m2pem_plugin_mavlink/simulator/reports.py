@@ -7,6 +7,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from m2pem_plugin_mavlink.simulator.fence import Fence
 from m2pem_plugin_mavlink.simulator.interfaces import (
     AutopilotInterface,
     Component,
@@ -111,6 +112,9 @@ class Reports(Component):
             health &= ~dialect.MAV_SYS_STATUS_SENSOR_GPS
         if autopilot.arming.armed or autopilot.arming.healthy:
             health |= dialect.MAV_SYS_STATUS_PREARM_CHECK
+        fence = autopilot.component(Fence)
+        present |= dialect.MAV_SYS_STATUS_GEOFENCE * fence.rules.enabled
+        health |= dialect.MAV_SYS_STATUS_GEOFENCE * (fence.breach is None)
         return dialect.MAVLink_sys_status_message(
             present,
             present,

@@ -8,13 +8,15 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from m2pem_plugin_mavlink.protocol.station_requests import requested_intervals
 from m2pem_plugin_mavlink.simulator.interfaces import (
     AutopilotInterface,
     CommandHandler,
     Component,
+    MessageHandler,
     ReportMaker,
 )
-from m2pem_plugin_mavlink.simulator.messages import Command, Peer, Result
+from m2pem_plugin_mavlink.simulator.messages import Command, Peer, Result, Sender
 
 
 class Streams(Component):
@@ -54,6 +56,17 @@ class Streams(Component):
                     entry[1] = max(entry[1] + entry[0], now_s)
                 next_s = min(next_s, entry[1])
         self._next_s = next_s
+
+    def messages(self) -> Mapping[str, MessageHandler]:
+        """ArduPilot also has the older way to set streams."""
+        is_ardupilot = self.autopilot.firmware.is_ardupilot
+        return {"REQUEST_DATA_STREAM": self._set_streams} if is_ardupilot else {}
+
+    def _set_streams(self, message: Any, sender: Sender) -> None:
+        for id_, interval_s in requested_intervals(message).items():
+            self._due[sender.peer].pop(id_, None)
+            if interval_s > 0 and id_ in self.makers:
+                self._set(sender.peer, id_, max(interval_s, 1 / self.autopilot.firmware.loop_hz))
 
     def commands(self) -> Mapping[int, CommandHandler]:
         """Setting, and asking for one message."""

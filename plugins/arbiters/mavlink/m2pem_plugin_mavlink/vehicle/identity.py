@@ -67,6 +67,11 @@ class Identity:
         return f"{self.firmware} {self.kind}"
 
 
+def kind_of(type_: int) -> Kind:
+    """Return the kind of a MAV_TYPE; a copter, if autopilots do not control it in its own way."""
+    return _KINDS.get(type_, Kind.COPTER)
+
+
 def identity(autopilot: int, type_: int) -> Identity | None:
     """Return the identity in a HEARTBEAT with these fields; None if drivers do not support it."""
     firmware, kind = _FIRMWARES.get(autopilot), _KINDS.get(type_)
