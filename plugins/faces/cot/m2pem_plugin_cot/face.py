@@ -167,7 +167,7 @@ class CotFace:
             try:
                 received = read_event(content)
             except EventError as error:
-                self._refuse(str(error))
+                self._refuse(f"{source.rpartition(':')[0]}: {error}")
                 received = None
             if received is not None and not received.uid.startswith(self._uid("", "")):
                 if received.name in self._fleet.handed_over:

@@ -10,8 +10,19 @@ from dataclasses import dataclass
 from lxml import etree
 
 from m2pem.api import Area, Point, Route
+from m2pem_plugin_cot.tak_protocol import (
+    MESH_HEADER,
+    STREAM_HEADER,
+    TakProtocolError,
+    as_xml,
+    is_tak,
+    varint,
+)
 
 MAX_EVENT_BYTES = 65_536
+MAX_TAK_BYTES = MAX_EVENT_BYTES - 16
+"""With its header, it is no longer than another event."""
+
 MAX_CORNERS = 1000
 MAX_NAME = 100
 END = b"</event>"
@@ -34,8 +45,14 @@ def read_event(content: bytes) -> Received | None:
     """Return what an event draws; None if it draws nothing, such as the position of a person.
 
     Raises:
-        EventError: it is too long, no XML, or its positions make no sense.
+        EventError: it is too long, neither XML nor of the TAK protocol, or its positions make no
+            sense.
     """
+    if len(content) <= MAX_EVENT_BYTES and is_tak(content):
+        try:
+            content = as_xml(content)
+        except TakProtocolError as error:
+            raise EventError(str(error)) from None
     if len(content) > MAX_EVENT_BYTES:
         raise EventError(f"it has {len(content):,} bytes, more than {MAX_EVENT_BYTES:,}")
     # Before the parser: a document type could declare entities, and those could be huge.
@@ -100,17 +117,32 @@ def _place(latitude: str, longitude: str) -> tuple[float, float]:
 
 
 class EventStream:
-    """Finds the events in a stream of bytes; one that is too long is left out, and counted."""
+    """Finds the events in a stream of bytes; one that is too long is left out, and counted. One of
+    the TAK protocol gets the header that it would have in a datagram."""
 
     def __init__(self) -> None:
         self.too_long = 0
         self._waiting = b""
         self._skips = False
+        self._skipped_bytes = 0
+        """How much is yet to come of a message of the TAK protocol that is too long."""
 
     def feed(self, content: bytes) -> Iterator[bytes]:
         """Yield the events that are whole now."""
-        waiting, begin = self._waiting + content, 0
-        while (found := waiting.find(END, begin)) >= 0:
+        waiting, begin = self._waiting + content, self._skipped_bytes
+        while True:
+            if not self._skips and (header := STREAM_HEADER.match(waiting, begin)):
+                start, end = header.end(), header.end() + varint(header[1])
+                if end - start > MAX_TAK_BYTES:
+                    self.too_long += 1
+                elif end > len(waiting):
+                    break
+                else:
+                    yield MESH_HEADER + waiting[start:end]
+                begin = end
+                continue
+            if (found := waiting.find(END, begin)) < 0:
+                break
             end = found + len(END)
             if self._skips:
                 self._skips = False
@@ -119,6 +151,7 @@ class EventStream:
             else:
                 yield _without_prologue(waiting[begin:end])
             begin = end
+        self._skipped_bytes = max(0, begin - len(waiting))
         self._waiting = waiting[begin:]
         if len(self._waiting) > MAX_EVENT_BYTES:
             self.too_long += not self._skips

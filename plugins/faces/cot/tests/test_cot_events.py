@@ -1,6 +1,7 @@
 """What is sent, and what of received bytes is used."""
 
 import contextlib
+import sys
 from dataclasses import replace
 from typing import Any
 
@@ -10,6 +11,8 @@ from hypothesis import strategies as st
 from lxml import etree
 from m2pem_plugin_cot.events import geometry_event, vehicle_event
 from m2pem_plugin_cot.received import MAX_EVENT_BYTES, EventError, EventStream, read_event
+from takproto import TAKProtoVer, xml2proto
+from takproto.proto import TakMessage
 
 from m2pem.api import Area, GeoPosition, Point, Route, VehicleState
 
@@ -159,3 +162,103 @@ def test_a_document_type_in_another_encoding_is_none() -> None:
     content = b'<?xml version="1.0" encoding="UTF-7"?>' + entity + event()
     with pytest.raises(EventError, match="no XML"):
         read_event(content.replace(b'uid="m1"', b'uid="&a;"'))
+
+
+def mesh(content: bytes) -> bytes:
+    """An event as takproto writes it into a datagram."""
+    return bytes(xml2proto(content.decode(), TAKProtoVer.MESH))
+
+
+def stream_of(content: bytes) -> bytes:
+    """An event as takproto writes it into a stream."""
+    return bytes(xml2proto(content.decode(), TAKProtoVer.STREAM))
+
+
+def protobuf(**fields: Any) -> bytes:
+    made = TakMessage()
+    for name, value in {"type": "b-m-p-s-m", "uid": "m1", "lat": 38.1, "lon": -77.3}.items():
+        setattr(made.cotEvent, name, value)
+    for name, value in fields.items():
+        if name == "callsign":
+            made.cotEvent.detail.contact.callsign = value
+        elif name == "xmlDetail":
+            made.cotEvent.detail.xmlDetail = value
+        else:
+            setattr(made.cotEvent, name, value)
+    return b"\xbf\x01\xbf" + bytes(made.SerializeToString())
+
+
+@pytest.mark.parametrize(
+    "geometry", [Point(PLACE), Route((PLACE, (38.11, -77.3, None))), Area((RING,))]
+)
+def test_the_tak_protocol_of_takproto_is_read_as_its_xml(geometry: Point | Route | Area) -> None:
+    content = geometry_event("u1", "l<&\"'z", geometry, AT_US, 60.0)
+    expected = read_event(content)
+    assert expected is not None
+    assert read_event(mesh(content)) == expected
+    (found,) = EventStream().feed(stream_of(content))
+    assert read_event(found) == expected
+
+
+def test_who_is_where_in_the_tak_protocol_draws_nothing() -> None:
+    assert read_event(mesh(vehicle_event("u1", "a-f-G", STATE, 30.0, "") or b"")) is None
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        (b"\xbf\x02\xbf" + mesh(event())[3:], "another version"),
+        (b"\xbf\x00\xbf" + event(), "another version"),
+        (b"\xbf\xff\xff\x03\xbf", "another version"),
+        (mesh(event())[:-5], "no valid protobuf"),
+        (b"\xbf\x01\xbf<event/>", "no valid protobuf"),
+        (protobuf(uid="m1")[:3] + b"\x12\xff\xff\xff\xff\x0f", "no valid protobuf"),
+        (protobuf(lat=float("nan")), "no place"),
+        (protobuf(lat=91.0), "no place"),
+        (protobuf(xmlDetail="<!DOCTYPE x>"), "document type"),
+        (protobuf(xmlDetail="&a;"), "no XML"),
+        (protobuf(xmlDetail="</detail></event><event>"), "no XML"),
+        (protobuf(callsign="\x01"), "no XML"),
+        (protobuf(callsign="&" * 30_000), "more than"),
+        (protobuf(callsign="x" * MAX_EVENT_BYTES), "more than"),
+    ],
+)
+def test_what_of_the_tak_protocol_cannot_be_used_is_refused(content: bytes, says: str) -> None:
+    with pytest.raises(EventError, match=says):
+        read_event(content)
+
+
+def test_without_takproto_the_tak_protocol_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    content = mesh(event())
+    for name in ("takproto", "takproto.proto"):
+        monkeypatch.setitem(sys.modules, name, None)
+    with pytest.raises(EventError, match=r"TAK protocol.*m2pem-plugin-cot\[tak\]"):
+        read_event(content)
+
+
+@given(st.binary(max_size=500))
+def test_no_bytes_of_the_tak_protocol_do_more_than_be_refused(content: bytes) -> None:
+    with contextlib.suppress(EventError):
+        assert read_event(b"\xbf\x01\xbf" + content) is None
+
+
+@given(
+    st.lists(
+        st.sampled_from([event(), stream_of(event()), b"\xbf\x80\x80\x04" + b"x" * 65_536]),
+        max_size=6,
+    ),
+    st.integers(1, 5000),
+)
+def test_a_stream_may_have_xml_and_the_tak_protocol_wherever_it_is_cut(
+    parts: list[bytes], size: int
+) -> None:
+    whole = b"\n".join(parts) + b"\n"
+    stream, found = EventStream(), []
+    for start in range(0, len(whole), size):
+        found += stream.feed(whole[start : start + size])
+    read = [event(), stream_of(event())]
+    assert [each.endswith(b"</event>") for each in found] == [
+        part == event() for part in parts if part in read
+    ]
+    assert {read_event(each) for each in found} <= {read_event(event())}
+    assert stream.too_long == sum(part not in read for part in parts)

@@ -17,6 +17,7 @@ import pytak
 import pytest
 from lxml import etree
 from m2pem_plugin_cot.face import CotFace
+from takproto import TAKProtoVer, xml2proto
 
 from m2pem.api import FaceSettings, GeoPosition, MissionControl, Point, Route, VehicleState, records
 from m2pem.errors import PluginError
@@ -156,6 +157,37 @@ async def test_a_marker_of_pytak_is_handed_over_if_the_fleet_allows_it() -> None
         writer.close()
 
 
+async def test_a_marker_in_the_tak_protocol_is_handed_over() -> None:
+    """As ATAK sends it to its multicast group; pytak 7.6.1 sends what takproto 3.0.1 has made."""
+    port = free_port()
+    settings = {"url": f"udp://127.0.0.1:{free_port()}", "listen": f"udp://127.0.0.1:{port}"}
+    async with fleet(**settings, receive=True) as control:
+        await until(lambda: is_bound(port))
+        _, writer = await pytak.create_udp_client(urlparse(f"udp+wo://127.0.0.1:{port}"), None)
+        await writer.send(bytes(xml2proto(marker().decode(), TAKProtoVer.MESH)))
+        await until(lambda: "lz" in control.geometries())
+        given = control.geometries()["lz"]
+        assert given.geometry["geometry"]["coordinates"] == [-77.3190, 38.1077]
+        assert given.by.startswith("cot phone.1 at 127.0.0.1:")
+        writer.close()
+
+
+async def test_a_server_may_send_the_tak_protocol_in_its_stream() -> None:
+    async def talk(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        frame = bytes(xml2proto(marker().decode(), TAKProtoVer.STREAM))
+        writer.write(marker("other") + b"\n" + frame[:40])
+        await writer.drain()
+        writer.write(frame[40:])
+        while await reader.read(1000):
+            continue
+
+    server = await asyncio.start_server(talk, "127.0.0.1", 0)
+    port = server.sockets[0].getsockname()[1]
+    async with fleet(url=f"tcp://127.0.0.1:{port}", receive=True) as control:
+        await until(lambda: "lz" in control.geometries())
+    server.close()
+
+
 async def test_a_hostile_sender_changes_nothing_and_slows_nothing() -> None:
     port = free_port()
     settings = {"url": f"udp://127.0.0.1:{free_port()}", "listen": f"udp://127.0.0.1:{port}"}
@@ -164,6 +196,8 @@ async def test_a_hostile_sender_changes_nothing_and_slows_nothing() -> None:
         marker(place='lat="1e309" lon="0"'),
         b'<!DOCTYPE x [<!ENTITY a "aaaaaaaaaa">]><event>&a;</event>',
         b"<event>" * 9000,
+        b"\xbf\x01\xbf" + os.urandom(1400),
+        b"\xbf\x01\xbf\x12" + b"\xff" * 9 + b"\x01",
         marker("not handed over"),
         marker("lz" * 30_000),
     ]
