@@ -1,23 +1,20 @@
 """Events of Cursor on Target that come in: what of them is a geometry.
 
-They come from a network, and nothing in them is trusted.
+They come from a network, and nothing in them is trusted. They are XML or, as ATAK sends them to its
+multicast group, of the TAK protocol, version 1: protobuf, which the optional package takproto
+reads. A datagram of it begins with BF, the version and BF; in a stream, each message with BF and
+its length.
 """
 
 import math
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from xml.sax.saxutils import quoteattr
 
 from lxml import etree
 
 from m2pem.api import Area, Point, Route
-from m2pem_plugin_cot.tak_protocol import (
-    MESH_HEADER,
-    STREAM_HEADER,
-    TakProtocolError,
-    as_xml,
-    is_tak,
-    varint,
-)
 
 MAX_EVENT_BYTES = 65_536
 MAX_TAK_BYTES = MAX_EVENT_BYTES - 16
@@ -26,6 +23,10 @@ MAX_TAK_BYTES = MAX_EVENT_BYTES - 16
 MAX_CORNERS = 1000
 MAX_NAME = 100
 END = b"</event>"
+TAK_MAGIC = b"\xbf"
+TAK_HEADER = b"\xbf\x01\xbf"
+_TAK_IN_STREAM = re.compile(rb"\s*\xbf([\x80-\xff]{0,3}[\x00-\x7f])")
+"""Magic byte and length, a varint; perhaps after the end of a line."""
 
 
 class EventError(ValueError):
@@ -48,11 +49,8 @@ def read_event(content: bytes) -> Received | None:
         EventError: it is too long, neither XML nor of the TAK protocol, or its positions make no
             sense.
     """
-    if len(content) <= MAX_EVENT_BYTES and is_tak(content):
-        try:
-            content = as_xml(content)
-        except TakProtocolError as error:
-            raise EventError(str(error)) from None
+    if content.startswith(TAK_MAGIC) and len(content) <= MAX_EVENT_BYTES:
+        content = _xml_of_tak(content)
     if len(content) > MAX_EVENT_BYTES:
         raise EventError(f"it has {len(content):,} bytes, more than {MAX_EVENT_BYTES:,}")
     # Before the parser: a document type could declare entities, and those could be huge.
@@ -73,6 +71,30 @@ def read_event(content: bytes) -> Received | None:
     name = "" if contact is None else contact.get("callsign", "")[:MAX_NAME]
     geometry = _geometry(type_, event)
     return None if geometry is None else Received(uid, name, geometry)
+
+
+def _xml_of_tak(content: bytes) -> bytes:
+    """Return the event in a datagram of the TAK protocol as XML: what of it may be a geometry."""
+    if not content.startswith(TAK_HEADER):
+        raise EventError("TAK protocol of another version than 1")
+    try:
+        from google.protobuf.message import DecodeError  # noqa: PLC0415  # optional
+        from takproto.proto import TakMessage  # noqa: PLC0415
+    except ImportError:
+        raise EventError(
+            "TAK protocol (protobuf): install m2pem-plugin-cot[tak], or let the sender send XML"
+        ) from None
+    try:
+        event = TakMessage.FromString(content[len(TAK_HEADER) :]).cotEvent
+    except DecodeError:
+        raise EventError("TAK protocol, but no valid protobuf") from None
+    name = event.detail.contact.callsign
+    return (
+        f"<event type={quoteattr(event.type)} uid={quoteattr(event.uid)}>"
+        f'<point lat="{event.lat}" lon="{event.lon}"/><detail>'
+        f"{f'<contact callsign={quoteattr(name)}/>' if name else ''}"
+        f"{event.detail.xmlDetail}</detail></event>"
+    ).encode()
 
 
 def printable(text: str) -> str:
@@ -131,14 +153,15 @@ class EventStream:
         """Yield the events that are whole now."""
         waiting, begin = self._waiting + content, self._skipped_bytes
         while True:
-            if not self._skips and (header := STREAM_HEADER.match(waiting, begin)):
-                start, end = header.end(), header.end() + varint(header[1])
+            if not self._skips and (header := _TAK_IN_STREAM.match(waiting, begin)):
+                start = header.end()
+                end = start + sum((each & 127) << 7 * at for at, each in enumerate(header[1]))
                 if end - start > MAX_TAK_BYTES:
                     self.too_long += 1
                 elif end > len(waiting):
                     break
                 else:
-                    yield MESH_HEADER + waiting[start:end]
+                    yield TAK_HEADER + waiting[start:end]
                 begin = end
                 continue
             if (found := waiting.find(END, begin)) < 0:

@@ -207,9 +207,9 @@ def _set_mode(command: Command, vehicle: ShownVehicle) -> Order:
         name, mode = modes.by_ardupilot_number(main, vehicle.type)
     else:
         number = main if main >= 256 else px4_mode(main & 255, sub & 255)
-        name, mode = f"{number:#x}", modes.BY_NUMBER.get(number)
+        name, mode = f"mode {number:#x}", modes.BY_NUMBER.get(number)
     if mode is None:
-        raise RefusedCommandError(f"the mode {name} cannot be commanded")
+        raise RefusedCommandError(f"{name} cannot be commanded")
     return _of_mode(mode, vehicle)
 
 

@@ -3,6 +3,7 @@ changes what a vehicle does; what would is refused."""
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -16,7 +17,6 @@ from m2pem_plugin_mavlink.face.streams import HEARTBEAT, Streams, is_known, mess
 from m2pem_plugin_mavlink.face.telemetry import heartbeat
 from m2pem_plugin_mavlink.face.vehicle import Camera, ShownVehicle
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
-from m2pem_plugin_mavlink.protocol.raw_frames import RawFrame
 from m2pem_plugin_mavlink.protocol.station_requests import refusal_of_ftp, requested_intervals
 
 ACCEPTED: int = dialect.MAV_RESULT_ACCEPTED
@@ -36,6 +36,31 @@ Say = Callable[[Station, ShownVehicle, str], None]
 """Tells a station why something is refused."""
 
 Answer = Callable[[Command, Station, ShownVehicle, Camera | None], int]
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """A message of a ground station to a vehicle. `source`: the address of its sender."""
+
+    message: Message
+    source: Address
+    station: Station
+    vehicle: ShownVehicle
+
+    def answer(self, message: Message) -> None:
+        """Send a message of the vehicle to the sender."""
+        self.station.send(message, self.vehicle.autopilot)
+
+    @property
+    def to(self) -> dict[str, int]:
+        """The fields of an answer that address it to the sender."""
+        return addressed(self.source)
+
+
+def addressed(to: Address) -> dict[str, int]:
+    """Return the fields of a message that has a target."""
+    return {"target_system": to.system, "target_component": to.component}
+
 
 _ONE_MESSAGE: Mapping[int, int] = {
     dialect.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
@@ -66,12 +91,11 @@ class Requests:
         ]
         self._downloads: dict[tuple[str, Address, int, int], Sequence[Message]] = {}
         self._commands: Mapping[int, Answer] = {
-            dialect.MAV_CMD_REQUEST_MESSAGE: self._request_message,
+            **dict.fromkeys((dialect.MAV_CMD_REQUEST_MESSAGE, *_ONE_MESSAGE), self._send),
             dialect.MAV_CMD_SET_MESSAGE_INTERVAL: self._set_interval,
             dialect.MAV_CMD_GET_MESSAGE_INTERVAL: self._get_interval,
-            **dict.fromkeys(_ONE_MESSAGE, self._request_one),
         }
-        self._messages: Mapping[str, Callable[[Message, RawFrame, Station, ShownVehicle], None]] = {
+        self._messages: Mapping[str, Callable[[Request], None]] = {
             "PARAM_REQUEST_LIST": self._list_parameters,
             "PARAM_REQUEST_READ": self._read_parameter,
             "PARAM_SET": self._set_parameter,
@@ -101,35 +125,19 @@ class Requests:
         answer = self._commands.get(command.id)
         return None if answer is None else answer(command, station, vehicle, camera)
 
-    def message(
-        self, message: Message, frame: RawFrame, station: Station, vehicle: ShownVehicle
-    ) -> bool:
+    def message(self, request: Request) -> bool:
         """Answer a message; return False if it is of another kind."""
-        answer = self._messages.get(message.TYPE.name)
+        answer = self._messages.get(request.message.TYPE.name)
         if answer is not None:
-            answer(message, frame, station, vehicle)
+            answer(request)
         return answer is not None
 
     # --- messages and intervals -------------------------------------------------------------------
 
-    def _request_message(
-        self, command: Command, station: Station, vehicle: ShownVehicle, camera: Camera | None
-    ) -> int:
-        return self._send(_whole(command.params[0]), command, station, vehicle, camera)
-
-    def _request_one(
-        self, command: Command, station: Station, vehicle: ShownVehicle, camera: Camera | None
-    ) -> int:
-        return self._send(_ONE_MESSAGE[command.id], command, station, vehicle, camera)
-
     def _send(
-        self,
-        id_: int,
-        command: Command,
-        station: Station,
-        vehicle: ShownVehicle,
-        camera: Camera | None,
+        self, command: Command, station: Station, vehicle: ShownVehicle, camera: Camera | None
     ) -> int:
+        id_ = _ONE_MESSAGE.get(command.id, _whole(command.params[0]))
         if camera is not None:
             make = CAMERA_MAKERS.get(id_)
             if make is None:
@@ -181,131 +189,87 @@ class Requests:
         station.send(made, vehicle.autopilot)
         return ACCEPTED
 
-    def _set_streams(
-        self, message: Message, frame: RawFrame, station: Station, vehicle: ShownVehicle
-    ) -> None:
-        station.ardupilot_modes = True
-        for id_, interval_s in requested_intervals(message).items():
+    def _set_streams(self, request: Request) -> None:
+        request.station.ardupilot_modes = True
+        for id_, interval_s in requested_intervals(request.message).items():
             if is_known(id_):
-                self._streams.set_interval(station, vehicle, id_, interval_s)
+                self._streams.set_interval(request.station, request.vehicle, id_, interval_s)
 
     def clock(
-        self, message: Message, frame: RawFrame, station: Station, vehicles: Iterable[ShownVehicle]
+        self, message: Message, source: Address, station: Station, vehicles: Iterable[ShownVehicle]
     ) -> None:
         """Answer PING and TIMESYNC for all vehicles that are present; each answer counts as a frame
         of the station."""
         is_ping = message.TYPE.name == "PING"
-        if frame.target.system if is_ping else message.tc1:
+        if message.target_system if is_ping else message.tc1:
             return  # it is an answer itself
         now_s = self._streams.now_s()
         for vehicle in vehicles:
-            if (state := vehicle.state) is None or not vehicle.present(now_s):
+            if vehicle.state is None or not vehicle.present(now_s) or not station.may_send(now_s):
                 continue
-            if is_ping:
-                to = frame.source
-                made = message._replace(target_system=to.system, target_component=to.component)
-            else:
-                since_ns = round((now_s - vehicle.received_s) * 1e9)
-                made = message._replace(tc1=state.time_us * 1000 + since_ns)
-            if station.may_send(now_s):
-                station.send(made, vehicle.autopilot)
+            own_ns = vehicle.state.time_us * 1000 + round((now_s - vehicle.received_s) * 1e9)
+            changed = addressed(source) if is_ping else {"tc1": own_ns}
+            station.send(message._replace(**changed), vehicle.autopilot)
 
-    def _refuse_file(
-        self, message: Message, frame: RawFrame, station: Station, vehicle: ShownVehicle
-    ) -> None:
-        refuse_file(message, frame, station, vehicle.autopilot)
+    @staticmethod
+    def _refuse_file(request: Request) -> None:
+        if (answer := refusal_of_files(request.message, request.source)) is not None:
+            request.answer(answer)
 
-    def _list_logs(
-        self, message: Message, frame: RawFrame, station: Station, vehicle: ShownVehicle
-    ) -> None:
-        station.send(message_type("LOG_ENTRY").make(num_logs=0), vehicle.autopilot)
+    @staticmethod
+    def _list_logs(request: Request) -> None:
+        request.answer(message_type("LOG_ENTRY").make(num_logs=0))
 
     # --- parameters -------------------------------------------------------------------------------
 
-    def _list_parameters(
-        self, message: Message, frame: RawFrame, station: Station, vehicle: ShownVehicle
-    ) -> None:
+    def _list_parameters(self, request: Request) -> None:
         for index in range(len(_PARAMETERS)):
-            station.send(_parameter(index, vehicle), vehicle.autopilot)
+            request.answer(_parameter(index, request.vehicle))
 
-    def _read_parameter(
-        self, message: Message, frame: RawFrame, station: Station, vehicle: ShownVehicle
-    ) -> None:
-        index = message.param_index
-        if index < 0:
-            index = _index_of(message.param_id)
-        if 0 <= index < len(_PARAMETERS):
-            station.send(_parameter(index, vehicle), vehicle.autopilot)
+    def _read_parameter(self, request: Request) -> None:
+        name, index = request.message.param_id, request.message.param_index
+        known = index if index >= 0 else _index_of(name)
+        if 0 <= known < len(_PARAMETERS):
+            request.answer(_parameter(known, request.vehicle))
         else:
-            made = message_type("PARAM_ERROR").make(
-                target_system=frame.source.system,
-                target_component=frame.source.component,
-                param_id=message.param_id,
-                param_index=message.param_index,
-                error=dialect.MAV_PARAM_ERROR_DOES_NOT_EXIST,
-            )
-            station.send(made, vehicle.autopilot)
+            error = dialect.MAV_PARAM_ERROR_DOES_NOT_EXIST
+            make = message_type("PARAM_ERROR").make
+            request.answer(make(**request.to, param_id=name, param_index=index, error=error))
 
-    def _set_parameter(
-        self, message: Message, frame: RawFrame, station: Station, vehicle: ShownVehicle
-    ) -> None:
-        index = _index_of(message.param_id)
+    def _set_parameter(self, request: Request) -> None:
+        index = _index_of(request.message.param_id)
         if index >= 0:
-            station.send(_parameter(index, vehicle), vehicle.autopilot)
-        self._say(station, vehicle, "parameters are read-only here")
+            request.answer(_parameter(index, request.vehicle))
+        self._say(request.station, request.vehicle, "parameters are read-only here")
 
     # --- the plan ---------------------------------------------------------------------------------
 
-    def _list_items(
-        self, message: Message, frame: RawFrame, station: Station, vehicle: ShownVehicle
-    ) -> None:
-        type_ = message.mission_type
-        items = self._items(type_, frame.source, vehicle)
-        key = station.name, frame.source, vehicle.system, type_
+    def _list_items(self, request: Request) -> None:
+        type_ = request.message.mission_type
+        items = self._items(type_, request.to, request.vehicle)
+        key = _download(request)
         self._downloads.pop(key, None)
         if len(self._downloads) >= MOST_DOWNLOADS:
             del self._downloads[next(iter(self._downloads))]
         self._downloads[key] = items
-        made = message_type("MISSION_COUNT").make(
-            target_system=frame.source.system,
-            target_component=frame.source.component,
-            count=len(items),
-            mission_type=type_,
-        )
-        station.send(made, vehicle.autopilot)
+        make = message_type("MISSION_COUNT").make
+        request.answer(make(**request.to, count=len(items), mission_type=type_))
 
-    def _send_item(
-        self, message: Message, frame: RawFrame, station: Station, vehicle: ShownVehicle
-    ) -> None:
-        key = station.name, frame.source, vehicle.system, message.mission_type
-        items = self._downloads.get(key)
+    def _send_item(self, request: Request) -> None:
+        items = self._downloads.get(_download(request))
         if items is None:
-            items = self._items(message.mission_type, frame.source, vehicle)
-        if message.seq < len(items):
-            station.send(items[message.seq], vehicle.autopilot)
+            items = self._items(request.message.mission_type, request.to, request.vehicle)
+        if request.message.seq < len(items):
+            request.answer(items[request.message.seq])
         else:
-            result = dialect.MAV_MISSION_INVALID_SEQUENCE
-            self._acknowledge(result, message, frame, station, vehicle)
+            _acknowledge(request, dialect.MAV_MISSION_INVALID_SEQUENCE)
 
-    def _refuse_upload(
-        self, message: Message, frame: RawFrame, station: Station, vehicle: ShownVehicle
-    ) -> None:
-        self._acknowledge(dialect.MAV_MISSION_DENIED, message, frame, station, vehicle)
-        self._say(station, vehicle, "the plan is read-only here: missions are m2pem's")
+    def _refuse_upload(self, request: Request) -> None:
+        _acknowledge(request, dialect.MAV_MISSION_DENIED)
+        text = "the plan is read-only here: missions are m2pem's"
+        self._say(request.station, request.vehicle, text)
 
-    @staticmethod
-    def _acknowledge(
-        result: int, message: Message, frame: RawFrame, station: Station, vehicle: ShownVehicle
-    ) -> None:
-        made = message_type("MISSION_ACK").make(
-            target_system=frame.source.system,
-            target_component=frame.source.component,
-            type=result,
-            mission_type=getattr(message, "mission_type", MISSION),
-        )
-        station.send(made, vehicle.autopilot)
-
-    def _items(self, type_: int, to: Address, vehicle: ShownVehicle) -> list[Message]:
+    def _items(self, type_: int, to: dict[str, int], vehicle: ShownVehicle) -> list[Message]:
         if type_ == MISSION:
             current = vehicle.plan.current
             return [
@@ -317,22 +281,32 @@ class Requests:
         return []
 
 
-def refuse_file(message: Message, frame: RawFrame, station: Station, source: Address) -> None:
-    """Answer FILE_TRANSFER_PROTOCOL in the name of a component: there are no files."""
-    if (payload := refusal_of_ftp(bytes(message.payload))) is not None:
-        system, component = frame.source
-        to = {"target_system": system, "target_component": component}
-        station.send(message._replace(payload=tuple(payload), **to), source)
+def refusal_of_files(message: Message, to: Address) -> Message | None:
+    """Return the answer to FILE_TRANSFER_PROTOCOL: there are no files; None: it asks nothing."""
+    payload = refusal_of_ftp(bytes(message.payload))
+    if payload is None:
+        return None
+    answer: Message = message._replace(payload=tuple(payload), **addressed(to))
+    return answer
+
+
+def _download(request: Request) -> tuple[str, Address, int, int]:
+    vehicle, type_ = request.vehicle, request.message.mission_type
+    return request.station.name, request.source, vehicle.system, type_
+
+
+def _acknowledge(request: Request, result: int) -> None:
+    type_ = getattr(request.message, "mission_type", MISSION)
+    request.answer(message_type("MISSION_ACK").make(**request.to, type=result, mission_type=type_))
 
 
 def _whole(value: float) -> int:
     return int(value) if math.isfinite(value) else -1
 
 
-def _waypoint(number: int, item: Item, is_current: bool, to: Address) -> Message:
+def _waypoint(number: int, item: Item, is_current: bool, to: dict[str, int]) -> Message:
     made: Message = message_type("MISSION_ITEM_INT").make(
-        target_system=to.system,
-        target_component=to.component,
+        **to,
         seq=number,
         frame=item.frame,
         command=dialect.MAV_CMD_NAV_WAYPOINT,
@@ -347,10 +321,9 @@ def _waypoint(number: int, item: Item, is_current: bool, to: Address) -> Message
     return made
 
 
-def _corner(number: int, corner: LatLon, corners: int, command: int, to: Address) -> Message:
+def _corner(number: int, corner: LatLon, corners: int, command: int, to: dict[str, int]) -> Message:
     made: Message = message_type("MISSION_ITEM_INT").make(
-        target_system=to.system,
-        target_component=to.component,
+        **to,
         seq=number,
         frame=dialect.MAV_FRAME_GLOBAL_INT,
         command=command,

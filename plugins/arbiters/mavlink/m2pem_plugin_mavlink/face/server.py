@@ -33,7 +33,7 @@ from m2pem_plugin_mavlink.face.events import Events
 from m2pem_plugin_mavlink.face.forwarding import COMMAND_INT, COMMAND_LONG, Forwarder
 from m2pem_plugin_mavlink.face.orders import DENIED, Orders, acknowledgement, name_of
 from m2pem_plugin_mavlink.face.received_messages import MessageReceiver
-from m2pem_plugin_mavlink.face.requests import Requests, refuse_file
+from m2pem_plugin_mavlink.face.requests import Request, Requests, refusal_of_files
 from m2pem_plugin_mavlink.face.sent_messages import MessageSender
 from m2pem_plugin_mavlink.face.settings import Settings, own_system
 from m2pem_plugin_mavlink.face.stations import Station, Stations
@@ -229,7 +229,7 @@ class FaceServer:
         type_ = types_by_id().get(frame.id)
         if type_ is not None and frame.id in _CLOCK_REQUESTS:
             message = type_.unpack(frame.payload)
-            self._requests.clock(message, frame, station, self._vehicles.values())
+            self._requests.clock(message, frame.source, station, self._vehicles.values())
             return
         vehicle = self._by_system.get(frame.target.system)
         if type_ is None or vehicle is None or frame.id in _NO_REQUEST:
@@ -255,7 +255,7 @@ class FaceServer:
             else:
                 if order is not None:
                     self._orders.target(order, frame, station, vehicle)
-        elif not self._requests.message(message, frame, station, vehicle):
+        elif not self._requests.message(Request(message, frame.source, station, vehicle)):
             self._tell(station, vehicle, f"{type_.name} is not carried out")
 
     def _command(
@@ -308,7 +308,8 @@ class FaceServer:
             answer = acknowledgement(message.command, DENIED, frame.source)
             station.send(answer, Address(system, frame.target.component or AUTOPILOT))
         if frame.id == FILE_TRANSFER and frame.target.system and message is not None:
-            refuse_file(message, frame, station, Address(system, frame.target.component))
+            if (refusal := refusal_of_files(message, frame.source)) is not None:
+                station.send(refusal, Address(system, frame.target.component or AUTOPILOT))
         elif frame.target.system and frame.id != DATA_STREAM:  # MAVProxy sends it every 10 s
             what = message.TYPE.name if message is not None else f"message {frame.id}"
             self._tell_as(
