@@ -120,12 +120,12 @@ def current_mode(mode: Mode) -> Message:
     return made
 
 
-def renumbered(message: Message, type_: int) -> Message:
-    """Return HEARTBEAT, CURRENT_MODE or AVAILABLE_MODES with ArduPilot's number of the mode for a
-    MAV_TYPE; that of GUIDED where it has no such mode."""
-    modes = _ardupilot(type_)
-    number = modes.for_purpose(BY_NUMBER[message.custom_mode].purpose)
+def renumbered(heartbeat: Message) -> Message:
+    """Return a HEARTBEAT with ArduPilot's number of the mode; GUIDED's, if it has no such mode."""
+    mode, modes = BY_NUMBER.get(heartbeat.custom_mode), _ardupilot(heartbeat.type)
+    if mode is None:
+        return heartbeat  # of a camera
+    number = modes.for_purpose(mode.purpose)
     number = modes.number("GUIDED") if number is None else number
-    fields = ("custom_mode", "intended_custom_mode")
-    made: Message = message._replace(**{name: number for name in fields if hasattr(message, name)})
+    made: Message = heartbeat._replace(custom_mode=number)
     return made

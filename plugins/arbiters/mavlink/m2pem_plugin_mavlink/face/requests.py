@@ -12,8 +12,8 @@ from m2pem_plugin_mavlink.face import modes
 from m2pem_plugin_mavlink.face.commands import Command
 from m2pem_plugin_mavlink.face.components import CAMERA_MAKERS
 from m2pem_plugin_mavlink.face.plan import Item
-from m2pem_plugin_mavlink.face.stations import Station
-from m2pem_plugin_mavlink.face.streams import HEARTBEAT, Streams, is_known, messages_of
+from m2pem_plugin_mavlink.face.stations import HEARTBEAT, Station
+from m2pem_plugin_mavlink.face.streams import Streams, is_known, messages_of
 from m2pem_plugin_mavlink.face.telemetry import heartbeat
 from m2pem_plugin_mavlink.face.vehicle import Camera, ShownVehicle
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
@@ -50,11 +50,6 @@ class Request:
     def answer(self, message: Message) -> None:
         """Send a message of the vehicle to the sender."""
         self.station.send(message, self.vehicle.autopilot)
-
-    @property
-    def to(self) -> dict[str, int]:
-        """The fields of an answer that address it to the sender."""
-        return addressed(self.source)
 
 
 def addressed(to: Address) -> dict[str, int]:
@@ -144,11 +139,13 @@ class Requests:
                 return UNSUPPORTED
             station.send(make(camera), Address(vehicle.system, camera.component))
             return ACCEPTED
+        if station.ardupilot_modes and id_ in (modes.AVAILABLE_MODES, modes.CURRENT_MODE):
+            return UNSUPPORTED  # they have PX4's numbers
         if id_ == modes.AVAILABLE_MODES:
             return self._send_modes(_whole(command.params[1]), station, vehicle)
         if not is_known(id_):
             return UNSUPPORTED
-        found = messages_of(vehicle, id_, station.ardupilot_modes)
+        found = messages_of(vehicle, id_)
         for message, source in found:
             station.send(message, source)
         return ACCEPTED if found else DENIED
@@ -157,10 +154,7 @@ class Requests:
         if not 0 <= index <= len(modes.MODES):
             return DENIED
         for each in [index] if index else range(1, len(modes.MODES) + 1):
-            made = modes.available_mode(each)
-            if station.ardupilot_modes:
-                made = modes.renumbered(made, vehicle.type)
-            station.send(made, vehicle.autopilot)
+            station.send(modes.available_mode(each), vehicle.autopilot)
         return ACCEPTED
 
     def _set_interval(
@@ -234,7 +228,9 @@ class Requests:
         else:
             error = dialect.MAV_PARAM_ERROR_DOES_NOT_EXIST
             make = message_type("PARAM_ERROR").make
-            request.answer(make(**request.to, param_id=name, param_index=index, error=error))
+            request.answer(
+                make(**addressed(request.source), param_id=name, param_index=index, error=error)
+            )
 
     def _set_parameter(self, request: Request) -> None:
         index = _index_of(request.message.param_id)
@@ -246,19 +242,21 @@ class Requests:
 
     def _list_items(self, request: Request) -> None:
         type_ = request.message.mission_type
-        items = self._items(type_, request.to, request.vehicle)
+        items = self._items(type_, addressed(request.source), request.vehicle)
         key = _download(request)
         self._downloads.pop(key, None)
         if len(self._downloads) >= MOST_DOWNLOADS:
             del self._downloads[next(iter(self._downloads))]
         self._downloads[key] = items
         make = message_type("MISSION_COUNT").make
-        request.answer(make(**request.to, count=len(items), mission_type=type_))
+        request.answer(make(**addressed(request.source), count=len(items), mission_type=type_))
 
     def _send_item(self, request: Request) -> None:
         items = self._downloads.get(_download(request))
         if items is None:
-            items = self._items(request.message.mission_type, request.to, request.vehicle)
+            items = self._items(
+                request.message.mission_type, addressed(request.source), request.vehicle
+            )
         if request.message.seq < len(items):
             request.answer(items[request.message.seq])
         else:
@@ -297,7 +295,11 @@ def _download(request: Request) -> tuple[str, Address, int, int]:
 
 def _acknowledge(request: Request, result: int) -> None:
     type_ = getattr(request.message, "mission_type", MISSION)
-    request.answer(message_type("MISSION_ACK").make(**request.to, type=result, mission_type=type_))
+    request.answer(
+        message_type("MISSION_ACK").make(
+            **addressed(request.source), type=result, mission_type=type_
+        )
+    )
 
 
 def _whole(value: float) -> int:

@@ -8,7 +8,10 @@ import asyncio
 import logging
 from collections.abc import Callable, Iterable, Iterator, Sequence, Set
 
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
 from m2pem.errors import PluginError
+from m2pem_plugin_mavlink.face import modes
 from m2pem_plugin_mavlink.link.endpoint import Endpoint
 from m2pem_plugin_mavlink.link.hub import endpoint_kind
 from m2pem_plugin_mavlink.link.route import Peer
@@ -23,6 +26,7 @@ MOST_ADDRESSES = 32
 FRAMES_PER_S = 400.0
 MOST_FRAMES_AT_ONCE = 800.0
 MAINTAIN_S = 1.0
+HEARTBEAT: int = dialect.MAVLINK_MSG_ID_HEARTBEAT
 
 _logger = logging.getLogger(__name__)
 
@@ -72,6 +76,8 @@ class Station:
 
     def send(self, message: Message, source: Address) -> None:
         """Send a message; a station that does not read loses it."""
+        if self.ardupilot_modes and message.TYPE.id == HEARTBEAT:
+            message = modes.renumbered(message)
         self.peer.send(message, source)
 
 

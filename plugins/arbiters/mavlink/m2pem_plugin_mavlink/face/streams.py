@@ -5,12 +5,9 @@ import heapq
 from collections.abc import Callable, Mapping, Sequence
 from itertools import count
 
-from pymavlink.dialects.v20 import ardupilotmega as dialect
-
-from m2pem_plugin_mavlink.face import modes
 from m2pem_plugin_mavlink.face.components import GIMBAL_MAKERS, camera_heartbeat
 from m2pem_plugin_mavlink.face.settings import FASTEST_HZ
-from m2pem_plugin_mavlink.face.stations import Station, Stations
+from m2pem_plugin_mavlink.face.stations import HEARTBEAT, Station, Stations
 from m2pem_plugin_mavlink.face.telemetry import MAKERS
 from m2pem_plugin_mavlink.face.vehicle import ShownVehicle
 from m2pem_plugin_mavlink.link.route import Peer
@@ -23,22 +20,16 @@ SENT_AT_ONCE = 64
 MOST_INTERVALS = 256
 """Most intervals of its own that a station may set."""
 
-HEARTBEAT: int = dialect.MAVLINK_MSG_ID_HEARTBEAT
 SHORTEST_S = 1 / FASTEST_HZ
 LONGEST_S = 3600.0
 
 _Entry = tuple[float, int, Station | None, ShownVehicle, int]
 
 
-def messages_of(
-    vehicle: ShownVehicle, id_: int, ardupilot_modes: bool
-) -> list[tuple[Message, Address]]:
-    """Return the messages of an id that a vehicle's components send now, with their senders.
-    `ardupilot_modes`: modes have ArduPilot's numbers, not PX4's."""
+def messages_of(vehicle: ShownVehicle, id_: int) -> list[tuple[Message, Address]]:
+    """Return the messages of an id that a vehicle's components send now, with their senders."""
     found: list[tuple[Message, Address]] = []
     if (maker := MAKERS.get(id_)) is not None and (message := maker(vehicle)) is not None:
-        if ardupilot_modes and id_ in (HEARTBEAT, modes.CURRENT_MODE):
-            message = modes.renumbered(message, vehicle.type)
         found.append((message, vehicle.autopilot))
     if id_ == HEARTBEAT:
         for camera in vehicle.cameras:
@@ -149,12 +140,10 @@ class Streams:
         if not interval_s:
             return
         if vehicle.present(now_s) and stations:
-            for ardupilot_modes in {each.ardupilot_modes for each in stations}:
-                for message, source in messages_of(vehicle, id_, ardupilot_modes):
-                    for each in stations:
-                        if each.ardupilot_modes is ardupilot_modes:
-                            each.send(message, source)
-                            self._sent += 1
+            for message, source in messages_of(vehicle, id_):
+                for each in stations:
+                    each.send(message, source)
+                    self._sent += 1
         if self._sent >= SENT_AT_ONCE:
             self._sent = 0
             await asyncio.sleep(0)
