@@ -16,9 +16,11 @@ from mavsdk.asyncio.plugins.action import ActionAsync
 from mavsdk.asyncio.plugins.camera import CameraAsync
 from mavsdk.asyncio.plugins.gimbal import GimbalAsync
 from mavsdk.asyncio.plugins.mission_raw import MissionRawAsync
+from mavsdk.asyncio.plugins.offboard import OffboardAsync
 from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
 from mavsdk.plugins.action import ActionError, ActionResult
 from mavsdk.plugins.mission_raw import MissionRawError
+from mavsdk.plugins.offboard import OffboardError, VelocityNedYaw
 from mavsdk.plugins.telemetry import FlightMode
 
 from m2pem.api import distance_m
@@ -155,6 +157,19 @@ def test_mavsdk_flies_a_copter_of_another_arbiter(tmp_path: Path) -> None:
         await action.land()
         await first(telemetry.subscribe_flight_mode(), lambda each: each is FlightMode.LAND)
         await first(telemetry.subscribe_position(), lambda each: each.relative_altitude_m < 0.5)
+
+    fleet_on(tmp_path, main, commands="all")
+
+
+def test_mavsdks_offboard_is_refused_and_does_not_send_a_copter_home(tmp_path: Path) -> None:
+    """MAVSDK 4.1 sets PX4's main mode 6, which is the number of RTL for ArduPilot's copters."""
+
+    async def main(control: Any, sdk: Client) -> None:
+        offboard = sdk.plugin(OffboardAsync, UAV1)
+        await offboard.set_velocity_ned(VelocityNedYaw(1.0, 0.0, 0.0, 0.0))
+        with pytest.raises(OffboardError, match="COMMAND_DENIED"):
+            await offboard.start()
+        assert not await control.runs()
 
     fleet_on(tmp_path, main, commands="all")
 

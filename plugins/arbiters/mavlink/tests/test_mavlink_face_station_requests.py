@@ -235,7 +235,10 @@ def test_pymavlink_sets_modes_by_the_names_that_it_gives_them(
     asyncio.run(main())
 
 
-def test_a_station_that_asks_for_data_streams_reads_the_modes_of_ardupilot(tmp_path: Path) -> None:
+@pytest.mark.parametrize("asks_for", ["streams", "parameters"])
+def test_a_station_that_asks_as_those_of_ardupilot_do_reads_its_modes(
+    tmp_path: Path, asks_for: str
+) -> None:
     async def main() -> None:
         async with (
             gateway(tmp_path, fleet=FLEET + BOAT) as (_, port),
@@ -244,10 +247,21 @@ def test_a_station_that_asks_for_data_streams_reads_the_modes_of_ardupilot(tmp_p
         ):
             for system, name in ((ROVER1, "HOLD"), (UAV1, "BRAKE"), (4, "LOITER")):
                 await station.hears("HEARTBEAT", of(system))
-                station.mav.request_data_stream_send(system, 1, 0, 4, 1)
+                if asks_for == "streams":
+                    station.mav.request_data_stream_send(system, 1, 0, 4, 1)
+                else:
+                    ask = ftp_request(1, 7, 4)[:12] + b"@PARAM/param.pck?withdefaults=1"
+                    station.mav.file_transfer_protocol_send(0, system, 1, ask.ljust(251, b"\0"))
+                    await station.hears("FILE_TRANSFER_PROTOCOL", of(system))
                 since = len(station.received)
-                beat = await station.hears("HEARTBEAT", of(system), since)
-                assert mavutil.mode_string_v10(beat) == name
+                await station.hears(
+                    "HEARTBEAT",
+                    lambda each: of(system)(each) and mavutil.mode_string_v10(each) == name,  # noqa: B023
+                    since,
+                )
+                request, available_modes = dialect.MAV_CMD_REQUEST_MESSAGE, 435
+                assert await station.command(system, request, available_modes) == 3
+                assert await other.command(system, request, available_modes) == 0
                 beats = [each for each in other.received if each.get_type() == "HEARTBEAT"]
                 px4_hold = 4 << 16 | 3 << 24
                 assert {each.custom_mode for each in beats if each.type != 30} == {px4_hold}

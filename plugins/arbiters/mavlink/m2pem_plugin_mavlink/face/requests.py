@@ -207,6 +207,8 @@ class Requests:
 
     @staticmethod
     def _refuse_file(request: Request) -> None:
+        # MAVProxy asks for ArduPilot's parameters 1 s after it meets a vehicle, for streams 15 s.
+        request.station.ardupilot_modes |= b"@PARAM" in bytes(request.message.payload)
         if (answer := refusal_of_files(request.message, request.source)) is not None:
             request.answer(answer)
 
