@@ -3,7 +3,7 @@
 import asyncio
 import logging
 from collections import OrderedDict
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -112,6 +112,7 @@ class FaceServer:
         self._cameras: dict[ResourceId, Camera] = {
             camera.resource: camera for each in self._vehicles.values() for camera in each.cameras
         }
+        self._types = ExitStack()
         self._said: OrderedDict[tuple[Peer, int, str], float] = OrderedDict()
         systems = frozenset(self._settings.systems.values())
         self._stations = Stations(self._settings.urls, systems, self._receive)
@@ -175,6 +176,7 @@ class FaceServer:
                     group.create_task(sender.run(self._thrown, sent))
         finally:
             shared_hub().link_watchers.remove(self._watch_type)
+            self._types.close()
             self._receiver.close()
             self._forwarder.close()
             await self._orders.close()
@@ -188,7 +190,7 @@ class FaceServer:
             if vehicle is not None and sender == link.address:
                 vehicle.type = message.type
 
-        link.listen({dialect.MAVLINK_MSG_ID_HEARTBEAT}, learn)
+        self._types.callback(link.listen({dialect.MAVLINK_MSG_ID_HEARTBEAT}, learn))
 
     async def _announce_holders(self) -> None:
         """Announce the stations that have vehicles as present, for as long as they are received."""
