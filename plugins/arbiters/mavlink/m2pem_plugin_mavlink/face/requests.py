@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from m2pem.api import Area, Fleet, LatLon
+from m2pem.api import Area, Fleet
 from m2pem_plugin_mavlink.face import modes
 from m2pem_plugin_mavlink.face.commands import Command
 from m2pem_plugin_mavlink.face.components import CAMERA_MAKERS
@@ -27,6 +27,7 @@ TEMPORARILY_REJECTED: int = dialect.MAV_RESULT_TEMPORARILY_REJECTED
 MISSION, FENCE = 0, 1
 """MAV_MISSION_TYPE."""
 
+GLOBAL_INT: int = dialect.MAV_FRAME_GLOBAL_INT
 KEEP_IN: int = dialect.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION
 KEEP_OUT: int = dialect.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION
 
@@ -80,7 +81,7 @@ class Requests:
         self._say = say
         area = fleet.geometries.get(fleet.fence)
         self._fence = [
-            (corner[:2], len(ring) - 1, KEEP_OUT if hole else KEEP_IN)
+            (Item(*corner[:2], 0.0, GLOBAL_INT), len(ring) - 1, KEEP_OUT if hole else KEEP_IN)
             for hole, ring in enumerate(area.rings if isinstance(area, Area) else ())
             for corner in ring[:-1]
         ]
@@ -271,13 +272,16 @@ class Requests:
 
     def _items(self, type_: int, to: dict[str, int], vehicle: ShownVehicle) -> list[Message]:
         if type_ == MISSION:
-            current = vehicle.plan.current
+            plan, command = vehicle.plan, dialect.MAV_CMD_NAV_WAYPOINT
             return [
-                _waypoint(number, item, number == current, to)
-                for number, item in enumerate(vehicle.plan.items)
+                _item(number, command, item, **to, param4=math.nan, current=number == plan.current)
+                for number, item in enumerate(plan.items)
             ]
         if type_ == FENCE:
-            return [_corner(number, *each, to) for number, each in enumerate(self._fence)]
+            return [
+                _item(number, command, item, **to, param1=corners, mission_type=FENCE)
+                for number, (item, corners, command) in enumerate(self._fence)
+            ]
         return []
 
 
@@ -308,34 +312,16 @@ def _whole(value: float) -> int:
     return int(value) if math.isfinite(value) else -1
 
 
-def _waypoint(number: int, item: Item, is_current: bool, to: dict[str, int]) -> Message:
+def _item(number: int, command: int, item: Item, **fields: float) -> Message:
     made: Message = message_type("MISSION_ITEM_INT").make(
-        **to,
         seq=number,
+        command=command,
         frame=item.frame,
-        command=dialect.MAV_CMD_NAV_WAYPOINT,
-        current=is_current,
         autocontinue=1,
-        param4=math.nan,
         x=round(item.latitude_deg * 1e7),
         y=round(item.longitude_deg * 1e7),
         z=item.altitude_m,
-        mission_type=MISSION,
-    )
-    return made
-
-
-def _corner(number: int, corner: LatLon, corners: int, command: int, to: dict[str, int]) -> Message:
-    made: Message = message_type("MISSION_ITEM_INT").make(
-        **to,
-        seq=number,
-        frame=dialect.MAV_FRAME_GLOBAL_INT,
-        command=command,
-        autocontinue=1,
-        param1=corners,
-        x=round(corner[0] * 1e7),
-        y=round(corner[1] * 1e7),
-        mission_type=FENCE,
+        **fields,
     )
     return made
 
