@@ -177,6 +177,7 @@ if TYPE_CHECKING:
     from m2pem.fleet.fleet import Fleet
     from m2pem.geo.cameras import KNOWN_CAMERAS, ImagePlan, SurveyCamera, image_plan
     from m2pem.geo.fence import Fence
+    from m2pem.geo.geoid import ellipsoidal_m, mean_sea_level_m, undulation_m
     from m2pem.geo.geojson import GeometryError, as_geojson, kind_of, parse_geojson
     from m2pem.geo.geometry_files import (
         READ_SUFFIXES,
@@ -312,6 +313,7 @@ _MODULES = {
     "m2pem.fleet.endurance": "lasts_s",
     "m2pem.fleet.approval": "file_digest person_of",
     "m2pem.fleet.fleet": "Fleet",
+    "m2pem.geo.geoid": "ellipsoidal_m mean_sea_level_m undulation_m",
     "m2pem.geo.geojson": "GeometryError as_geojson kind_of parse_geojson",
     "m2pem.geo.geometry_files": (
         "FileFormat FileProblem GeometryFile NamedGeometry READ_SUFFIXES read_geometry_file"
@@ -552,11 +554,13 @@ __all__ = [
     "distance_m",
     "convex_hull",
     "edges_enclose",
+    "ellipsoidal_m",
     "encode_parameters",
     "follow",
     "lawn_mower",
     "listening_check",
     "longest_edge_yaw",
+    "mean_sea_level_m",
     "middle_of",
     "offset",
     "parse_geojson",
@@ -569,6 +573,7 @@ __all__ = [
     "simulator_group",
     "strip_width_m",
     "trace_ids",
+    "undulation_m",
     "worst_first",
 ]
 
