@@ -6,7 +6,7 @@ from pathlib import Path
 from m2pem.findings import Severity, unreadable_remedy
 from m2pem.geo.csv_waypoints import parse_csv
 from m2pem.geo.file_text import decoded, parsed_json
-from m2pem.geo.geojson import GeometryError, kind_of, parse_geojson
+from m2pem.geo.geojson import GeometryError, is_wgs84, kind_of, parse_geojson
 from m2pem.geo.geometry_files import read_geometry_file
 from m2pem.geo.qgroundcontrol import parse_plan, parse_waypoints
 from m2pem.mission.geometry import Area, Point, Route
@@ -60,6 +60,8 @@ def _read(path: Path, kind: str) -> Point | Route | Area:
     value = parsed_json(text)
     if not isinstance(value, Mapping):
         raise GeometryError("a JSON object is expected")
+    if path.suffix.lower() in (".geojson", ".json") and not is_wgs84(value.get("crs")):
+        return _only_one(path, content, kind)
     if path.suffix.lower() == ".plan":
         return parse_plan(value, area=kind == "area")
     return parse_geojson(value)

@@ -6,6 +6,7 @@ route's property `"speeds_m_s"` has a speed or null for each position (`Route.sp
 """
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -104,9 +105,18 @@ def check_crs(value: Mapping[str, Any]) -> None:
     Raises:
         GeometryError: it does.
     """
-    crs = value.get("crs")
-    if crs is not None and not any(name in str(crs) for name in ("CRS84", "4326", "4979")):
+    if not is_wgs84(value.get("crs")):
         raise GeometryError("its 'crs' is not WGS-84; export it as WGS-84 longitude and latitude")
+
+
+def is_wgs84(crs: object) -> bool:
+    """Whether a member `crs` of GeoJSON of 2008 says longitude and latitude of WGS-84, or nothing.
+
+    With heights above the ellipsoid (EPSG:4979, CRS84h) it is another system.
+    """
+    properties = crs.get("properties") if isinstance(crs, Mapping) else None
+    names = properties.values() if isinstance(properties, Mapping) else ()
+    return crs is None or any(re.search(r"(^|\W)(CRS84|4326)$", str(name)) for name in names)
 
 
 def with_speeds(geometry: Point | Route | Area, value: object) -> Point | Route | Area:

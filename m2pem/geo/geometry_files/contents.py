@@ -71,6 +71,7 @@ class Contents:
         self._names: set[str] = set()
         self._problems: list[FileProblem] = []
         self._untold = 0
+        self._has_error = False
         self._positions = 0
 
     @contextmanager
@@ -94,26 +95,35 @@ class Contents:
                 f"is beyond the first {MAX_FEATURES} features", "split the file"
             )
         count = _count(geometry)
-        if self._positions + count > MAX_POSITIONS:
+        self.expect(count)
+        self._positions += count
+        self._geometries.append(NamedGeometry(self._unique(name, geometry), geometry))
+
+    def expect(self, positions: int) -> None:
+        """Refuse that many positions more before the work of reading them.
+
+        Raises:
+            GeometryError: the file has too many.
+        """
+        if self._positions + positions > MAX_POSITIONS:
             raise FeatureProblemError(
                 f"the file has more than {MAX_POSITIONS:,} positions", "simplify its lines"
             )
-        self._positions += count
-        self._geometries.append(NamedGeometry(self._unique(name, geometry), geometry))
 
     def warn(self, feature: str, message: str, remedy: str = "") -> None:
         """Add a warning: the feature was read, and something of it was not kept."""
         self._note(FileProblem(Severity.WARNING, feature, message, remedy))
 
     def _note(self, problem: FileProblem) -> None:
+        self._has_error = self._has_error or problem.severity is Severity.ERROR
         if len(self._problems) < MAX_PROBLEMS:
             self._problems.append(problem)
         else:
             self._untold += 1
 
     def whole(self) -> GeometryFile:
-        """Return what was collected. A file without geometry and problem is a problem."""
-        if not self._geometries and not self._problems:
+        """Return what was collected. A file of which nothing could be read has an error."""
+        if not self._geometries and not self._has_error:
             self._problems.append(
                 FileProblem(
                     Severity.ERROR,

@@ -1,17 +1,24 @@
 """GeoJSON (RFC 7946) with any number of features."""
 
 import json
+import re
 from collections.abc import Mapping, Sequence
-from typing import Any
+from itertools import islice
+from typing import TYPE_CHECKING, Any
 
 from m2pem.geo.file_text import decoded, parsed_json
-from m2pem.geo.geojson import GeometryError, as_geojson, check_crs, parse_geojson
-from m2pem.geo.geometry_files.contents import Contents, NamedGeometry
+from m2pem.geo.geojson import GeometryError, as_geojson, check_crs, is_wgs84, parse_geojson
+from m2pem.geo.geometry_files.contents import MAX_POSITIONS, Contents, NamedGeometry
+
+if TYPE_CHECKING:
+    from m2pem.geo.geometry_files.reference_system import ReferenceSystem
 
 MAX_DEPTH = 10
 """How deep collections of geometries may nest."""
 
 _PARTS = {"MultiLineString": "LineString", "MultiPolygon": "Polygon"}
+_NUMBER = r"\s*+-?\d[\d.eE+-]*+\s*+"
+_POSITION = re.compile(rf"\[{_NUMBER},{_NUMBER}(?:,{_NUMBER})?\]")
 _NAME_KEYS = ("name", "Name", "NAME", "title", "label", "id", "ID")
 
 
@@ -21,12 +28,28 @@ def read_geojson(content: bytes, contents: Contents) -> None:
     Raises:
         GeometryError: it is not GeoJSON.
     """
-    value = parsed_json(decoded(content))
+    text = decoded(content)
+    # Before they are parsed: half a million positions are 150 MB of lists.
+    contents.expect(sum(1 for _ in islice(_POSITION.finditer(text), MAX_POSITIONS + 1)))
+    value = parsed_json(text)
     if not isinstance(value, Mapping) or not isinstance(value.get("type"), str):
         raise GeometryError("is not GeoJSON: an object with 'type' is expected")
-    check_crs(value)
+    if not is_wgs84(value.get("crs")):
+        # Loaded when needed: every command line reads fleets, few files have another system.
+        from m2pem.geo.geometry_files.reference_system import system_of_geojson  # noqa: PLC0415
+
+        system = system_of_geojson(value["crs"])
+        _read_value({**value, "crs": None}, contents, system)
+        system.warn_of_accuracy(contents, "")
+    else:
+        _read_value(value, contents, None)
+
+
+def _read_value(
+    value: Mapping[str, Any], contents: Contents, system: "ReferenceSystem | None"
+) -> None:
     if value["type"] != "FeatureCollection":
-        read_feature(value, "", contents)
+        read_feature(value, "", contents, system)
         return
     features = value.get("features")
     if not isinstance(features, list):
@@ -34,20 +57,32 @@ def read_geojson(content: bytes, contents: Contents) -> None:
     for index, feature in enumerate(features):
         where = f"features[{index}]"
         name = _name(feature)
-        read_feature(feature, f"{where} {name!r}" if name else where, contents)
+        read_feature(feature, f"{where} {name!r}" if name else where, contents, system)
 
 
-def read_feature(feature: object, where: str, contents: Contents) -> None:
-    """Collect the geometries of a Feature, or of a geometry alone; problems are of `where`."""
+def read_feature(
+    feature: object, where: str, contents: Contents, system: "ReferenceSystem | None" = None
+) -> None:
+    """Collect the geometries of a Feature, or of a geometry alone; problems are of `where`.
+
+    `system`: that of its positions, if it is not WGS 84.
+    """
     with contents.feature(where):
         if not isinstance(feature, Mapping):
             raise GeometryError("is not GeoJSON: an object with 'type' is expected")
+        check_crs(feature)
         is_feature = feature.get("type") == "Feature"
         geometry = feature.get("geometry") if is_feature else feature
         properties = feature.get("properties") if is_feature else None
         if geometry is None:
             raise GeometryError("has no geometry")
         parts = _parts(geometry)
+        if system is not None:
+            given = properties if isinstance(properties, Mapping) else {}
+            frame = str(given.get("altitude_frame") or "")
+            parts = [_in_wgs84(part, system, frame) for part in parts]
+            if system.has_heights and not frame:
+                properties = {**given, "altitude_frame": "amsl"}
         read = [
             parse_geojson({"type": "Feature", "properties": properties, "geometry": part})
             for part in parts
@@ -83,6 +118,32 @@ def _parts(geometry: object, depth: int = 0) -> list[Any]:
             raise GeometryError("coordinates: a list is expected")
         return [{"type": _PARTS[str(kind)], "coordinates": member} for member in members]
     return [geometry]
+
+
+def _in_wgs84(part: object, system: "ReferenceSystem", frame: str) -> object:
+    """Return a single geometry in WGS 84; what is no geometry, as it is."""
+
+    def converted(value: Any, depth: int = 0) -> Any:
+        lists = (
+            [each for each in value if isinstance(each, list)] if isinstance(value, list) else []
+        )
+        if not lists:
+            return system.to_wgs84([_position(value)], frame)[0]
+        if depth < MAX_DEPTH and any(isinstance(each, list) for each in lists[0]):
+            return [converted(each, depth + 1) for each in value]
+        return system.to_wgs84([_position(each) for each in value], frame)
+
+    if not isinstance(part, Mapping) or "coordinates" not in part:
+        return part
+    return {**part, "coordinates": converted(part["coordinates"])}
+
+
+def _position(value: object) -> tuple[float, float, float | None]:
+    given = value if isinstance(value, list) else []
+    numbers = [each for each in given if isinstance(each, int | float) and abs(each) < 1e300]
+    if len(numbers) != len(given) or not 2 <= len(given) <= 3:
+        raise GeometryError(f"coordinates: {str(value)[:40]} is no position")
+    return (float(numbers[0]), float(numbers[1]), float(numbers[2]) if numbers[2:] else None)
 
 
 def _name(feature: object) -> str:

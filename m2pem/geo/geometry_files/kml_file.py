@@ -5,52 +5,73 @@ An altitude above home, which KML does not have, is written as above ground, and
 """
 
 import json
-import re
 from collections.abc import Iterator, Sequence
-from io import BytesIO
-from typing import TypeAlias
+from itertools import islice
+from posixpath import dirname, join, normpath
+from urllib.parse import unquote
 
 from lxml import etree
 
 from m2pem.geo.file_text import parsed_json
-from m2pem.geo.geojson import (
-    ALTITUDE_FRAMES,
-    SPEEDS,
-    GeometryError,
-    checked,
-    coordinate,
-    with_speeds,
-)
+from m2pem.geo.geojson import ALTITUDE_FRAMES, SPEEDS, GeometryError, checked, with_speeds
 from m2pem.geo.geometry_files.archive import archive_of, member
-from m2pem.geo.geometry_files.contents import Contents, FeatureProblemError, NamedGeometry
+from m2pem.geo.geometry_files.contents import (
+    MAX_POSITIONS,
+    Contents,
+    FeatureProblemError,
+    NamedGeometry,
+)
+from m2pem.geo.geometry_files.kml_elements import (
+    POSITION,
+    Element,
+    child_text,
+    coordinates,
+    kml_root,
+    local_name,
+    position,
+)
+from m2pem.geo.geometry_files.wpml import has_waylines, read_waylines
 from m2pem.mission.geometry import Area, Coordinate, Point, Route
 
 _KML = "http://www.opengis.net/kml/2.2"
 _FRAME_OF = {"relativeToGround": "terrain", "absolute": "amsl"}
 _CLAMPED = frozenset({"", "clampToGround", "clampToSeaFloor"})
 _MODE_OF = {"relative": "relativeToGround", "terrain": "relativeToGround", "amsl": "absolute"}
-_SPACE_AFTER_COMMA = re.compile(r",\s+")
-_SPACE_BEFORE_COMMA = re.compile(r"(?<!\s)\s+,")
-"""Begins only where the space does: otherwise the time grows with the square of its length."""
 _PARTS = ("MultiGeometry", "MultiTrack")
-_SINGLE = ("Point", "LineString", "LinearRing", "Polygon", "Track", *_PARTS)
-_ELSEWHERE = ("NetworkLink", "GroundOverlay", "PhotoOverlay")
-
-Element: TypeAlias = etree._Element
+_SINGLE = ("Point", "LineString", "LinearRing", "Polygon", "Track", "Model", *_PARTS)
+_PICTURE = ("is a picture, which is not read", "")
+_NOT_READ = {
+    "NetworkLink": ("what it refers to is not in this file", "save that as a file of its own"),
+    "GroundOverlay": _PICTURE,
+    "PhotoOverlay": _PICTURE,
+    "Tour": ("is a flight of the viewer's camera, which is not read", ""),
+    "Update": ("its changes of other features are not made", "save the changed features"),
+}
 
 
 def read_kmz(content: bytes, contents: Contents) -> None:
-    """Collect the placemarks of the document in a KMZ archive.
+    """Collect the placemarks of the document in a KMZ archive, and of documents that it links.
+
+    A drone maker's archive (WPML) has its waylines as they are flown in a member of their own.
 
     Raises:
         GeometryError: it is no archive, or has no document.
     """
     with archive_of(content) as archive:
-        names = [name for name in archive.namelist() if name.lower().endswith(".kml")]
-        if not names:
+        members = [name for name in archive.namelist() if name.lower().endswith(".kml")]
+        waylines = [each for each in archive.namelist() if each.lower().endswith("waylines.wpml")]
+        if not members and not waylines:
             raise FeatureProblemError("has no .kml", "save it again as .kml or .kmz")
-        document = member(archive, "doc.kml" if "doc.kml" in names else names[0])
-    read_kml(document, contents)
+        first = (waylines or [each for each in members if each == "doc.kml"] or members)[0]
+        documents = [first]
+        for name in documents:  # which grows by what they link
+            with contents.feature("" if name == first else name):
+                linked = _read(member(archive, name), contents, members, name)
+                documents += [each for each in linked if each not in documents]
+        left = [each for each in members if each not in documents and not waylines]
+        if left:
+            message = f"is not read: {first} does not link it"
+            contents.warn(", ".join(left)[:200], message, "save it as a file")
 
 
 def read_kml(content: bytes, contents: Contents) -> None:
@@ -59,52 +80,57 @@ def read_kml(content: bytes, contents: Contents) -> None:
     Raises:
         GeometryError: it is not KML.
     """
-    root = _root(content)
+    _read(content, contents, (), "")
+
+
+def _read(content: bytes, contents: Contents, members: Sequence[str], base: str) -> list[str]:
+    """Return which of the archive's members it links, once each."""
+    root = kml_root(content)
+    contents.expect(_position_count(root))
+    linked: dict[str, None] = {}
+    if has_waylines(root):
+        read_waylines(root, contents)
+        return []
     for element in root.iter(etree.Element):
-        local = _local(element)
+        local = local_name(element)
+        if local in ("Placemark", *_NOT_READ) and next(element.iterancestors("{*}Update"), None):
+            continue
         if local == "Placemark":
             _read_placemark(element, contents)
-        elif local in _ELSEWHERE:
-            name = _text(element, "name")
-            contents.warn(
-                f"{local} {name!r}" if name else local,
-                "what it refers to is not in this file",
-                "save that as a file of its own" if local == "NetworkLink" else "",
-            )
+        elif local in _NOT_READ:
+            href = next(element.iter("{*}href"), None) if local == "NetworkLink" else None
+            text = "" if href is None else unquote((href.text or "").strip()).partition("#")[0]
+            target = normpath(join(dirname(base), text))
+            if target in members:
+                linked[target] = None
+                continue
+            name = child_text(element, "name")
+            contents.warn(f"{local} {name!r}" if name else local, *_NOT_READ[local])
+    return list(linked)
 
 
-def _root(content: bytes) -> Element:
-    # Before the parser: a document type could declare entities, and those could be huge.
-    if b"<!DOCTYPE" in content[:100_000].upper() or b"<!ENTITY" in content[:100_000].upper():
-        raise FeatureProblemError("has a document type", "save it as KML without one")
-    parser = etree.XMLParser(
-        resolve_entities=False,
-        load_dtd=False,
-        no_network=True,
-        huge_tree=False,
-        remove_comments=True,
-        remove_pis=True,
-    )
-    try:
-        root = etree.parse(BytesIO(content), parser).getroot()
-    except (etree.XMLSyntaxError, ValueError, OSError) as error:
-        raise GeometryError(f"is not XML: {str(error)[:200]}") from None
-    if root.getroottree().docinfo.internalDTD is not None:
-        raise FeatureProblemError("has a document type", "save it as KML without one")
-    if _local(root) not in ("kml", "Document", "Folder", "Placemark"):
-        raise GeometryError(f"is not KML: its root is {_local(root)!r}, where 'kml' is expected")
-    return root
+def _position_count(root: Element) -> int:
+    """Return how many positions a document has, at most one beyond the limit for each element."""
+    count = sum(1 for _ in islice(root.iter("{*}coord"), MAX_POSITIONS + 1))
+    for element in root.iter("{*}coordinates"):
+        if count > MAX_POSITIONS:
+            break
+        found = POSITION.finditer(element.text or "")
+        count += sum(1 for _ in islice(found, MAX_POSITIONS + 1))
+    return count
 
 
 def _read_placemark(placemark: Element, contents: Contents) -> None:
-    name = _text(placemark, "name")
+    name = child_text(placemark, "name")
     line = placemark.sourceline or 0
-    with contents.feature(f"placemark {name!r}" if name else f"placemark in line {line}"):
+    where = f"placemark {name!r}" if name else f"placemark in line {line}"
+    with contents.feature(where):
         frame = _data(placemark, "altitude_frame")
         if frame and frame not in ALTITUDE_FRAMES:
             known = ", ".join(ALTITUDE_FRAMES)
             raise FeatureProblemError(f"altitude_frame {frame!r} is not known", f"one of {known}")
-        read = [_geometry(part, frame) for child in placemark for part in _parts(child)]
+        parts = [part for child in placemark for part in _parts(child)]
+        read = [_geometry(part, frame, where, contents) for part in parts]
         if not read:
             raise GeometryError("has no point, line or polygon")
         speeds = _data(placemark, SPEEDS)
@@ -114,7 +140,7 @@ def _read_placemark(placemark: Element, contents: Contents) -> None:
 
 def _parts(element: Element) -> Iterator[Element]:
     """Yield the single geometries of an element, if it is one. Depth is bounded by the parser."""
-    local = _local(element)
+    local = local_name(element)
     if local in _PARTS:
         for child in element:
             yield from _parts(child)
@@ -122,18 +148,21 @@ def _parts(element: Element) -> Iterator[Element]:
         yield element
 
 
-def _geometry(element: Element, frame: str) -> Point | Route | Area:
-    mode = _text(element, "altitudeMode")
+def _geometry(element: Element, frame: str, where: str, contents: Contents) -> Point | Route | Area:
+    local = local_name(element)
+    mode = _mode(element)
+    if local == "Model":
+        raise FeatureProblemError("a Model is not read", "give its place as a Point")
     if not frame and mode not in _CLAMPED and mode not in _FRAME_OF:
+        is_known = "is above the sea floor" if mode == "relativeToSeaFloor" else "is not known"
         raise FeatureProblemError(
-            f"altitudeMode {mode!r} is not known", f"one of clampToGround, {', '.join(_FRAME_OF)}"
+            f"altitudeMode {mode!r} {is_known}", f"one of clampToGround, {', '.join(_FRAME_OF)}"
         )
     keeps = bool(frame) or mode in _FRAME_OF
     frame = frame or _FRAME_OF.get(mode, "relative")
-    local = _local(element)
     if local == "Polygon":
         rings = [
-            _coordinates(ring, keeps)
+            _raised(element, coordinates(ring, keeps))
             for boundary in ("outerBoundaryIs", "innerBoundaryIs")
             for ring in _rings(element, boundary)
         ]
@@ -141,9 +170,10 @@ def _geometry(element: Element, frame: str) -> Point | Route | Area:
             raise GeometryError("a polygon has an outerBoundaryIs")
         closed = tuple(_closed(ring) for ring in rings)
         return Area(checked(closed), frame)
-    positions = _track(element) if local == "Track" else _coordinates(element, keeps)
-    if local == "Track" and mode in _CLAMPED:
-        positions = [(latitude, longitude, None) for latitude, longitude, _ in positions]
+    if local == "Track":
+        positions = _track(element, keeps, where, contents)
+    else:
+        positions = _raised(element, coordinates(element, keeps))
     if local == "Point":
         if len(positions) != 1:
             raise GeometryError(f"a point has one position, not {len(positions)}")
@@ -155,8 +185,8 @@ def _geometry(element: Element, frame: str) -> Point | Route | Area:
 
 def _rings(polygon: Element, boundary: str) -> Iterator[Element]:
     for child in polygon:
-        if _local(child) == boundary:
-            yield from (ring for ring in child if _local(ring) == "LinearRing")
+        if local_name(child) == boundary:
+            yield from (ring for ring in child if local_name(ring) == "LinearRing")
 
 
 def _closed(ring: Sequence[Coordinate]) -> tuple[Coordinate, ...]:
@@ -165,60 +195,50 @@ def _closed(ring: Sequence[Coordinate]) -> tuple[Coordinate, ...]:
     return tuple(ring) if ring[0][:2] == ring[-1][:2] else (*ring, ring[0])
 
 
-def _coordinates(element: Element, keeps_altitude: bool) -> list[Coordinate]:
-    words = _joined(_text(element, "coordinates")).split()
-    positions = []
-    for number, word in enumerate(words, start=1):
-        parts = word.split(",")
-        if not 2 <= len(parts) <= 3:
-            raise FeatureProblemError(
-                f"position {number}: {word[:60]!r} is no position", "write longitude,latitude"
-            )
-        positions.append(_position(parts, keeps_altitude, number))
-    return positions
+def _mode(element: Element) -> str:
+    """Return its altitude mode (`gx:` or not): its own, or that of the parts of its parent."""
+    parent = element.getparent()
+    of_all = parent is not None and local_name(parent) in _PARTS
+    mode = child_text(element, "altitudeMode")
+    return mode or (_mode(parent) if of_all and parent is not None else "")
 
 
-def _joined(text: str) -> str:
-    """Return a list of positions without the space around commas, which some programs write."""
-    return _SPACE_AFTER_COMMA.sub(",", _SPACE_BEFORE_COMMA.sub(",", text))
+def _raised(element: Element, positions: list[Coordinate]) -> list[Coordinate]:
+    """Add the `gx:altitudeOffset` of an element, in metres, to what altitudes there are."""
+    text = child_text(element, "altitudeOffset")
+    if not text:
+        return positions
+    try:
+        offset_m = float(text)
+    except ValueError:
+        raise GeometryError(f"altitudeOffset {text[:20]!r} is not a number") from None
+    return [(lat, lon, None if alt is None else alt + offset_m) for lat, lon, alt in positions]
 
 
-def _track(element: Element) -> list[Coordinate]:
-    found = [child.text or "" for child in element if _local(child) == "coord"]
+def _track(
+    element: Element, keeps_altitude: bool, where: str, contents: Contents
+) -> list[Coordinate]:
+    """Return the samples of a track. An empty one means that there was no fix: GDAL 3.12.4 reads it
+    as 0, 0, 0."""
+    found = [child.text or "" for child in element if local_name(child) == "coord"]
     positions = []
     for number, text in enumerate(found, start=1):
         parts = text.split()
+        if not parts:
+            contents.warn(where, f"position {number}: is empty, and left out")
+            continue
         if not 2 <= len(parts) <= 3:
             raise GeometryError(f"position {number}: {text[:60]!r} is no position")
-        positions.append(_position(parts, True, number))
+        positions.append(position(parts, keeps_altitude, number))
     return positions
-
-
-def _position(parts: Sequence[str], keeps_altitude: bool, number: int) -> Coordinate:
-    try:
-        longitude, latitude, *altitude = (float(part) for part in parts)
-    except ValueError:
-        raise GeometryError(f"position {number}: {','.join(parts)[:60]!r} is no number") from None
-    altitude_m = altitude[0] if altitude and keeps_altitude else None
-    return coordinate(latitude, longitude, altitude_m, f"position {number}")
-
-
-def _local(element: Element) -> str:
-    tag = element.tag
-    return tag.rpartition("}")[2] if isinstance(tag, str) else ""
-
-
-def _text(element: Element, child: str) -> str:
-    found = next((each for each in element if _local(each) == child), None)
-    return "" if found is None else (found.text or "").strip()
 
 
 def _data(placemark: Element, name: str) -> str:
     for extended in placemark:
-        if _local(extended) == "ExtendedData":
+        if local_name(extended) == "ExtendedData":
             for data in extended.iter(etree.Element):
                 if data.get("name") == name:
-                    return _text(data, "value") or (data.text or "").strip()
+                    return child_text(data, "value") or (data.text or "").strip()
     return ""
 
 

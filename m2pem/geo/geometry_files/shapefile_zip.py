@@ -1,6 +1,9 @@
 """Shapefiles (Esri), each layer with its .dbf and .prj, in a ZIP archive."""
 
+import struct
+from collections.abc import Sequence
 from io import BytesIO
+from math import isnan
 from pathlib import PurePosixPath
 from typing import Any
 
@@ -10,15 +13,23 @@ from m2pem.geo.geojson import GeometryError
 from m2pem.geo.geometry_files.archive import Archive, archive_of, member
 from m2pem.geo.geometry_files.contents import MAX_FEATURES, Contents, FeatureProblemError
 from m2pem.geo.geometry_files.geojson_file import read_feature
+from m2pem.geo.geometry_files.reference_system import ReferenceSystem, system_of_wkt
 
 _NAME_FIELDS = ("name", "title", "label", "id")
 _FRAME_FIELDS = ("altitude_frame", "alt_frame", "altitude_f")
 """Names of fields have at most ten characters."""
 
+_POINTS = frozenset({shapefile.POINT, shapefile.POINTM, shapefile.POINTZ})
+_MULTIPOINTS = frozenset({shapefile.MULTIPOINT, shapefile.MULTIPOINTM, shapefile.MULTIPOINTZ})
+_LINES = frozenset({shapefile.POLYLINE, shapefile.POLYLINEM, shapefile.POLYLINEZ})
+_POLYGONS = frozenset({shapefile.POLYGON, shapefile.POLYGONM, shapefile.POLYGONZ})
 _WITH_Z = frozenset(
     {shapefile.POINTZ, shapefile.POLYLINEZ, shapefile.POLYGONZ, shapefile.MULTIPOINTZ}
 )
-_REPROJECT = "export the layer as WGS 84 (EPSG:4326)"
+_NO_DATA = -1e38
+"""A Z value below it is none, as a measure is (Esri's white paper of 1998, page 2)."""
+
+_WGS84 = 'GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]]]'
 
 
 def read_shapefiles(content: bytes, contents: Contents) -> None:
@@ -40,12 +51,11 @@ def _read_layer(archive: Archive, name: str, contents: Contents) -> None:
     parts = {
         suffix: _part(archive, name, suffix) for suffix in (".shp", ".shx", ".dbf", ".prj", ".cpg")
     }
-    projection = (parts[".prj"] or b"").decode("utf-8", "replace").strip()
+    projection = (parts[".prj"] or b"").decode("utf-8-sig", "replace").strip()
     if not projection:
         contents.warn(name, "has no .prj: taken as WGS 84 longitude and latitude")
-    elif not _is_wgs84(projection):
-        found = projection.partition('"')[2].partition('"')[0]
-        raise FeatureProblemError(f"its coordinates are of {found[:80]!r}, not WGS 84", _REPROJECT)
+    system = system_of_wkt(projection or _WGS84)
+    contents.expect(_position_count(parts[".shp"] or b""))
     streams: dict[str, Any] = {
         suffix[1:]: BytesIO(content)
         for suffix, content in parts.items()
@@ -54,14 +64,17 @@ def _read_layer(archive: Archive, name: str, contents: Contents) -> None:
     encoding = (parts[".cpg"] or b"").decode("ascii", "replace").strip() or "utf-8"
     try:
         with shapefile.Reader(**streams, encoding=encoding, encodingErrors="replace") as layer:
-            _read_shapes(layer, name, contents)
+            _read_shapes(layer, name, system, contents)
     except GeometryError:
         raise
     except Exception as error:  # of damaged files, pyshp raises what struct, codecs and it raise
         raise GeometryError(f"is damaged: {type(error).__name__}: {str(error)[:200]}") from None
+    system.warn_of_accuracy(contents, name)
 
 
-def _read_shapes(layer: "shapefile.Reader", name: str, contents: Contents) -> None:
+def _read_shapes(
+    layer: "shapefile.Reader", name: str, system: ReferenceSystem, contents: Contents
+) -> None:
     warned = False
     for index in range(len(layer)):
         if index > MAX_FEATURES:
@@ -77,47 +90,90 @@ def _read_shapes(layer: "shapefile.Reader", name: str, contents: Contents) -> No
         if shape.shapeType == shapefile.NULL:
             contents.warn(where, "has no geometry")
             continue
-        frame = next((str(lower[key]) for key in _FRAME_FIELDS if lower.get(key)), None)
-        if frame is None and shape.shapeType in _WITH_Z:
-            frame = "amsl"
-            if not warned:
-                warned = True
-                contents.warn(
-                    name,
-                    "its Z values are taken as altitudes above mean sea level",
-                    "a field alt_frame may say relative or terrain",
-                )
-        properties = {"name": title, **({"altitude_frame": frame} if frame else {})}
-        geometry = _with_altitudes(shape)
-        read_feature(
-            {"type": "Feature", "properties": properties, "geometry": geometry}, where, contents
-        )
+        frame = next((str(lower[key]) for key in _FRAME_FIELDS if lower.get(key)), "")
+        if not frame and shape.shapeType in _WITH_Z and not warned:
+            warned = True
+            of = f" of {system.name!r} are converted to" if system.has_heights else " are taken as"
+            contents.warn(
+                name,
+                f"its Z values{of} altitudes above mean sea level",
+                "a field alt_frame may say relative or terrain",
+            )
+        with contents.feature(where):
+            geometry = _geometry(shape, system, frame, where, contents)
+            frame = frame or ("amsl" if shape.shapeType in _WITH_Z else "")
+            properties = {"name": title, **({"altitude_frame": frame} if frame else {})}
+            feature = {"type": "Feature", "properties": properties, "geometry": geometry}
+            read_feature(feature, where, contents)
 
 
-def _with_altitudes(shape: "shapefile.Shape") -> Any:
-    """Return a shape as GeoJSON; pyshp leaves the Z values of lines and polygons out."""
-    geometry = shape.__geo_interface__
-    if shape.shapeType not in _WITH_Z:
-        return geometry
-    altitudes = dict(zip(((x, y) for x, y, *_ in shape.points), shape.z, strict=False))
+def _geometry(
+    shape: "shapefile.Shape", system: ReferenceSystem, frame: str, where: str, contents: Contents
+) -> dict[str, Any]:
+    """Return a shape as GeoJSON in WGS 84.
 
-    def place(value: Any) -> Any:
-        if value and isinstance(value[0], list | tuple):
-            return [place(each) for each in value]
-        altitude = altitudes.get(tuple(value[:2]))
-        return list(value[:2]) if altitude is None else [*value[:2], altitude]
+    By index: pyshp 3.1.6 leaves the Z values out of `__geo_interface__`, and a line may pass a
+    place twice at different heights.
+    """
+    kind = shape.shapeType
+    heights: list[float | None] = [None] * len(shape.points)
+    if kind in _WITH_Z:
+        heights = [None if isnan(z) or z <= _NO_DATA else z for z in shape.z]
+        if missing := [str(number) for number, z in enumerate(heights, 1) if z is None]:
+            contents.warn(where, f"has no height at position {', '.join(missing)[:200]}")
+    if any(each is not None for each in getattr(shape, "m", ())):
+        contents.warn(where, "its measures (M values) are not read")
+    flat = [(x, y, z) for (x, y, *_), z in zip(shape.points, heights, strict=True)]
+    places = system.to_wgs84(flat, frame)
+    if kind in _POINTS:
+        return {"type": "Point", "coordinates": places[0] if places else []}
+    if kind in _MULTIPOINTS:
+        return {"type": "MultiPoint", "coordinates": places}
+    ends = [*shape.parts[1:], len(places)]
+    parts = [places[start:end] for start, end in zip(shape.parts, ends, strict=True)]
+    if kind in _LINES:
+        return {"type": "MultiLineString", "coordinates": parts}
+    if kind in _POLYGONS:
+        return {"type": "MultiPolygon", "coordinates": _polygons(shape, parts)}
+    raise FeatureProblemError(
+        f"is a {shape.shapeTypeName}", "export points, multi-points, lines or polygons"
+    )
 
-    return {**geometry, "coordinates": place(geometry["coordinates"])}
+
+def _polygons(
+    shape: "shapefile.Shape", rings: Sequence[list[list[float]]]
+) -> list[list[list[list[float]]]]:
+    """Return the rings in polygons. pyshp decides by x and y which ring is a hole of which."""
+    ends = [*shape.parts[1:], len(shape.points)]
+    flat = [
+        [tuple(point[:2]) for point in shape.points[start:end]]
+        for start, end in zip(shape.parts, ends, strict=True)
+    ]
+    ring_of = {id(each): ring for each, ring in zip(flat, rings, strict=True)}
+    polygons = shapefile.organize_polygon_rings(flat)
+    return [[ring_of[id(each)] for each in polygon] for polygon in polygons]
+
+
+def _position_count(shp: bytes) -> int:
+    """Return how many positions a .shp holds, by the headers of its records."""
+    count, at = 0, 100
+    try:
+        while at + 12 <= len(shp):
+            (words,) = struct.unpack_from(">i", shp, at + 4)
+            (kind,) = struct.unpack_from("<i", shp, at + 8)
+            if kind in _POINTS:
+                count += 1
+            elif kind in _MULTIPOINTS:
+                count += max(0, struct.unpack_from("<i", shp, at + 44)[0])
+            elif kind != shapefile.NULL:
+                count += max(0, struct.unpack_from("<i", shp, at + 48)[0])
+            at += 8 + 2 * max(words, 2)
+    except struct.error:
+        pass  # it ends within a record: the reader says so
+    return count
 
 
 def _part(archive: Archive, name: str, suffix: str) -> bytes | None:
     wanted = PurePosixPath(name).with_suffix(suffix).as_posix().lower()
     found = next((each for each in archive.namelist() if each.lower() == wanted), None)
     return None if found is None else member(archive, found)
-
-
-def _is_wgs84(projection: str) -> bool:
-    text = projection.upper().replace(" ", "").replace("_", "")
-    return text.startswith(("GEOGCS", "GEOGCRS", "GEODCRS")) and (
-        "WGS84" in text or "WGS1984" in text or "WORLDGEODETICSYSTEM1984" in text
-    )

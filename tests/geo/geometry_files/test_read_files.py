@@ -19,7 +19,6 @@ from m2pem.geo.geometry_files.contents import MAX_PROBLEMS
 from m2pem.mission.geometry import Area, Point, Route
 
 WGS84 = 'GEOGCS["GCS_WGS_1984",DATUM["D_WGS_1984",SPHEROID["WGS_1984",6378137.0,298.257223563]]]'
-UTM = 'PROJCS["WGS_1984_UTM_Zone_18N",GEOGCS["GCS_WGS_1984",DATUM["D_WGS_1984"]]]'
 
 
 def read(name: str, content: bytes | str) -> GeometryFile:
@@ -265,15 +264,6 @@ def test_layers_of_shapefiles_are_read() -> None:
     file = read("a.zip", archive(layer(shapefile.POLYLINEZ, [("road", line)])))
     assert file.geometries[0].geometry == Route(((53.0, 7.0, 5.0), (53.1, 7.1, 6.0)), "amsl")
     assert "taken as altitudes above mean sea level" in str(file.problems[0])
-
-
-def test_a_layer_of_another_projection_is_refused() -> None:
-    point = {"type": "Point", "coordinates": (500_000.0, 5_900_000.0)}
-    (problem,) = problems("a.zip", archive(layer(shapefile.POINT, [("p", point)], UTM)))
-    assert problem == (
-        "my/layer.shp: its coordinates are of 'WGS_1984_UTM_Zone_18N', not WGS 84; "
-        "export the layer as WGS 84 (EPSG:4326)"
-    )
 
 
 # --- ground stations ----------------------------------------------------------------------------

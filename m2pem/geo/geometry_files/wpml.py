@@ -1,0 +1,147 @@
+"""Waylines of WPML, the KML of DJI and others (DJI Cloud API, `template.kml` and `waylines.wpml`).
+
+A wayline is a route: its points in the order of `wpml:index`, with heights and speeds that stand
+beside their coordinates. `waylines.wpml` has them as they are executed, `template.kml` as they were
+planned. What a wayline commands besides is left out, with a warning that names the waypoints.
+"""
+
+from collections import defaultdict
+from math import isfinite, nan
+
+from m2pem.geo.geoid import mean_sea_level_m
+from m2pem.geo.geojson import GeometryError
+from m2pem.geo.geometry_files.contents import Contents, FeatureProblemError
+from m2pem.geo.geometry_files.kml_elements import Element, child_text, coordinates, local_name
+from m2pem.mission.geometry import Coordinate, Route
+
+_ELLIPSOID = "WGS84"
+_FRAME_OF = {
+    "relativeToStartPoint": "relative",
+    "EGM96": "amsl",
+    _ELLIPSOID: "amsl",
+    "aboveGroundLevel": "terrain",
+    "realTimeFollowSurface": "terrain",
+}
+_OF_MISSION = {
+    "flyToWaylineMode": "",
+    "finishAction": "noAction",
+    "exitOnRCLost": "",
+    "executeRCLostAction": "",
+    "takeOffSecurityHeight": "",
+    "globalRTHHeight": "",
+}
+"""Of `missionConfig`: what commands the vehicle, and the value that commands nothing."""
+
+_STRAIGHT = ("", "toPointAndStopWithDiscontinuityCurvature")
+_AS_ROUTES = ("", "followWayline")
+
+
+def has_waylines(root: Element) -> bool:
+    """Whether a document is WPML."""
+    return next(root.iter("{*}waylineId", "{*}templateType", "{*}executeHeight"), None) is not None
+
+
+def read_waylines(root: Element, contents: Contents) -> None:
+    """Collect the waylines of a document, each as a route."""
+    for config in root.iter("{*}missionConfig"):
+        given = {name: child_text(config, name) for name in _OF_MISSION}
+        left = [
+            f"{name} {given[name]}" for name in given if given[name] not in ("", _OF_MISSION[name])
+        ]
+        if left:
+            contents.warn("missionConfig", f"not read: {', '.join(left)}", "draw it in the mission")
+    for folder in root.iter("{*}Folder"):
+        name = child_text(folder, "waylineId") or child_text(folder, "templateId")
+        if not name:
+            continue
+        where = f"wayline {name}"
+        with contents.feature(where):
+            kind = child_text(folder, "templateType") or "waypoint"
+            if kind != "waypoint":
+                raise FeatureProblemError(
+                    f"is a template of {kind!r}", "export the KMZ with its waylines.wpml"
+                )
+            route = _route(folder)
+            _warn_of_commands(folder, where, contents)
+            contents.add(f"wayline_{name}", route)
+
+
+def _route(folder: Element) -> Route:
+    mode = child_text(folder, "executeHeightMode")
+    for system in folder.iter("{*}waylineCoordinateSysParam"):
+        mode = mode or child_text(system, "heightMode")
+    if mode not in _FRAME_OF:
+        known = ", ".join(_FRAME_OF)
+        raise FeatureProblemError(f"its height mode {mode!r} is not known", f"one of {known}")
+    waypoints: list[Coordinate] = []
+    speeds: list[float] = []
+    for number, placemark in _in_order(folder):
+        height_m = _number(_height(placemark, folder, mode), "height", number)
+        found = [each for point in placemark.iter("{*}Point") for each in coordinates(point, False)]
+        if len(found) != 1:
+            raise GeometryError(f"waypoint {number}: has {len(found)} positions")
+        latitude, longitude, _ = found[0]
+        if mode == _ELLIPSOID:
+            height_m = mean_sea_level_m(latitude, longitude, height_m)
+        waypoints.append((latitude, longitude, height_m))
+        speed = child_text(placemark, "waypointSpeed")
+        if not speed or child_text(placemark, "useGlobalSpeed") == "1":
+            speed = child_text(folder, "autoFlightSpeed")
+        speeds.append(_number(speed, "speed", number))
+    if not waypoints:
+        raise GeometryError("has no waypoint")
+    return Route(tuple(waypoints), _FRAME_OF[mode], tuple(speeds))
+
+
+def _in_order(folder: Element) -> list[tuple[int, Element]]:
+    """Return the waypoints by their `wpml:index`, which is how messages name them."""
+    placemarks = [each for each in folder if local_name(each) == "Placemark"]
+    indices = [child_text(each, "index") for each in placemarks]
+    if not all(each.isdecimal() and len(each) < 10 for each in indices):
+        raise GeometryError("each waypoint has a wpml:index, a whole number")
+    numbered = dict(zip(map(int, indices), placemarks, strict=True))
+    if len(numbered) < len(placemarks):
+        raise GeometryError("two waypoints have the same wpml:index")
+    return sorted(numbered.items(), key=lambda each: each[0])
+
+
+def _height(placemark: Element, folder: Element, mode: str) -> str:
+    if executed := child_text(placemark, "executeHeight"):
+        return executed
+    if child_text(placemark, "useGlobalHeight") == "1":
+        return child_text(folder, "globalHeight")
+    return child_text(placemark, "ellipsoidHeight" if mode == _ELLIPSOID else "height")
+
+
+def _number(text: str, what: str, waypoint: int) -> float:
+    try:
+        number = float(text)
+    except ValueError:
+        number = nan
+    if not isfinite(number) or (what == "speed" and number <= 0):
+        raise GeometryError(f"waypoint {waypoint}: {what} {text[:20]!r} cannot be flown")
+    return number
+
+
+def _warn_of_commands(folder: Element, where: str, contents: Contents) -> None:
+    at: dict[str, list[str]] = defaultdict(list)
+    for group in folder.iter("{*}startActionGroup"):
+        for each in group.iter("{*}actionActuatorFunc"):
+            at[f"action {each.text}"].append("before the first one")
+    turn_of_all = child_text(folder, "globalWaypointTurnMode")
+    for number, placemark in _in_order(folder):
+        turn = next(
+            (each.text or "" for each in placemark.iter("{*}waypointTurnMode")), turn_of_all
+        )
+        heading = next((each.text or "" for each in placemark.iter("{*}waypointHeadingMode")), "")
+        commands = {f"action {each.text}" for each in placemark.iter("{*}actionActuatorFunc")}
+        commands |= set() if turn.strip() in _STRAIGHT else {f"turn mode {turn.strip()}"}
+        commands |= set() if heading.strip() in _AS_ROUTES else {f"heading mode {heading.strip()}"}
+        for command in commands:
+            at[command[:60]].append(str(number))
+    for command, numbers in sorted(at.items()):
+        contents.warn(
+            where,
+            f"{command} is not read: of waypoint {', '.join(numbers)[:200]}",
+            "draw it in the mission",
+        )
