@@ -1,9 +1,12 @@
 """Tables of positions: columns are found by their names, rows of one name are one geometry."""
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from csv import writer
+from dataclasses import dataclass
 from io import StringIO
-from itertools import zip_longest
+from itertools import islice, zip_longest
+from typing import TypeAlias
 
 from m2pem.geo.csv_waypoints import (
     METRES,
@@ -15,23 +18,88 @@ from m2pem.geo.csv_waypoints import (
     positions_as,
 )
 from m2pem.geo.file_text import decoded
-from m2pem.geo.geojson import GeometryError, checked, kind_of, with_speeds
-from m2pem.geo.geometry_files.contents import Contents, FeatureProblemError, NamedGeometry
+from m2pem.geo.geojson import ALTITUDE_FRAMES, GeometryError, checked, kind_of, with_speeds
+from m2pem.geo.geometry_files.contents import (
+    MAX_POSITIONS,
+    Contents,
+    FeatureProblemError,
+    NamedGeometry,
+)
 from m2pem.mission.geometry import Area, Coordinate, Point, Route
+from m2pem.units import UNITS, Dimension
 
 _SPEED = "speed_m_s"
 _HEADER = ("name", "kind", "ring", "lat_deg", "lon_deg", "alt_m", "altitude_frame")
 _NAMES = {
-    **{name: name for name in ("lat", "lon", "alt", "name", "kind", "ring", "altitude_frame")},
+    **{name: name for name in ("lat", "lon", "alt", "name", "kind", "ring")},
     **OTHER_NAMES,
     **dict.fromkeys(("y", "breitengrad"), "lat"),
     **dict.fromkeys(("x", "längengrad"), "lon"),
-    **dict.fromkeys(("elevation", "z"), "alt"),
     **dict.fromkeys(("route", "title", "label", "id"), "name"),
     "type": "kind",
-    "frame": "altitude_frame",
+    **dict.fromkeys(("frame", "altitudeframe", "altitudemode", "altmode"), "altitude_frame"),
+    **dict.fromkeys(("speed", "velocity", "groundspeed"), _SPEED),
 }
+"""What a column holds, by its name without unit, spaces and underscores."""
+
+_ABOVE = {
+    "": ("",),
+    "relative": ("relative", "rel", "abovetakeoff", "abovehome"),
+    "terrain": ("agl", "aboveground", "abovegroundlevel", "aboveterrain"),
+    "amsl": ("amsl", "msl", "asl", "abovesealevel", "abovemeansealevel"),
+}
+_HEIGHTS = {
+    name: frame
+    for frame, words in _ABOVE.items()
+    for word in words
+    for base in ("alt", "altitude", "height", "elevation", "elev", "ele", "hgt", "z", "")
+    for name in (base + word, word + base)
+    if name
+}
+"""The altitude frame that the name of a column of heights says; "": none."""
+
+_MODES = {
+    **{word: frame for frame, words in _ABOVE.items() for word in words if word},
+    **{"absolute": "amsl", "relativetoground": "terrain"},
+}
+_LITCHI = {"0": "relative", "1": "terrain"}
+"""The numbers in Litchi's column `altitudemode`, beside which speed 0 means the mission's."""
+
+_LENGTHS = {
+    **METRES,
+    **dict.fromkeys(("meter", "meters", "metre", "metres"), 1.0),
+    **dict.fromkeys(("foot", "feet"), METRES["ft"]),
+    **dict.fromkeys(("ft_us", "us_ft", "us_survey_foot", "us_survey_feet"), 1200 / 3937),
+}
+_SPEEDS = {
+    **{unit.replace("/", "_"): scale for unit, scale in UNITS[Dimension.SPEED].items()},
+    **dict.fromkeys(("mps", "meters_per_second", "metres_per_second"), 1.0),
+    **dict.fromkeys(("kph", "kmh", "kmph"), 1 / 3.6),
+    **dict.fromkeys(("kt", "kts", "knot", "knots"), UNITS[Dimension.SPEED]["kn"]),
+    "fps": METRES["ft"],
+}
+_DEGREES = dict.fromkeys(("deg", "degree", "degrees", "°", "decimal_degrees", "dd", "wgs84"), 1.0)
+_UNITS = {"lat": _DEGREES, "lon": _DEGREES, "alt": _LENGTHS, _SPEED: _SPEEDS}
+_BRACKETS = re.compile(r"([^\[(]+)[\[(]([^\])]*)[\])]")
+_FRAMES = f"in a column altitude_frame one of {', '.join(ALTITUDE_FRAMES)}; or leave it out"
+_OF_FLIGHT = {
+    re.compile(r"(?!wind)(.*_)?(speed|velocity|ground_?speed|air_?speed)"): (
+        "write speed_m_s or speed_km_h; or leave it out"
+    ),
+    re.compile(r"(.*_)?(mode|datum)$"): f"write {_FRAMES}",
+    re.compile(r"(.*_)?(alt|height|elev|hgt|agl|a?msl|asl|hae)"): (
+        f"write alt_m or alt_ft, and {_FRAMES}"
+    ),
+}
+"""Columns that say how to fly: the import stops if it cannot be read, and says what would be."""
+
+_COMMANDS = re.compile(
+    r"(poi|gimbal|action|photo|camera|curve|rotation|heading|yaw|turn|hover|stay|wait|delay|loiter"
+    r"|hold|command|cmd|trigger)"
+)
 _KINDS = ("route", "area", "point")
+
+_Cells: TypeAlias = dict[str, tuple[str, Column]]
 
 
 def read_csv(content: bytes, contents: Contents) -> None:
@@ -45,21 +113,46 @@ def read_csv(content: bytes, contents: Contents) -> None:
         GeometryError: it is not CSV, or has no columns of positions.
     """
     text = decoded(content)
-    rows = csv_rows(text, _delimiter(text))
+    delimiter = _delimiter(text)
+    if text.count("\n") > MAX_POSITIONS:
+        contents.expect(sum(1 for _ in islice(csv_rows(text, delimiter), MAX_POSITIONS + 2)) - 1)
+    rows = csv_rows(text, delimiter)
     line, header = next(rows, (1, [""]))
     columns = _columns(header, f"line {line}", contents)
-    groups: dict[str, list[tuple[str, Mapping[str, tuple[str, Column]]]]] = {}
+    index_of_name = next((at for at, each in columns.items() if each.name == "name"), None)
+    groups: dict[str, list[tuple[int, list[str]]]] = {}
     for number, row in rows:
         if len(row) != len(header):
             raise GeometryError(
                 f"line {number}: has {len(row)} columns where the header has {len(header)}"
             )
-        cells = {column.name: (row[index], column) for index, column in columns.items()}
-        name = cells["name"][0] if "name" in cells else ""
-        groups.setdefault(name, []).append((f"line {number}", cells))
+        name = "" if index_of_name is None else row[index_of_name]
+        groups.setdefault(name, []).append((number, row))
+    is_litchi = any(each.lower().startswith("curvesize") for each in header)
     for name, group in groups.items():
-        with contents.feature(f"{group[0][0]} {name!r}" if name else group[0][0]):
-            contents.add(name, _geometry(group))
+        where = f"line {group[0][0]}"
+        with contents.feature(f"{where} {name!r}" if name else where):
+            # One after the other: with all rows as mappings a table takes three times the memory.
+            rows_of_it = ((number, _cells(row, columns, is_litchi)) for number, row in group)
+            contents.add(name, _geometry(rows_of_it))
+
+
+def _cells(row: Sequence[str], columns: Mapping[int, "_Named"], is_litchi: bool) -> _Cells:
+    """Return the cells of a row by what they hold."""
+    cells: _Cells = {column.name: (row[index], column) for index, column in columns.items()}
+    height = cells.get("alt")
+    if height is not None and isinstance(height[1], _Named) and height[1].frame:
+        cells["altitude_frame"] = (height[1].frame, height[1])
+    elif "altitude_frame" in cells:
+        text, column = cells["altitude_frame"]
+        word = text.lower().replace("_", "")
+        cells["altitude_frame"] = (
+            (_LITCHI.get(word) if is_litchi else None) or _MODES.get(word, text),
+            column,
+        )
+    if is_litchi and _cell(cells, _SPEED) in ("0", "0.0"):
+        del cells[_SPEED]
+    return cells
 
 
 def write_csv(geometries: Sequence[NamedGeometry]) -> bytes:
@@ -94,58 +187,93 @@ def _delimiter(text: str) -> str:
     return max(",;\t", key=first.count)
 
 
-def _columns(header: Sequence[str], where: str, contents: Contents) -> dict[int, Column]:
-    """Return the columns that are used, by their place in a row."""
-    columns: dict[int, Column] = {}
-    left: list[str] = []
+def _columns(header: Sequence[str], where: str, contents: Contents) -> dict[int, "_Named"]:
+    """Return the columns that are read, by their index."""
+    columns: dict[str, tuple[int, _Named]] = {}
+    left, commands, stops = [], [], []
     for index, text in enumerate(header):
-        column = _column(text, where, contents)
-        if column is None or column.name in (each.name for each in columns.values()):
+        column, words = _column(text)
+        if column is None:
+            hint = next((hint for sign, hint in _OF_FLIGHT.items() if sign.match(words)), "")
+            if _COMMANDS.match(words):
+                commands.append(text)
+            elif hint:
+                stops.append((f"{where}: column {text[:60]!r} cannot be read", hint))
+            else:
+                left.append(text)
+        elif column.name in columns and column.name in ("name", "kind", "ring"):
             left.append(text)
+        elif column.name in columns and text.lower() not in ("x", "y"):
+            first, _ = columns[column.name]
+            if header[first].lower() in ("x", "y"):
+                columns[column.name] = (index, column)
+            else:
+                both = f"{header[first]!r} and {text!r}"
+                stops.append((f"{where}: columns {both} hold the same", "leave one of them out"))
         else:
-            columns[index] = column
-    names = [column.name for column in columns.values()]
+            columns[column.name] = (index, column)
     for needed in ("lat", "lon"):
-        if needed not in names:
+        if needed not in columns:
             raise FeatureProblemError(
                 f"{where}: there is no column '{needed}' among {', '.join(header)[:200]!r}",
                 "the header is, for example, name,lat_deg,lon_deg,alt_m",
             )
+    if "altitude_frame" in columns and "alt" in columns and columns["alt"][1].frame:
+        stops.append((f"{where}: two columns say what heights are above", "leave one of them out"))
+    if stops:
+        raise FeatureProblemError(*stops[0])
+    if "alt" in columns:
+        index, column = columns["alt"]
+        if not column.unit:
+            message = f"column {header[index]!r} has no unit: taken as metres"
+            contents.warn(where, message, "write, say, alt_ft")
+        if "ele" in header[index].lower() and not (column.frame or "altitude_frame" in columns):
+            message = f"column {header[index]!r} is taken as heights above home"
+            contents.warn(where, message, f"write {_FRAMES}")
     if left:
         contents.warn(where, f"columns that are not read: {', '.join(left)[:200]}")
-    return columns
+    if commands:
+        names = ", ".join(dict.fromkeys(each.rstrip("0123456789") for each in commands))
+        what = f"columns that command more than a place are not read: {names[:400]}"
+        contents.warn(where, what, "draw it in the mission")
+    return dict(columns.values())
 
 
-def _column(text: str, where: str, contents: Contents) -> Column | None:
-    if text.strip().lower() == _SPEED:
-        return Column(_SPEED)
-    lower = text.lower().removesuffix("]").removesuffix(")").replace(" [", "_").replace(" (", "_")
-    if lower in _NAMES:
-        name, unit = _NAMES[lower], ""
-    else:
-        head, _, unit = lower.rpartition("_")
-        name = _NAMES.get(head, "")
-        if name not in ("lat", "lon", "alt"):
-            return None
-    if name == "alt":
-        if not unit:
-            contents.warn(
-                where, f"column {text!r} has no unit: taken as metres", "write, say, alt_ft"
-            )
-        elif unit not in METRES:
-            return None
-        return Column(name, METRES[unit or "m"])
-    return Column(name) if unit in ("", "deg", "degrees", "wgs84") else None
+@dataclass(frozen=True, slots=True)
+class _Named(Column):
+    """A column, with what heights are above (`frame`) and their unit, where its name says so."""
+
+    frame: str = ""
+    unit: str = ""
 
 
-def _geometry(
-    group: Sequence[tuple[str, Mapping[str, tuple[str, Column]]]],
-) -> Point | Route | Area:
+def _column(text: str) -> tuple[_Named | None, str]:
+    """Return what a column holds, if it can be read, and the words of its name joined by `_`."""
+    brackets = _BRACKETS.fullmatch(text[:200].lower())
+    words = _words(brackets[1] if brackets else text[:200].lower())
+    units = [(len(words), "_".join(_words(brackets[2])))] if brackets else []
+    units += [] if brackets else [(-size, "_".join(words[-size:])) for size in (3, 2, 1)]
+    for end, unit in [*units, (len(words), "")]:
+        key = "".join(words[:end])
+        name = "alt" if key in _HEIGHTS else _NAMES.get(key, "")
+        scales = _UNITS.get(name, {})
+        if name and (unit in scales or (not unit and name != _SPEED)):
+            frame = _HEIGHTS[key] if name == "alt" else ""
+            return _Named(name, scales.get(unit, 1.0), frame, unit), "_".join(words)
+    return None, "_".join(words)
+
+
+def _words(text: str) -> list[str]:
+    return [each for each in re.split(r"[\s_/.-]+", text) if each]
+
+
+def _geometry(rows: Iterable[tuple[int, _Cells]]) -> Point | Route | Area:
     kind = ""
     frame = ""
     rings: dict[str, list[Coordinate]] = {}
     speeds = []
-    for where, cells in group:
+    for number, cells in rows:
+        where = f"line {number}"
         given = _cell(cells, "kind").lower() or kind
         if given and given not in _KINDS:
             raise FeatureProblemError(
@@ -159,7 +287,7 @@ def _geometry(
             )
         kind, frame = given, its_frame
         rings.setdefault(_cell(cells, "ring"), []).append(csv_position(cells, where))
-        speeds.append(_speed(_cell(cells, _SPEED), where))
+        speeds.append(_speed(cells, where))
     if kind == "area" and len(rings) > 1:
         areas = [positions_as(ring, frame, "area") for ring in rings.values()]
         return Area(
@@ -170,14 +298,15 @@ def _geometry(
     return with_speeds(geometry, speeds) if any(each is not None for each in speeds) else geometry
 
 
-def _speed(text: str, where: str) -> float | None:
-    if not text.strip():
+def _speed(cells: _Cells, where: str) -> float | None:
+    text, column = cells.get(_SPEED, ("", Column(_SPEED)))
+    if not text:
         return None
     try:
-        return float(text)
+        return float(text) * column.scale
     except ValueError:
-        raise GeometryError(f"{where}: {_SPEED} {text[:20]!r} is not a number") from None
+        raise GeometryError(f"{where}: speed {text[:20]!r} is not a number") from None
 
 
-def _cell(cells: Mapping[str, tuple[str, Column]], name: str) -> str:
+def _cell(cells: _Cells, name: str) -> str:
     return cells[name][0] if name in cells else ""
