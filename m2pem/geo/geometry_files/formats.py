@@ -39,6 +39,7 @@ _READERS: Mapping[str, Reader] = {
     ".json": read_geojson,
     ".kml": read_kml,
     ".kmz": read_kmz,
+    ".wpml": read_kml,
     ".csv": read_csv,
     ".plan": read_plan,
     ".waypoints": read_waypoints,

@@ -91,19 +91,19 @@ def _read(content: bytes, contents: Contents, members: Sequence[str], base: str)
     if has_waylines(root):
         read_waylines(root, contents)
         return []
-    for element in root.iter(etree.Element):
+    for element in root.iter(*(f"{{*}}{name}" for name in ("Placemark", *_NOT_READ))):
         local = local_name(element)
-        if local in ("Placemark", *_NOT_READ) and next(element.iterancestors("{*}Update"), None):
+        if any(True for _ in element.iterancestors("{*}Update")):
             continue
         if local == "Placemark":
             _read_placemark(element, contents)
-        elif local in _NOT_READ:
-            href = next(element.iter("{*}href"), None) if local == "NetworkLink" else None
-            text = "" if href is None else unquote((href.text or "").strip()).partition("#")[0]
-            target = normpath(join(dirname(base), text))
-            if target in members:
-                linked[target] = None
-                continue
+            continue
+        href = next(element.iter("{*}href"), None) if local == "NetworkLink" else None
+        text = "" if href is None else unquote((href.text or "").strip()).partition("#")[0]
+        target = normpath(join(dirname(base), text))
+        if target in members:
+            linked[target] = None
+        else:
             name = child_text(element, "name")
             contents.warn(f"{local} {name!r}" if name else local, *_NOT_READ[local])
     return list(linked)

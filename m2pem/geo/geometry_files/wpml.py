@@ -11,7 +11,7 @@ from math import isfinite, nan
 from m2pem.geo.geoid import mean_sea_level_m
 from m2pem.geo.geojson import GeometryError
 from m2pem.geo.geometry_files.contents import Contents, FeatureProblemError
-from m2pem.geo.geometry_files.kml_elements import Element, child_text, coordinates, local_name
+from m2pem.geo.geometry_files.kml_elements import Element, child_text, coordinates
 from m2pem.mission.geometry import Coordinate, Route
 
 _ELLIPSOID = "WGS84"
@@ -34,6 +34,7 @@ _OF_MISSION = {
 
 _STRAIGHT = ("", "toPointAndStopWithDiscontinuityCurvature")
 _AS_ROUTES = ("", "followWayline")
+_HEADING = "waypointHeadingMode"
 
 
 def has_waylines(root: Element) -> bool:
@@ -63,6 +64,9 @@ def read_waylines(root: Element, contents: Contents) -> None:
                 )
             route = _route(folder)
             _warn_of_commands(folder, where, contents)
+            others = [each for each in folder.iter("{*}Placemark") if not child_text(each, "index")]
+            if others:
+                contents.warn(where, "placemarks without a wpml:index are not read")
             contents.add(f"wayline_{name}", route)
 
 
@@ -95,10 +99,10 @@ def _route(folder: Element) -> Route:
 
 def _in_order(folder: Element) -> list[tuple[int, Element]]:
     """Return the waypoints by their `wpml:index`, which is how messages name them."""
-    placemarks = [each for each in folder if local_name(each) == "Placemark"]
+    placemarks = [each for each in folder if child_text(each, "index")]
     indices = [child_text(each, "index") for each in placemarks]
     if not all(each.isdecimal() and len(each) < 10 for each in indices):
-        raise GeometryError("each waypoint has a wpml:index, a whole number")
+        raise GeometryError(f"wpml:index {', '.join(indices)[:60]} is not one whole number each")
     numbered = dict(zip(map(int, indices), placemarks, strict=True))
     if len(numbered) < len(placemarks):
         raise GeometryError("two waypoints have the same wpml:index")
@@ -108,7 +112,8 @@ def _in_order(folder: Element) -> list[tuple[int, Element]]:
 def _height(placemark: Element, folder: Element, mode: str) -> str:
     if executed := child_text(placemark, "executeHeight"):
         return executed
-    if child_text(placemark, "useGlobalHeight") == "1":
+    # Of the two heights of a template only the one for all is above the start point in each mode.
+    if mode == "relativeToStartPoint" and child_text(placemark, "useGlobalHeight") == "1":
         return child_text(folder, "globalHeight")
     return child_text(placemark, "ellipsoidHeight" if mode == _ELLIPSOID else "height")
 
@@ -128,15 +133,16 @@ def _warn_of_commands(folder: Element, where: str, contents: Contents) -> None:
     for group in folder.iter("{*}startActionGroup"):
         for each in group.iter("{*}actionActuatorFunc"):
             at[f"action {each.text}"].append("before the first one")
-    turn_of_all = child_text(folder, "globalWaypointTurnMode")
+    for each in folder.iter("{*}surfaceFollowModeEnable"):
+        if each.text == "1":
+            at["following the ground (surfaceFollowModeEnable)"].append("0 and all others")
+    turns, headings = child_text(folder, "globalWaypointTurnMode"), _first(folder, _HEADING, "")
     for number, placemark in _in_order(folder):
-        turn = next(
-            (each.text or "" for each in placemark.iter("{*}waypointTurnMode")), turn_of_all
-        )
-        heading = next((each.text or "" for each in placemark.iter("{*}waypointHeadingMode")), "")
+        turn = _first(placemark, "waypointTurnMode", turns)
+        heading = _first(placemark, _HEADING, headings)
         commands = {f"action {each.text}" for each in placemark.iter("{*}actionActuatorFunc")}
-        commands |= set() if turn.strip() in _STRAIGHT else {f"turn mode {turn.strip()}"}
-        commands |= set() if heading.strip() in _AS_ROUTES else {f"heading mode {heading.strip()}"}
+        commands |= set() if turn in _STRAIGHT else {f"turn mode {turn}"}
+        commands |= set() if heading in _AS_ROUTES else {f"heading mode {heading}"}
         for command in commands:
             at[command[:60]].append(str(number))
     for command, numbers in sorted(at.items()):
@@ -145,3 +151,8 @@ def _warn_of_commands(folder: Element, where: str, contents: Contents) -> None:
             f"{command} is not read: of waypoint {', '.join(numbers)[:200]}",
             "draw it in the mission",
         )
+
+
+def _first(element: Element, name: str, default: str) -> str:
+    found = next(element.iter(f"{{*}}{name}"), None)
+    return default if found is None else (found.text or "").strip()
