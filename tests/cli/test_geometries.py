@@ -83,6 +83,8 @@ def test_a_drawing_is_imported_listed_exported_deleted_and_restored(
         (("import", "far.geojson"), 1, "from the fleet's origin"),
         (("import", "bad.geojson"), 1, "not all of it can be read"),
         (("import", "bad.geojson", "bad"), 1, "'bad' is not a route, area or point"),
+        (("import", "link.kml"), 1, "link.kml: has no route, area or point"),
+        (("import", "link.kml", "gate"), 1, "'gate' is not a route, area or point"),
     ],
 )
 def test_what_cannot_be_done_is_said_and_changes_nothing(
@@ -98,6 +100,7 @@ def test_what_cannot_be_done_is_said_and_changes_nothing(
     (tmp_path / "far.geojson").write_text(features(("near", GATE), ("far", Point((0, 0, None)))))
     bad = features(("lane", GATE)).replace('"features": [', '"features": [{"type": "Feature"}, ')
     (tmp_path / "bad.geojson").write_text(bad)
+    (tmp_path / "link.kml").write_text("<kml><NetworkLink><name>more</name></NetworkLink></kml>")
     found, _, err = invoke("geometries", *arguments, "--fleet", fleet)
     assert (found, says in err) == (status, True), err
     _, out, _ = invoke("geometries", "list", "--fleet", fleet, "--format", "json")

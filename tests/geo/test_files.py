@@ -21,6 +21,19 @@ def test_the_suffix_says_how_to_read(tmp_path: Path) -> None:
     assert isinstance(read_geometry(tmp_path / "a.csv", "point"), Point)
 
 
+def test_geojson_of_another_reference_system_is_converted(tmp_path: Path) -> None:
+    def written(name: str) -> Path:
+        crs = {"type": "name", "properties": {"name": name}}
+        geometry = {"type": "Point", "coordinates": [500_000, 0], "crs": crs}
+        return write_json(tmp_path / "a.geojson", geometry)
+
+    found = read_geometry(written("EPSG:32631"), "point")
+    assert isinstance(found, Point)
+    assert found.position[:2] == pytest.approx((0.0, 3.0))
+    with pytest.raises(GeometryError, match="'EPSG:999999' is not known to PROJ"):
+        read_geometry(written("EPSG:999999"), "point")
+
+
 def test_another_kind_of_geometry_is_refused(tmp_path: Path) -> None:
     path = write_json(tmp_path / "a.geojson", LINE)
     with pytest.raises(GeometryError, match=r"a\.geojson: holds a route; an area is expected"):

@@ -136,7 +136,9 @@ def _warn_of_commands(folder: Element, where: str, contents: Contents) -> None:
     for each in folder.iter("{*}surfaceFollowModeEnable"):
         if each.text == "1":
             at["following the ground (surfaceFollowModeEnable)"].append("0 and all others")
-    turns, headings = child_text(folder, "globalWaypointTurnMode"), _first(folder, _HEADING, "")
+    turns, headings = child_text(folder, "globalWaypointTurnMode"), ""
+    for each in folder.iter("{*}globalWaypointHeadingParam"):
+        headings = child_text(each, _HEADING)
     for number, placemark in _in_order(folder):
         turn = _first(placemark, "waypointTurnMode", turns)
         heading = _first(placemark, _HEADING, headings)

@@ -121,6 +121,65 @@ def test_a_feature_with_one_bad_part_is_left_out_whole() -> None:
     assert "latitude 95" in problem
 
 
+def with_crs(name: str, *coordinates: Sequence[float], **properties: str) -> str:
+    geometry = {"type": "LineString", "coordinates": coordinates}
+    feature = {"type": "Feature", "properties": properties, "geometry": geometry}
+    crs = {"type": "name", "properties": {"name": name}}
+    return json.dumps({"type": "FeatureCollection", "crs": crs, "features": [feature]})
+
+
+def test_positions_of_another_reference_system_are_converted() -> None:
+    """GeoJSON of 2008 had a member `crs`; QGIS and GDAL still write it."""
+    line = ((500_000, 0, 5), (500_000, 0, 6))
+    (route,) = read("a.geojson", with_crs("urn:ogc:def:crs:EPSG::32631", *line)).geometries
+    assert isinstance(route.geometry, Route)
+    for found, height in zip(route.geometry.waypoints, (5.0, 6.0), strict=True):
+        assert found == pytest.approx((0.0, 3.0, height))
+    assert route.geometry.altitude_frame == "relative"
+
+
+def test_heights_above_the_ellipsoid_are_converted_unless_they_have_a_frame() -> None:
+    places = ((-77.3192, 38.1075, 10), (-77.318, 38.1085, 10))
+    (route,) = read("a.geojson", with_crs("EPSG:4979", *places)).geometries
+    assert isinstance(route.geometry, Route)
+    assert route.geometry.waypoints[0][2] == pytest.approx(43.97, abs=0.05)
+    assert route.geometry.altitude_frame == "amsl"
+    own = with_crs("EPSG:4979", *places, altitude_frame="relative")
+    assert read("a.geojson", own).geometries[0].geometry == Route(
+        ((38.1075, -77.3192, 10.0), (38.1085, -77.318, 10.0))
+    )
+
+
+@pytest.mark.parametrize("name", ["urn:ogc:def:crs:OGC:1.3:CRS84", "EPSG:4326"])
+def test_what_is_wgs_84_anyway_is_read_as_it_is(name: str) -> None:
+    (route,) = read("a.geojson", with_crs(name, (7, 53), (8, 54))).geometries
+    assert route.geometry == Route(((53.0, 7.0, None), (54.0, 8.0, None)))
+
+
+@pytest.mark.parametrize(
+    ("name", "place", "says"),
+    [
+        ("EPSG:104326", [7, 53], "its 'crs' 'EPSG:104326' is not known to PROJ"),
+        ("EPSG:25832", ["a", 1], "is no position"),
+        ("EPSG:25832", [1, 2, 3, 4], "is no position"),
+        ("EPSG:25832", [], "is no position"),
+        ("EPSG:25832", [1e30, 1e30], "is no place of"),
+    ],
+)
+def test_positions_that_cannot_be_converted_are_problems(
+    name: str, place: Sequence[Any], says: str
+) -> None:
+    (problem,) = problems("a.geojson", with_crs(name, place, place))
+    assert says in problem
+
+
+def test_a_file_beyond_the_limit_of_positions_is_refused_before_it_is_parsed() -> None:
+    """A million lists are hundreds of megabytes: the rest of this is not JSON, and never read."""
+    many = '{"type": "LineString", "coordinates": [' + "[7, 53]," * 200_001 + "never"
+    (problem,) = problems("a.geojson", many)
+    assert problem == "the file has more than 200,000 positions; simplify its lines"
+
+
 # --- KML ----------------------------------------------------------------------------------------
 
 
