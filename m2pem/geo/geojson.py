@@ -22,6 +22,9 @@ ALTITUDE_FRAMES = ("relative", "amsl", "terrain")
 SPEEDS = "speeds_m_s"
 """The property, and the extended data of KML, with the speeds of a route's waypoints."""
 
+_ROUNDING_DEG = 1e-9
+"""Within it a longitude beyond 180 degrees is 180: Natural Earth's Russia has 180.00000000000014."""
+
 _TYPES = ("LineString", "MultiPoint", "Polygon", "Point", "Feature", "FeatureCollection")
 
 
@@ -201,6 +204,8 @@ def coordinate(
     longitude_deg = _number(longitude, "longitude", where)
     if abs(latitude_deg) > 90.0:
         raise GeometryError(f"{where}: latitude {latitude_deg:g} is not within -90..90{hint}")
+    if 180.0 < abs(longitude_deg) < 180.0 + _ROUNDING_DEG:
+        longitude_deg = math.copysign(180.0, longitude_deg)
     if abs(longitude_deg) > 180.0:
         raise GeometryError(f"{where}: longitude {longitude_deg:g} is not within -180..180{hint}")
     altitude_m = None if altitude is None else _number(altitude, "altitude", where)

@@ -41,6 +41,11 @@ def test_the_altitude_frame_is_a_property_of_the_feature() -> None:
     assert parse_geojson({"type": "FeatureCollection", "features": [feature]}) == expected
 
 
+def test_a_longitude_of_180_degrees_with_an_error_of_rounding_is_180_degrees() -> None:
+    point = parse_geojson({"type": "Point", "coordinates": [-180.00000000000014, 1]})
+    assert point == Point((1.0, -180.0, None))
+
+
 @pytest.mark.parametrize(
     ("value", "message"),
     [

@@ -203,13 +203,9 @@ def _columns(header: Sequence[str], where: str, contents: Contents) -> dict[int,
                 left.append(text)
         elif column.name in columns and column.name in ("name", "kind", "ring"):
             left.append(text)
-        elif column.name in columns and text.lower() not in ("x", "y"):
-            first, _ = columns[column.name]
-            if header[first].lower() in ("x", "y"):
-                columns[column.name] = (index, column)
-            else:
-                both = f"{header[first]!r} and {text!r}"
-                stops.append((f"{where}: columns {both} hold the same", "leave one of them out"))
+        elif column.name in columns:
+            both = f"{header[columns[column.name][0]]!r} and {text!r}"
+            stops.append((f"{where}: columns {both} hold the same", "leave one of them out"))
         else:
             columns[column.name] = (index, column)
     for needed in ("lat", "lon"):

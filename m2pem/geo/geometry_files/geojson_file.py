@@ -34,23 +34,24 @@ def read_geojson(content: bytes, contents: Contents) -> None:
     value = parsed_json(text)
     if not isinstance(value, Mapping) or not isinstance(value.get("type"), str):
         raise GeometryError("is not GeoJSON: an object with 'type' is expected")
+    system = None
     if not is_wgs84(value.get("crs")):
         # Loaded when needed: every command line reads fleets, few files have another system.
         from m2pem.geo.geometry_files.reference_system import system_of_geojson  # noqa: PLC0415
 
         system = system_of_geojson(value["crs"])
-        _read_value({**value, "crs": None}, contents, system)
-        system.warn_of_accuracy(contents, "")
+        value = {**value, "crs": None}
+    if value["type"] == "FeatureCollection":
+        _read_features(value, contents, system)
     else:
-        _read_value(value, contents, None)
+        read_feature(value, "", contents, system)
+    if system is not None:
+        system.warn_of_accuracy(contents, "")
 
 
-def _read_value(
+def _read_features(
     value: Mapping[str, Any], contents: Contents, system: "ReferenceSystem | None"
 ) -> None:
-    if value["type"] != "FeatureCollection":
-        read_feature(value, "", contents, system)
-        return
     features = value.get("features")
     if not isinstance(features, list):
         raise GeometryError("features: a list of features is expected")
@@ -80,7 +81,12 @@ def read_feature(
         if system is not None:
             given = properties if isinstance(properties, Mapping) else {}
             frame = str(given.get("altitude_frame") or "")
-            parts = [_in_wgs84(part, system, frame) for part in parts]
+            parts = [
+                {**each, "coordinates": _in_wgs84(each.get("coordinates"), system, frame)}
+                if isinstance(each, Mapping)
+                else each
+                for each in parts
+            ]
             if system.has_heights and not frame:
                 properties = {**given, "altitude_frame": "amsl"}
         read = [
@@ -120,30 +126,23 @@ def _parts(geometry: object, depth: int = 0) -> list[Any]:
     return [geometry]
 
 
-def _in_wgs84(part: object, system: "ReferenceSystem", frame: str) -> object:
-    """Return a single geometry in WGS 84; what is no geometry, as it is."""
-
-    def converted(value: Any, depth: int = 0) -> Any:
-        lists = (
-            [each for each in value if isinstance(each, list)] if isinstance(value, list) else []
-        )
-        if not lists:
-            return system.to_wgs84([_position(value)], frame)[0]
-        if depth < MAX_DEPTH and any(isinstance(each, list) for each in lists[0]):
-            return [converted(each, depth + 1) for each in value]
-        return system.to_wgs84([_position(each) for each in value], frame)
-
-    if not isinstance(part, Mapping) or "coordinates" not in part:
-        return part
-    return {**part, "coordinates": converted(part["coordinates"])}
+def _in_wgs84(value: Any, system: "ReferenceSystem", frame: str) -> Any:
+    """Return positions, in lists of any depth, in WGS 84; what is none stays as it is."""
+    if _is_position(value):
+        return system.to_wgs84([value], frame)[0]
+    if not isinstance(value, list):
+        return value
+    if value and all(map(_is_position, value)):
+        return system.to_wgs84(value, frame)
+    return [_in_wgs84(each, system, frame) for each in value]
 
 
-def _position(value: object) -> tuple[float, float, float | None]:
-    given = value if isinstance(value, list) else []
-    numbers = [each for each in given if isinstance(each, int | float) and abs(each) < 1e300]
-    if len(numbers) != len(given) or not 2 <= len(given) <= 3:
-        raise GeometryError(f"coordinates: {str(value)[:40]} is no position")
-    return (float(numbers[0]), float(numbers[1]), float(numbers[2]) if numbers[2:] else None)
+def _is_position(value: object) -> bool:
+    return (
+        isinstance(value, list)
+        and len(value) in (2, 3)
+        and all(isinstance(each, int | float) and abs(each) < 1e300 for each in value)
+    )
 
 
 def _name(feature: object) -> str:

@@ -7,7 +7,7 @@ the area for which the chosen transformation is meant.
 
 import re
 from collections.abc import Mapping, Sequence
-from math import isfinite, isinf
+from math import isfinite
 
 from pyproj import CRS, Transformer
 from pyproj.exceptions import CRSError, ProjError
@@ -27,6 +27,8 @@ _ALIGNED_WITH_WGS84 = frozenset({"China 2000"})
 """Datums that are within a decimetre of WGS 84 by their definition (CGCS2000: ITRF97 at the epoch
 2000.0), of which PROJ 9.5 knows no transformation."""
 
+_WGS84 = re.compile(r"WGS[ _]?(19)?84")
+_ANGLE = re.compile(r"deg|grad|gon|rad", re.I)
 _OF_TIDES = re.compile(
     r"\b(low|high|tid\w+|chart|MLLW|MLW|MHW|LAT|HAT)\b|low.?water|high.?water", re.I
 )
@@ -44,43 +46,34 @@ class ReferenceSystem:
 
     def __init__(self, crs: CRS) -> None:
         self.name = " ".join(crs.name.split())[:80]
-        horizontal, self._vertical = (crs, None)
-        if crs.is_compound:
-            horizontal, self._vertical = crs.sub_crs_list[:2]
+        horizontal, *vertical = crs.sub_crs_list if crs.is_compound else [crs]
         if not (horizontal.is_geographic or horizontal.is_projected):
             raise self._refused(f"is neither geographic nor projected ({horizontal.type_name})")
-        if self._vertical is not None and _OF_TIDES.search(_names(self._vertical)):
-            raise self._refused(f"has heights above {self._vertical.name!r}, not above sea level")
-        axes = (
-            horizontal.source_crs or horizontal if horizontal.is_bound else horizontal
-        ).axis_info
+        for each in vertical:
+            datum = each.datum.name if each.datum else ""
+            if _OF_TIDES.search(f"{each.name} {datum}".replace("_", " ")):
+                raise self._refused(f"has heights above {each.name!r}, not above sea level")
+        own = horizontal.source_crs if horizontal.is_bound else horizontal
+        axes = (own or horizontal).axis_info
         self._is_3d = len(axes) == 3
-        self.has_heights = self._is_3d or self._vertical is not None
-        self._axis = self._vertical.axis_info[0] if self._vertical is not None else axes[-1]
-        self._transformer = self._of(horizontal)
+        self.has_heights = self._is_3d or bool(vertical)
+        self._axis = vertical[0].axis_info[0] if vertical else axes[-1]
+        self._transformer = self._of(horizontal, own.datum.name if own and own.datum else "")
         self._accuracies_m: dict[str, float] = {}
 
-    def _of(self, crs: CRS) -> Transformer:
+    def _of(self, crs: CRS, datum: str) -> Transformer:
         target = CRS.from_epsg(4979 if self._is_3d else 4326)
-        datum = crs.datum or (crs.source_crs.datum if crs.source_crs else None)
-        name = datum.name if datum else ""
-        aligned = name in _ALIGNED_WITH_WGS84 or (
-            # What GDAL writes of a system that says of its datum only the ellipsoid of WGS 84.
-            bool(re.search("unknown", name, re.I))
-            and "towgs84" not in name.lower()
-            and crs.ellipsoid is not None
-            and crs.ellipsoid.name.replace("_", " ").replace(" ", "") in ("WGS84", "WGS1984")
-        )
+        # What GDAL writes of a system that says of its datum only the ellipsoid of WGS 84.
+        unnamed = re.match(r"(?!.*towgs84).*unknown", datum, re.I) is not None
+        ellipsoid = crs.ellipsoid.name if crs.ellipsoid else ""
+        aligned = unnamed and _WGS84.fullmatch(ellipsoid) or datum in _ALIGNED_WITH_WGS84
         try:
-            return Transformer.from_crs(crs, target, always_xy=True, allow_ballpark=aligned)
+            return Transformer.from_crs(crs, target, always_xy=True, allow_ballpark=bool(aligned))
         except ProjError:
-            raise self._refused(
-                f"of its datum {name[:80]!r} no transformation to WGS 84 is known"
-            ) from None
+            why = f"of its datum {datum[:80]!r} no transformation to WGS 84 is known"
+            raise self._refused(why) from None
 
-    def to_wgs84(
-        self, positions: Sequence[tuple[float, float, float | None]], frame: str = ""
-    ) -> list[list[float]]:
+    def to_wgs84(self, positions: Sequence[Sequence[float]], frame: str = "") -> list[list[float]]:
         """Return positions as [longitude, latitude], and the height in metres where one is given.
 
         `frame`: of the heights, if the file says it beside the reference system; else heights of a
@@ -89,92 +82,74 @@ class ReferenceSystem:
         Raises:
             FeatureProblemError: a position, or a height, cannot be converted.
         """
-        if not positions:
-            return []
-        raw = [0.0 if each[2] is None else each[2] for each in positions]
-        converted = self._converted(
-            [each[0] for each in positions], [each[1] for each in positions], raw
-        )
         result = []
-        for (x, y, z), (longitude, latitude, height) in zip(positions, converted, strict=True):
-            if not (isfinite(longitude) and isfinite(latitude)):
-                raise FeatureProblemError(f"({x:g}, {y:g}) is no place of {self.name!r}", _EXPORT)
+        for given, (longitude, latitude, height) in zip(
+            positions, self._converted(positions), strict=True
+        ):
             place = [longitude, latitude]
-            if z is not None:
-                place.append(self._height(z, height, place, frame))
+            if len(given) > 2:
+                if self._is_3d and not frame:
+                    place.append(mean_sea_level_m(latitude, longitude, height))
+                else:
+                    place.append(self._metres(given[2]))
             result.append(place)
         return result
 
     def warn_of_accuracy(self, contents: Contents, where: str) -> None:
         """Warn of each transformation that was used and is not known to be right within 1 m."""
         for description, accuracy_m in self._accuracies_m.items():
-            said = (
-                "an accuracy that is not known"
-                if accuracy_m < 0
-                else f"an accuracy of {accuracy_m:g} m"
-            )
-            contents.warn(where, f"is converted from {self.name!r} by {description!r} with {said}")
+            accuracy = f"of {accuracy_m:g} m" if accuracy_m >= 0 else "that is not known"
+            message = f"is converted from {self.name!r} by {description!r} with an accuracy"
+            contents.warn(where, f"{message} {accuracy}")
 
-    def _height(self, z: float, converted: float, place: Sequence[float], frame: str) -> float:
-        if self.has_heights and self._is_3d and not frame:
-            return mean_sea_level_m(place[1], place[0], converted)
+    def _metres(self, height: float) -> float:
         factor: float = self._axis.unit_conversion_factor
-        if self._vertical is None and not self._is_3d:
-            angular = self._axis.unit_name.lower().startswith(("deg", "grad", "gon", "rad"))
-            if z and not angular and factor != 1.0:
-                raise FeatureProblemError(
-                    f"{self.name!r} is in {self._axis.unit_name!r} and does not say in which unit "
-                    f"the height {z:g} is",
-                    _EXPORT,
-                )
-            return z
-        return -z * factor if self._axis.direction == "down" else z * factor
+        if self.has_heights:
+            return -height * factor if self._axis.direction == "down" else height * factor
+        if height and factor != 1.0 and not _ANGLE.match(self._axis.unit_name):
+            what = f"{self.name!r} is in {self._axis.unit_name!r} and does not say in which"
+            raise FeatureProblemError(f"{what} unit the height {height:g} is", _EXPORT)
+        return height
 
     def _converted(
-        self, xs: Sequence[float], ys: Sequence[float], zs: Sequence[float]
-    ) -> list[tuple[float, float, float]]:
+        self, positions: Sequence[Sequence[float]]
+    ) -> Sequence[tuple[float, float, float]]:
+        rows = [(each[0], each[1], each[2] if len(each) > 2 else 0.0) for each in positions]
+        xs, ys, zs = ([row[axis] for row in rows] for axis in range(3))
         places = list(zip(*self._transformer.transform(xs, ys, zs), strict=True))
         if self._is_meant_for(places):
             return places
         # PROJ chooses an operation for each position, and names only that of the last one.
-        for index, (x, y, z) in enumerate(zip(xs, ys, zs, strict=True)):
-            places[index] = self._transformer.transform(x, y, z)
+        for index, row in enumerate(rows):
+            places[index] = self._transformer.transform(row[0], row[1], row[2])
             if not self._is_meant_for(places[index : index + 1]):
-                longitude, latitude = places[index][:2]
-                raise self._refused(
-                    "no transformation to WGS 84 is known for latitude "
-                    f"{latitude:.6g}, longitude {longitude:.6g}"
-                )
+                place = f"({row[0]:.10g}, {row[1]:.10g})"
+                raise self._refused(f"no transformation to WGS 84 is known for {place}")
         return places
 
     def _is_meant_for(self, places: Sequence[tuple[float, float, float]]) -> bool:
+        if not all(isfinite(each[0]) and isfinite(each[1]) for each in places):
+            return False
         try:
             operation = self._transformer.get_last_used_operation()
         except ProjError:  # there is only one, and it changes nothing (pyproj 3.7)
             operation = self._transformer
-        if operation.accuracy == 0.0 or any(isinf(each[0]) for each in places):
-            return True
         area = operation.area_of_use
-        if area is not None:
-            wraps = area.west > area.east
+        if area is not None and operation.accuracy != 0.0:
+            width = (area.east - area.west) % 360 or 360
             for longitude, latitude, _ in places:
-                east, west = longitude <= area.east, longitude >= area.west
-                if not (
-                    area.south <= latitude <= area.north
-                    and (east or west if wraps else east and west)
-                ):
+                is_within = (longitude - area.west) % 360 <= width
+                if not (is_within and area.south <= latitude <= area.north):
                     return False
         if not 0.0 <= operation.accuracy <= 1.0:
-            steps = [
-                each for each in operation.description.split(" + ") if "axis order" not in each
-            ]
-            self._accuracies_m[steps[-1] if steps else operation.description] = operation.accuracy
+            steps = operation.description.split(" + ")
+            used = [each for each in steps if "axis order" not in each][-1:] or steps
+            self._accuracies_m[used[0]] = operation.accuracy
         return True
 
     def _refused(self, why: str) -> FeatureProblemError:
-        return FeatureProblemError(
-            f"is of {self.name!r}, which cannot be converted: {why}", _EXPORT
-        )
+        message = f"is of {self.name!r}, which cannot be converted: {why}"
+        return FeatureProblemError(message, _EXPORT)
 
 
 def system_of_wkt(text: str) -> ReferenceSystem:
@@ -189,9 +164,8 @@ def system_of_wkt(text: str) -> ReferenceSystem:
     try:
         return ReferenceSystem(CRS.from_wkt(text))
     except CRSError as error:
-        raise FeatureProblemError(
-            f"its .prj {name!r} cannot be read: {str(error)[:120]}", _EXPORT
-        ) from None
+        message = f"its .prj {name!r} cannot be read: {str(error)[:120]}"
+        raise FeatureProblemError(message, _EXPORT) from None
 
 
 def system_of_geojson(crs: object) -> ReferenceSystem:
@@ -211,10 +185,5 @@ def system_of_geojson(crs: object) -> ReferenceSystem:
     try:
         return ReferenceSystem(CRS.from_authority(found[1].upper(), found[2]))
     except CRSError:
-        raise FeatureProblemError(
-            f"its 'crs' {name[:80]!r} is not known to PROJ", _EXPORT
-        ) from None
-
-
-def _names(vertical: CRS) -> str:
-    return f"{vertical.name} {vertical.datum.name if vertical.datum else ''}".replace("_", " ")
+        message = f"its 'crs' {name[:80]!r} is not known to PROJ"
+        raise FeatureProblemError(message, _EXPORT) from None

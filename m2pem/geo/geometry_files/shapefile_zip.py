@@ -1,7 +1,6 @@
 """Shapefiles (Esri), each layer with its .dbf and .prj, in a ZIP archive."""
 
 import struct
-from collections.abc import Sequence
 from io import BytesIO
 from math import isnan
 from pathlib import PurePosixPath
@@ -100,58 +99,50 @@ def _read_shapes(
                 "a field alt_frame may say relative or terrain",
             )
         with contents.feature(where):
-            geometry = _geometry(shape, system, frame, where, contents)
-            frame = frame or ("amsl" if shape.shapeType in _WITH_Z else "")
+            geometry = _geometry(shape, where, contents)
+            if shape.shapeType in _WITH_Z and not system.has_heights:
+                frame = frame or "amsl"
             properties = {"name": title, **({"altitude_frame": frame} if frame else {})}
             feature = {"type": "Feature", "properties": properties, "geometry": geometry}
-            read_feature(feature, where, contents)
+            read_feature(feature, where, contents, system)
 
 
-def _geometry(
-    shape: "shapefile.Shape", system: ReferenceSystem, frame: str, where: str, contents: Contents
-) -> dict[str, Any]:
-    """Return a shape as GeoJSON in WGS 84.
+def _geometry(shape: "shapefile.Shape", where: str, contents: Contents) -> dict[str, Any]:
+    """Return a shape as GeoJSON in its own reference system.
 
     By index: pyshp 3.1.6 leaves the Z values out of `__geo_interface__`, and a line may pass a
     place twice at different heights.
     """
     kind = shape.shapeType
-    heights: list[float | None] = [None] * len(shape.points)
+    places = [[x, y] for x, y, *_ in shape.points]
     if kind in _WITH_Z:
-        heights = [None if isnan(z) or z <= _NO_DATA else z for z in shape.z]
-        if missing := [str(number) for number, z in enumerate(heights, 1) if z is None]:
+        missing = []
+        for number, (place, z) in enumerate(zip(places, shape.z, strict=True), start=1):
+            if isnan(z) or z <= _NO_DATA:
+                missing.append(str(number))
+            else:
+                place.append(z)
+        if missing:
             contents.warn(where, f"has no height at position {', '.join(missing)[:200]}")
     if any(each is not None for each in getattr(shape, "m", ())):
         contents.warn(where, "its measures (M values) are not read")
-    flat = [(x, y, z) for (x, y, *_), z in zip(shape.points, heights, strict=True)]
-    places = system.to_wgs84(flat, frame)
     if kind in _POINTS:
         return {"type": "Point", "coordinates": places[0] if places else []}
     if kind in _MULTIPOINTS:
         return {"type": "MultiPoint", "coordinates": places}
+    if kind not in (*_LINES, *_POLYGONS):
+        remedy = "export points, multi-points, lines or polygons"
+        raise FeatureProblemError(f"is a {shape.shapeTypeName}", remedy)
     ends = [*shape.parts[1:], len(places)]
     parts = [places[start:end] for start, end in zip(shape.parts, ends, strict=True)]
     if kind in _LINES:
         return {"type": "MultiLineString", "coordinates": parts}
-    if kind in _POLYGONS:
-        return {"type": "MultiPolygon", "coordinates": _polygons(shape, parts)}
-    raise FeatureProblemError(
-        f"is a {shape.shapeTypeName}", "export points, multi-points, lines or polygons"
-    )
-
-
-def _polygons(
-    shape: "shapefile.Shape", rings: Sequence[list[list[float]]]
-) -> list[list[list[list[float]]]]:
-    """Return the rings in polygons. pyshp decides by x and y which ring is a hole of which."""
-    ends = [*shape.parts[1:], len(shape.points)]
-    flat = [
-        [tuple(point[:2]) for point in shape.points[start:end]]
-        for start, end in zip(shape.parts, ends, strict=True)
-    ]
-    ring_of = {id(each): ring for each, ring in zip(flat, rings, strict=True)}
+    # pyshp decides by x and y which ring is a hole of which, and returns the lists that it got.
+    flat = [[(x, y) for x, y, *_ in part] for part in parts]
+    part_of = {id(ring): part for ring, part in zip(flat, parts, strict=True)}
     polygons = shapefile.organize_polygon_rings(flat)
-    return [[ring_of[id(each)] for each in polygon] for polygon in polygons]
+    rings = [[part_of[id(ring)] for ring in polygon] for polygon in polygons]
+    return {"type": "MultiPolygon", "coordinates": rings}
 
 
 def _position_count(shp: bytes) -> int:

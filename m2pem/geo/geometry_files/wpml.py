@@ -22,15 +22,15 @@ _FRAME_OF = {
     "aboveGroundLevel": "terrain",
     "realTimeFollowSurface": "terrain",
 }
-_OF_MISSION = {
-    "flyToWaylineMode": "",
-    "finishAction": "noAction",
-    "exitOnRCLost": "",
-    "executeRCLostAction": "",
-    "takeOffSecurityHeight": "",
-    "globalRTHHeight": "",
-}
-"""Of `missionConfig`: what commands the vehicle, and the value that commands nothing."""
+_OF_MISSION = (
+    "flyToWaylineMode",
+    "finishAction",
+    "exitOnRCLost",
+    "executeRCLostAction",
+    "takeOffSecurityHeight",
+    "globalRTHHeight",
+)
+"""Of `missionConfig`: what commands the vehicle."""
 
 _STRAIGHT = ("", "toPointAndStopWithDiscontinuityCurvature")
 _AS_ROUTES = ("", "followWayline")
@@ -46,9 +46,7 @@ def read_waylines(root: Element, contents: Contents) -> None:
     """Collect the waylines of a document, each as a route."""
     for config in root.iter("{*}missionConfig"):
         given = {name: child_text(config, name) for name in _OF_MISSION}
-        left = [
-            f"{name} {given[name]}" for name in given if given[name] not in ("", _OF_MISSION[name])
-        ]
+        left = [f"{name} {text}" for name, text in given.items() if text not in ("", "noAction")]
         if left:
             contents.warn("missionConfig", f"not read: {', '.join(left)}", "draw it in the mission")
     for folder in root.iter("{*}Folder"):
@@ -64,9 +62,6 @@ def read_waylines(root: Element, contents: Contents) -> None:
                 )
             route = _route(folder)
             _warn_of_commands(folder, where, contents)
-            others = [each for each in folder.iter("{*}Placemark") if not child_text(each, "index")]
-            if others:
-                contents.warn(where, "placemarks without a wpml:index are not read")
             contents.add(f"wayline_{name}", route)
 
 
@@ -133,9 +128,6 @@ def _warn_of_commands(folder: Element, where: str, contents: Contents) -> None:
     for group in folder.iter("{*}startActionGroup"):
         for each in group.iter("{*}actionActuatorFunc"):
             at[f"action {each.text}"].append("before the first one")
-    for each in folder.iter("{*}surfaceFollowModeEnable"):
-        if each.text == "1":
-            at["following the ground (surfaceFollowModeEnable)"].append("0 and all others")
     turns, headings = child_text(folder, "globalWaypointTurnMode"), ""
     for each in folder.iter("{*}globalWaypointHeadingParam"):
         headings = child_text(each, _HEADING)
@@ -148,11 +140,8 @@ def _warn_of_commands(folder: Element, where: str, contents: Contents) -> None:
         for command in commands:
             at[command[:60]].append(str(number))
     for command, numbers in sorted(at.items()):
-        contents.warn(
-            where,
-            f"{command} is not read: of waypoint {', '.join(numbers)[:200]}",
-            "draw it in the mission",
-        )
+        message = f"{command} is not read: of waypoint {', '.join(numbers)[:200]}"
+        contents.warn(where, message, "draw it in the mission")
 
 
 def _first(element: Element, name: str, default: str) -> str:

@@ -94,6 +94,7 @@ def test_a_height_speed_or_mode_that_cannot_be_read_stops_the_import(
     ("header", "why"),
     [
         ("alt_m,height_ft", "columns 'alt_m' and 'height_ft' hold the same"),
+        ("x,y", "columns 'lon' and 'x' hold the same"),
         ("alt_agl_m,altitude_frame", "two columns say what heights are above"),
     ],
 )
@@ -101,11 +102,6 @@ def test_two_columns_that_may_differ_stop_the_import(header: str, why: str) -> N
     file = read(f"lat,lon,{header}", "53,7,1,amsl")
     assert file.geometries == ()
     assert why in str(file.problems[0])
-
-
-def test_degrees_are_taken_before_the_metres_of_a_map() -> None:
-    (point,) = read("x,y,Latitude (deg),Longitude [°]", "500000,5900000,53,7").geometries
-    assert point.geometry == Point((53.0, 7.0, None))
 
 
 def test_columns_of_something_else_are_named_and_left_out() -> None:

@@ -160,10 +160,10 @@ def test_what_is_wgs_84_anyway_is_read_as_it_is(name: str) -> None:
     ("name", "place", "says"),
     [
         ("EPSG:104326", [7, 53], "its 'crs' 'EPSG:104326' is not known to PROJ"),
-        ("EPSG:25832", ["a", 1], "is no position"),
-        ("EPSG:25832", [1, 2, 3, 4], "is no position"),
-        ("EPSG:25832", [], "is no position"),
-        ("EPSG:25832", [1e30, 1e30], "is no place of"),
+        ("EPSG:25832", ["a", 1], "longitude 'a' is not a number"),
+        ("EPSG:25832", [1, 2, 3, 4], "coordinates[0]: a position is [longitude, latitude]"),
+        ("EPSG:25832", [], "coordinates[0]: a position is [longitude, latitude]"),
+        ("EPSG:25832", [1e30, 1e30], "no transformation to WGS 84 is known for (1e+30, 1e+30)"),
     ],
 )
 def test_positions_that_cannot_be_converted_are_problems(
