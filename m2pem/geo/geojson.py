@@ -23,7 +23,7 @@ SPEEDS = "speeds_m_s"
 """The property, and the extended data of KML, with the speeds of a route's waypoints."""
 
 _ROUNDING_DEG = 1e-9
-"""Within it a longitude beyond 180 degrees is 180: Natural Earth's Russia has 180.00000000000014."""
+"""Within it a longitude beyond 180 degrees is 180: that of Natural Earth is 180.00000000000014."""
 
 _TYPES = ("LineString", "MultiPoint", "Polygon", "Point", "Feature", "FeatureCollection")
 

@@ -66,7 +66,7 @@ class ReferenceSystem:
         # What GDAL writes of a system that says of its datum only the ellipsoid of WGS 84.
         unnamed = re.match(r"(?!.*towgs84).*unknown", datum, re.I) is not None
         ellipsoid = crs.ellipsoid.name if crs.ellipsoid else ""
-        aligned = unnamed and _WGS84.fullmatch(ellipsoid) or datum in _ALIGNED_WITH_WGS84
+        aligned = (unnamed and _WGS84.fullmatch(ellipsoid)) or datum in _ALIGNED_WITH_WGS84
         try:
             return Transformer.from_crs(crs, target, always_xy=True, allow_ballpark=bool(aligned))
         except ProjError:
