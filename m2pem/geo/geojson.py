@@ -112,14 +112,19 @@ def check_crs(value: Mapping[str, Any]) -> None:
         raise GeometryError("its 'crs' is not WGS-84; export it as WGS-84 longitude and latitude")
 
 
+def crs_name(crs: object) -> str:
+    """Return the name of a member `crs` of GeoJSON of 2008, such as EPSG:25832; "" without one."""
+    properties = crs.get("properties") if isinstance(crs, Mapping) else {"name": crs}
+    given = properties if isinstance(properties, Mapping) else {}
+    return f"EPSG:{given['code']}" if "code" in given else str(given.get("name", "")).strip()
+
+
 def is_wgs84(crs: object) -> bool:
-    """Whether a member `crs` of GeoJSON of 2008 says longitude and latitude of WGS-84, or nothing.
+    """Whether a member `crs` says longitude and latitude of WGS-84, or nothing.
 
     With heights above the ellipsoid (EPSG:4979, CRS84h) it is another system.
     """
-    properties = crs.get("properties") if isinstance(crs, Mapping) else None
-    names = properties.values() if isinstance(properties, Mapping) else ()
-    return crs is None or any(re.search(r"(^|\W)(CRS84|4326)$", str(name)) for name in names)
+    return crs is None or bool(re.search(r"(^|\W)(CRS84|4326)$", crs_name(crs)))
 
 
 def with_speeds(geometry: Point | Route | Area, value: object) -> Point | Route | Area:

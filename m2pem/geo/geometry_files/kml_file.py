@@ -148,18 +148,20 @@ def _parts(element: Element) -> Iterator[Element]:
         yield element
 
 
-def _geometry(element: Element, frame: str, where: str, contents: Contents) -> Point | Route | Area:
+def _geometry(
+    element: Element, own_frame: str, where: str, contents: Contents
+) -> Point | Route | Area:
     local = local_name(element)
     mode = _mode(element)
     if local == "Model":
         raise FeatureProblemError("a Model is not read", "give its place as a Point")
-    if not frame and mode not in _CLAMPED and mode not in _FRAME_OF:
+    if not own_frame and mode not in _CLAMPED and mode not in _FRAME_OF:
         is_known = "is above the sea floor" if mode == "relativeToSeaFloor" else "is not known"
         raise FeatureProblemError(
             f"altitudeMode {mode!r} {is_known}", f"one of clampToGround, {', '.join(_FRAME_OF)}"
         )
-    keeps = bool(frame) or mode in _FRAME_OF
-    frame = frame or _FRAME_OF.get(mode, "relative")
+    keeps = bool(own_frame) or mode in _FRAME_OF
+    frame = own_frame or _FRAME_OF.get(mode, "relative")
     if local == "Polygon":
         rings = [
             _raised(element, coordinates(ring, keeps))
@@ -180,6 +182,9 @@ def _geometry(element: Element, frame: str, where: str, contents: Contents) -> P
         return Point(positions[0], frame)
     if not positions:
         raise GeometryError("has no position")
+    missing = [str(n) for n, each in enumerate(positions, start=1) if each[2] is None]
+    if not own_frame and 0 < len(missing) < len(positions):
+        contents.warn(where, f"has no altitude at position {', '.join(missing)[:200]}")
     return Route(tuple(positions), frame)
 
 

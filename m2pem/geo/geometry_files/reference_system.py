@@ -6,13 +6,14 @@ the area for which the chosen transformation is meant.
 """
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from math import isfinite
 
 from pyproj import CRS, Transformer
 from pyproj.exceptions import CRSError, ProjError
 
 from m2pem.geo.geoid import mean_sea_level_m
+from m2pem.geo.geojson import crs_name
 from m2pem.geo.geometry_files.contents import Contents, FeatureProblemError
 
 MAX_WKT_CHARACTERS = 20_000
@@ -174,14 +175,11 @@ def system_of_geojson(crs: object) -> ReferenceSystem:
     Raises:
         FeatureProblemError: it names none by authority and code, or one that cannot be converted.
     """
-    properties = crs.get("properties") if isinstance(crs, Mapping) else None
-    given = properties if isinstance(properties, Mapping) else {}
-    name = f"EPSG:{given['code']}" if "code" in given else str(given.get("name", ""))
-    found = _AUTHORITY.fullmatch(name.strip())
+    name = crs_name(crs)
+    found = _AUTHORITY.fullmatch(name)
     if found is None:
-        raise FeatureProblemError(
-            f"its 'crs' {(name or str(crs))[:80]!r} is not known", "name it as EPSG:25832, say"
-        )
+        message = f"its 'crs' {(name or str(crs))[:80]!r} is not known"
+        raise FeatureProblemError(message, "name it as EPSG:25832, say")
     try:
         return ReferenceSystem(CRS.from_authority(found[1].upper(), found[2]))
     except CRSError:

@@ -124,6 +124,13 @@ def test_an_offset_of_altitudes_is_added() -> None:
     assert found(read(kml(raised, GX)))["a"] == Route(((53.0, 7.0, 2.5), (54.0, 8.0, 3.5)), "amsl")
 
 
+def test_a_line_without_an_altitude_at_some_positions_has_a_warning() -> None:
+    body = LINE.format("a", "<altitudeMode>absolute</altitudeMode>").replace("54,6", "54")
+    file = read(kml(body))
+    assert found(file)["a"] == Route(((53.0, 7.0, 5.0), (54.0, 8.0, None)), "amsl")
+    assert [str(each) for each in file.problems] == ["placemark 'a': has no altitude at position 2"]
+
+
 def test_a_multitrack_gives_its_tracks_its_altitude_mode_unless_they_have_one() -> None:
     """The schema of `gx` has the mode at both; GDAL 3.12.4 gives it of neither."""
     own = "<altitudeMode>relativeToGround</altitudeMode>"

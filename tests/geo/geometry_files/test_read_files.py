@@ -154,6 +154,8 @@ def test_heights_above_the_ellipsoid_are_converted_unless_they_have_a_frame() ->
 def test_what_is_wgs_84_anyway_is_read_as_it_is(name: str) -> None:
     (route,) = read("a.geojson", with_crs(name, (7, 53), (8, 54))).geometries
     assert route.geometry == Route(((53.0, 7.0, None), (54.0, 8.0, None)))
+    point = {"type": "Point", "coordinates": [7, 53], "crs": name}
+    assert read("a.geojson", json.dumps(point)).geometries[0].geometry == Point((53.0, 7.0, None))
 
 
 @pytest.mark.parametrize(
