@@ -13,19 +13,22 @@ from m2pem.mission.geometry import Coordinate
 
 Element: TypeAlias = etree._Element
 
-POSITION = re.compile(r"[^\s,]+(?:\s*+,\s*+[^\s,]+)*+")
+POSITION = re.compile(r"[^\s,]+(?:\s*+,\s*+[^\s,]+)*")
 _SPACE_AFTER_COMMA = re.compile(r",\s+")
 _SPACE_BEFORE_COMMA = re.compile(r"(?<!\s)\s+,")
 """Begins only where the space does: otherwise the time grows with the square of its length."""
 
-_BEFORE_ROOT = re.compile(rb"(?:\xef\xbb\xbf)?(?>\s+|<\?.*?\?>|<!--.*?-->)*+<[\w.:-]+", re.DOTALL)
+_BEFORE_ROOT = re.compile(
+    rb"(?:\xef\xbb\xbf)?(?>(?:\s+|<\?.*?\?>|<!--.*?-->)*)<[\w.:-]+", re.DOTALL
+)
 _USED_PREFIX = re.compile(rb"[<\s]([A-Za-z_][\w.-]*+):[A-Za-z_]")
 _MOST_PREFIXES = 50
 
 
 def kml_root(content: bytes) -> Element:
-    """Return the root of a document. Names are told apart without their prefixes, so that a prefix
-    that is used and not declared does no harm: some programs write gx, xsi and wpml like that.
+    """Return the root of a document.
+
+    A prefix may be undeclared, as some programs write gx, xsi and wpml: names count without it.
 
     Raises:
         GeometryError: it is no XML, has a document type, or is another XML than KML.

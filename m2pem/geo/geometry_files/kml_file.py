@@ -41,7 +41,7 @@ _PARTS = ("MultiGeometry", "MultiTrack")
 _SINGLE = ("Point", "LineString", "LinearRing", "Polygon", "Track", "Model", *_PARTS)
 _PICTURE = ("is a picture, which is not read", "")
 _NOT_READ = {
-    "NetworkLink": ("what it refers to is not in this file", "save that as a file of its own"),
+    "NetworkLink": ("what it refers to is not in this file", "save that as a separate file"),
     "GroundOverlay": _PICTURE,
     "PhotoOverlay": _PICTURE,
     "Tour": ("is a flight of the viewer's camera, which is not read", ""),
@@ -52,7 +52,7 @@ _NOT_READ = {
 def read_kmz(content: bytes, contents: Contents) -> None:
     """Collect the placemarks of the document in a KMZ archive, and of documents that it links.
 
-    A drone maker's archive (WPML) has its waylines as they are flown in a member of their own.
+    Of a drone maker's archive (WPML) its `waylines.wpml` is read, which has them as they are flown.
 
     Raises:
         GeometryError: it is no archive, or has no document.

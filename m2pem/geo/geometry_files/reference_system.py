@@ -18,7 +18,7 @@ from m2pem.geo.geometry_files.contents import Contents, FeatureProblemError
 
 MAX_WKT_CHARACTERS = 20_000
 _EXPORT = "export it as WGS 84 (EPSG:4326), with heights in metres"
-_FILE_OF_ITS_OWN = re.compile(r"PROJ4_GRIDS|PARAMETERFILE|grids=(?!@null)", re.IGNORECASE)
+_NAMES_A_FILE = re.compile(r"PROJ4_GRIDS|PARAMETERFILE|grids=(?!@null)", re.IGNORECASE)
 """A system that names a file: PROJ would open whatever file of this computer that is."""
 
 _AUTHORITY = re.compile(
@@ -160,7 +160,7 @@ def system_of_wkt(text: str) -> ReferenceSystem:
         FeatureProblemError: it is none, or one whose positions cannot be converted.
     """
     name = " ".join(text.partition('"')[2].partition('"')[0].split())[:80]
-    if len(text) > MAX_WKT_CHARACTERS or _FILE_OF_ITS_OWN.search(text):
+    if len(text) > MAX_WKT_CHARACTERS or _NAMES_A_FILE.search(text):
         raise FeatureProblemError(f"its .prj {name!r} refers to a grid, or is too long", _EXPORT)
     try:
         return ReferenceSystem(CRS.from_wkt(text))

@@ -1,6 +1,6 @@
 """Waylines of WPML, the KML of DJI and others (DJI Cloud API, `template.kml` and `waylines.wpml`).
 
-A wayline is a route: its points in the order of `wpml:index`, with heights and speeds that stand
+A wayline is a route: its points in the order of `wpml:index`, with heights and speeds that are
 beside their coordinates. `waylines.wpml` has them as they are executed, `template.kml` as they were
 planned. What a wayline commands besides is left out, with a warning that names the waypoints.
 """

@@ -202,7 +202,7 @@ def test_links_within_an_archive_are_followed_once_each() -> None:
     place = Point((53.0, 7.0, None))
     assert found(file) == {"a": place, "b": place}
     assert [str(each) for each in file.problems] == [
-        "NetworkLink 'n': what it refers to is not in this file; save that as a file of its own",
+        "NetworkLink 'n': what it refers to is not in this file; save that as a separate file",
         "left.kml: is not read: doc.kml does not link it; save it as a file",
     ]
 
