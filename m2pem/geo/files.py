@@ -16,7 +16,7 @@ __all__ = ["GeometryError", "parse_geojson", "read_geometry"]
 
 MAX_BYTES = 5_000_000
 
-_OF_MANY = (".kml", ".kmz", ".zip")
+_OF_MANY = (".kml", ".kmz", ".wpml", ".zip")
 """Files of any number of geometries: one of the kind that is asked for is expected."""
 
 _SUFFIXES = (".geojson", ".json", ".plan", ".waypoints", ".csv", *_OF_MANY)
