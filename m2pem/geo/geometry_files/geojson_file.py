@@ -37,9 +37,9 @@ def read_geojson(content: bytes, contents: Contents) -> None:
     system = None
     if not is_wgs84(value.get("crs")):
         # Loaded when needed: every command line reads fleets, few files have another system.
-        from m2pem.geo.geometry_files.reference_system import system_of_geojson  # noqa: PLC0415
+        from m2pem.geo.geometry_files.reference_system import system_named  # noqa: PLC0415
 
-        system = system_of_geojson(value["crs"])
+        system = system_named(value["crs"])
         value = {**value, "crs": None}
     if value["type"] == "FeatureCollection":
         _read_features(value, contents, system)

@@ -169,8 +169,8 @@ def system_of_wkt(text: str) -> ReferenceSystem:
         raise FeatureProblemError(message, _EXPORT) from None
 
 
-def system_of_geojson(crs: object) -> ReferenceSystem:
-    """Return the system that the member `crs` of GeoJSON of 2008 names, such as EPSG:25832.
+def system_named(crs: object) -> ReferenceSystem:
+    """Return a system by its name, such as EPSG:25832, or by the `crs` of GeoJSON of 2008.
 
     Raises:
         FeatureProblemError: it names none by authority and code, or one that cannot be converted.

@@ -12,7 +12,7 @@ from m2pem.geo.geojson import GeometryError
 from m2pem.geo.geometry_files.archive import Archive, archive_of, member
 from m2pem.geo.geometry_files.contents import MAX_FEATURES, Contents, FeatureProblemError
 from m2pem.geo.geometry_files.geojson_file import read_feature
-from m2pem.geo.geometry_files.reference_system import ReferenceSystem, system_of_wkt
+from m2pem.geo.geometry_files.reference_system import ReferenceSystem, system_named, system_of_wkt
 
 _NAME_FIELDS = ("name", "title", "label", "id")
 _FRAME_FIELDS = ("altitude_frame", "alt_frame", "altitude_f")
@@ -27,8 +27,6 @@ _WITH_Z = frozenset(
 )
 _NO_DATA = -1e38
 """A Z value below it is none, as a measure is (Esri's white paper of 1998, page 2)."""
-
-_WGS84 = 'GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]]]'
 
 
 def read_shapefiles(content: bytes, contents: Contents) -> None:
@@ -53,7 +51,7 @@ def _read_layer(archive: Archive, name: str, contents: Contents) -> None:
     projection = (parts[".prj"] or b"").decode("utf-8-sig", "replace").strip()
     if not projection:
         contents.warn(name, "has no .prj: taken as WGS 84 longitude and latitude")
-    system = system_of_wkt(projection or _WGS84)
+    system = system_of_wkt(projection) if projection else system_named("EPSG:4326")
     contents.expect(_position_count(parts[".shp"] or b""))
     streams: dict[str, Any] = {
         suffix[1:]: BytesIO(content)

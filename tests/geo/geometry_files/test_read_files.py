@@ -12,13 +12,14 @@ import pytest
 import shapefile
 from hypothesis import given
 from hypothesis import strategies as st
+from pyproj import CRS
 
 from m2pem.findings import Severity
 from m2pem.geo.geometry_files import GeometryFile, read_geometry_file
 from m2pem.geo.geometry_files.contents import MAX_PROBLEMS
 from m2pem.mission.geometry import Area, Point, Route
 
-WGS84 = 'GEOGCS["GCS_WGS_1984",DATUM["D_WGS_1984",SPHEROID["WGS_1984",6378137.0,298.257223563]]]'
+WGS84 = CRS("EPSG:4326").to_wkt("WKT1_ESRI")
 
 
 def read(name: str, content: bytes | str) -> GeometryFile:

@@ -9,7 +9,7 @@ from rasterio.warp import transform
 
 from m2pem.geo.geojson import GeometryError
 from m2pem.geo.geometry_files.contents import Contents
-from m2pem.geo.geometry_files.reference_system import system_of_geojson, system_of_wkt
+from m2pem.geo.geometry_files.reference_system import system_named, system_of_wkt
 
 BESSEL = 'SPHEROID["Bessel_1841",6377397.155,299.1528128]'
 WGS84 = 'SPHEROID["WGS_1984",6378137.0,298.257223563]'
@@ -98,16 +98,16 @@ def test_what_cannot_be_converted_is_refused_by_its_name(wkt: str, why: str) -> 
 
 def test_a_position_outside_the_area_of_a_transformation_is_refused() -> None:
     """PROJ 9.5 takes a transformation for the Tarim basin near Beijing: 63 m off."""
-    system = system_of_geojson(named("EPSG:4214"))
+    system = system_named(named("EPSG:4214"))
     with pytest.raises(GeometryError, match=r"no transformation .* known for .116, 40."):
         system.to_wgs84([(116.0, 40.0)])
-    british = system_of_geojson(named("EPSG:27700"))
+    british = system_named(named("EPSG:27700"))
     with pytest.raises(GeometryError, match=r"no transformation"):
         british.to_wgs84([(1e30, 1e30)])
 
 
 def test_a_line_over_areas_of_several_transformations_is_converted() -> None:
-    system = system_of_geojson(named("EPSG:4267"))
+    system = system_named(named("EPSG:4267"))
     ends = [(-97.0, 48.9), (-97.0, 49.5)]  # NAD27 has others in Canada
     assert [round(each[1], 2) for each in system.to_wgs84(ends)] == [48.9, 49.5]
 
@@ -115,7 +115,7 @@ def test_a_line_over_areas_of_several_transformations_is_converted() -> None:
 def test_how_right_a_transformation_is_becomes_a_warning_if_it_is_worse_than_a_metre() -> None:
     contents = Contents("a")
     for code, place in (("25832", (500_000, 5.5e6)), ("26918", (500_000, 4e6))):
-        system = system_of_geojson(named(f"EPSG:{code}"))
+        system = system_named(named(f"EPSG:{code}"))
         system.to_wgs84([place])
         system.warn_of_accuracy(contents, code)
     (only,) = [str(each) for each in contents.whole().problems if each.feature]
@@ -144,15 +144,13 @@ def test_heights_are_metres_above_mean_sea_level(code: str, height_m: float) -> 
 
 
 def test_a_height_with_a_frame_beside_the_system_keeps_it_and_only_its_unit_changes() -> None:
-    assert system_of_geojson(named("EPSG:4979")).to_wgs84([(7, 53, 30.0)], "relative") == [
-        [7, 53, 30.0]
-    ]
+    assert system_named(named("EPSG:4979")).to_wgs84([(7, 53, 30.0)], "relative") == [[7, 53, 30.0]]
     feet = system_of_wkt(CRS("EPSG:4326+8228").to_wkt("WKT1_ESRI"))
     assert feet.to_wgs84([(7, 53, 100.0)], "terrain")[0][2] == pytest.approx(30.48)
 
 
 def test_a_system_in_feet_that_does_not_say_what_its_heights_are_keeps_only_zeros() -> None:
-    system = system_of_geojson(named("EPSG:2263"))
+    system = system_named(named("EPSG:2263"))
     assert system.to_wgs84([(1e6, 2e5, 0.0)])[0][2] == 0.0
     with pytest.raises(GeometryError, match="in 'US survey foot' and does not say in which unit"):
         system.to_wgs84([(1e6, 2e5, 12.0)])
@@ -168,7 +166,7 @@ def test_a_system_in_feet_that_does_not_say_what_its_heights_are_keeps_only_zero
     ],
 )
 def test_the_names_of_a_system_in_geojson(name: str) -> None:
-    assert system_of_geojson(named(name)).name == "ETRS89 / UTM zone 32N"
+    assert system_named(named(name)).name == "ETRS89 / UTM zone 32N"
 
 
 @pytest.mark.parametrize(
@@ -182,5 +180,5 @@ def test_the_names_of_a_system_in_geojson(name: str) -> None:
 )
 def test_a_system_that_is_not_known_is_refused(crs: object, why: str) -> None:
     with pytest.raises(GeometryError, match=r"\w") as error:
-        system_of_geojson(crs)
+        system_named(crs)
     assert why in f"{error.value}; {getattr(error.value, 'remedy', '')}"
