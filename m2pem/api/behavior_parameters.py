@@ -274,6 +274,8 @@ def encode_parameters(
                 encoded[name] = {"route": route, "frame": value.altitude_frame}
                 if value.speeds_m_s:
                     encoded[name]["speeds"] = list(value.speeds_m_s)
+                if value.altitude_frames:
+                    encoded[name]["frames"] = list(value.altitude_frames)
             case VehiclePosition():
                 encoded[name] = {"vehicle": value.vehicle}
             case bool() | int() | float() | str():
@@ -297,7 +299,8 @@ def _decoded(value: Any) -> ResolvedValue:
         return VehiclePosition(str(value["vehicle"]))
     if "route" in value:
         speeds = tuple(None if each is None else float(each) for each in value.get("speeds", ()))
-        return Route(tuple(map(_coordinate, value["route"])), str(value["frame"]), speeds)
+        frames = tuple(map(str, value.get("frames", ())))
+        return Route(tuple(map(_coordinate, value["route"])), str(value["frame"]), speeds, frames)
     return Point(_coordinate(value["point"]), str(value["frame"]))
 
 

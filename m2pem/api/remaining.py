@@ -199,24 +199,29 @@ def part_of_route(
         index for index, mark_m in enumerate(line.marks_m) if from_m - 1e-6 <= mark_m <= to_m + 1e-6
     ]
     waypoints = [route.waypoints[index] for index in kept]
+    frames = [route.frames[index] for index in kept]
     speeds = [route.speeds_m_s[index] if route.speeds_m_s else None for index in kept]
     for end_m, place in ((from_m, 0), (to_m, len(waypoints) + 1)):
         if all(abs(end_m - mark_m) >= 1e-6 for mark_m in line.marks_m):
             waypoints.insert(place, _between(route, line, frame, end_m))
+            frames.insert(place, route.frames[line.segment_at(end_m) + 1])
             speeds.insert(place, None)
     before = sum(mark_m <= from_m + 1e-6 for mark_m in line.marks_m)
     if speeds:
         speeds[0] = route.speed_from(before - 1)
     given = tuple(speeds) if any(speed is not None for speed in speeds) else ()
-    return Route(tuple(waypoints), route.altitude_frame, given)
+    return Route.of(waypoints, frames, given)
 
 
 def _between(route: Route, line: Polyline, frame: LocalFrame, along_m: float) -> Coordinate:
-    """Return the place at a distance along a route, at an altitude between its neighbours'."""
+    """Return the place at a distance along a route, at an altitude between its neighbours'; at none
+    where they are in different frames."""
     index = line.segment_at(along_m)
     before, after = route.waypoints[index][2], route.waypoints[index + 1][2]
     up_m = after
-    if before is not None and after is not None:
+    if route.frames[index] != route.frames[index + 1]:
+        up_m = None
+    elif before is not None and after is not None:
         part = (along_m - line.marks_m[index]) / line.segments[index].length_m
         up_m = before + (after - before) * part
     return (*frame.to_latlon(line.at(along_m)), up_m)

@@ -9,6 +9,7 @@ import click
 
 from m2pem.cli.completers import file_or
 from m2pem.cli.options import as_json, example, format_option, journal_option
+from m2pem.findings import lines
 
 if TYPE_CHECKING:
     from m2pem.api.allocation import SharedSpaceState, WaitingTask
@@ -112,6 +113,7 @@ def _as_data(arbiters: "FleetArbiters") -> dict[str, Any]:
             }
             for space in fleet.shared_space.values()
         },
+        "warnings": fleet.warnings,
     }
 
 
@@ -155,6 +157,8 @@ def _as_text(arbiters: "FleetArbiters") -> str:
                 offered.setdefault(behavior, []).append(name)
     behaviors = [(name, ", ".join(who)) for name, who in sorted(offered.items())]
     parts.append(table(("BEHAVIOR", "OFFERED BY"), behaviors))
+    if arbiters.fleet.warnings:
+        parts.append("\n".join(lines(arbiters.fleet.warnings)))
     return "\n\n".join(parts)
 
 

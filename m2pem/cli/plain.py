@@ -341,11 +341,15 @@ class PlainOcu:
         """To every run, now and later (paper, section 4.3)."""
         from m2pem.geo.files import read_geometry
         from m2pem.geo.geojson import as_geojson
+        from m2pem.geo.geometry_files import FileProblem
 
         if len(words) < 2:
             raise OperatorError(f"say which, and from where: {kind} NAME FILE")
         name, file = words[0], " ".join(words[1:])
-        geometry = await asyncio.to_thread(read_geometry, Path(file), kind)
+        left_out: list[FileProblem] = []
+        geometry = await asyncio.to_thread(read_geometry, Path(file), kind, left_out.append)
+        for problem in left_out:
+            self._say(f"{file}: {problem}")
         await self._control.set_geometry(name, as_geojson(geometry), by=NAME)
         self._say(f"{name} is handed over")
 

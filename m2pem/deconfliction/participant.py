@@ -158,7 +158,10 @@ class FlightParameters(BehaviorParameters):
 
     def waypoint_spans(self, route: Route) -> list[Span]:
         """The height at each waypoint of a route."""
-        return [self.span(each[2], route.altitude_frame) for each in route.waypoints]
+        return [
+            self.span(each[2], frame)
+            for each, frame in zip(route.waypoints, route.frames, strict=True)
+        ]
 
     def target_place(self) -> tuple[EastNorth | None, Span]:
         """Where `target` is, None if that is wherever a vehicle goes; and the height to be at."""

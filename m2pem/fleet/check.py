@@ -190,7 +190,7 @@ def check_mission(
     shortages = check_shortages(mission, check.demands)
     shortages += check_same_vehicle(mission, check.demands)
     roles = check_operator_roles(mission, fleet)
-    drawn = _out_of_reach(mission, fleet)
+    drawn = [*_out_of_reach(mission, fleet), *_of_files(mission, fleet)]
     return [*findings, *shortages, *_returned(mission, fleet), *roles, *drawn]
 
 
@@ -200,6 +200,20 @@ def _out_of_reach(mission: Mission, fleet: Fleet) -> Iterator[Finding]:
         if fleet.origin != NO_ORIGIN and (wrong := geometry_out_of_reach(geometry, fleet.origin)):
             message = f"geometry '{name}': {wrong[0]}"
             yield Finding(Severity.ERROR, mission.file, 0, "", "out-of-reach", message, wrong[1])
+
+
+def _of_files(mission: Mission, fleet: Fleet) -> Iterator[Finding]:
+    """What is doubtful of the files of the geometries that the mission names."""
+    named = {
+        each.value
+        for task in mission.activities()
+        if isinstance(task, ScriptTask | ServiceTask | SendTask) and task.behavior
+        for each in task.behavior.parameters
+        if isinstance(each.value, str) and each.value not in mission.geometries
+    }
+    for warning in fleet.warnings:
+        if warning.element.partition(".")[2] in named:
+            yield warning
 
 
 def _returned(mission: Mission, fleet: Fleet) -> Iterator[Finding]:

@@ -9,6 +9,7 @@ from typing import Any, get_type_hints
 import msgspec
 
 from m2pem.errors import JournalError
+from m2pem.findings import Finding
 from m2pem.fleet.hosts import CutOffPolicy, Host
 from m2pem.geo.geojson import kind_of
 from m2pem.mission.catalogue import ResourceId
@@ -171,8 +172,9 @@ class Fleet:
     has; `supervisor_role`: which operators may at any time, "": none. `hosts`: the other computers
     that arbiters run on, by name. `faces`: the settings of each face; `videos`: of cameras that
     operators can look through. `terrain_folder`: of elevation files, "": none is named;
-    `clearance_m`: the least height of aircraft above the ground, None: it is not checked. No run
-    depends on these four, and no journal has them.
+    `clearance_m`: the least height of aircraft above the ground, None: it is not checked;
+    `warnings`: what is doubtful of files of geometries, with the path in the fleet file. No run
+    depends on these five, and no journal has them.
     """
 
     name: str
@@ -213,6 +215,7 @@ class Fleet:
     terrain_folder: str = ""
     clearance_m: float | None = None
     debugging: bool = False
+    warnings: tuple[Finding, ...] = ()
 
     @property
     def detectors(self) -> tuple[ResourceId, ...]:
@@ -283,7 +286,7 @@ _TYPES: dict[str, type[Geometry]] = {
 }
 
 
-_NOT_IN_JOURNALS = ("faces", "videos", "terrain_folder", "clearance_m")
+_NOT_IN_JOURNALS = ("faces", "videos", "terrain_folder", "clearance_m", "warnings")
 
 
 def dump(fleet: Fleet) -> bytes:

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -9,6 +10,7 @@ from urllib.parse import urlsplit
 from pydantic import ValidationError
 
 from m2pem.errors import FleetError
+from m2pem.findings import Finding, Severity
 from m2pem.fleet.fleet import (
     Domain,
     Fleet,
@@ -35,6 +37,7 @@ from m2pem.fleet.fleet_schema import (
 from m2pem.fleet.hosts import CutOffPolicy, Host, WhenCutOff, endpoint_problem
 from m2pem.fleet.yaml_source import YamlSource, note_shape_findings, read_yaml
 from m2pem.geo.files import GeometryError, read_geometry
+from m2pem.geo.geometry_files import FileProblem
 from m2pem.geo.local_frame import Origin
 from m2pem.geo.positions import NO_ORIGIN, geometry_out_of_reach
 from m2pem.mission.catalogue import ResourceId
@@ -60,6 +63,7 @@ def load_fleet(path: str | Path) -> Fleet:
     source = read_yaml(path)
     model: FleetModel | None = None
     geometries: dict[str, Geometry] = {}
+    warnings: list[Finding] = []
     if source.data is None and not source.findings:
         source.error((), "empty", "is empty", "a fleet begins with 'version: 1'")
     elif source.data is not None:
@@ -72,7 +76,7 @@ def load_fleet(path: str | Path) -> Fleet:
         _check_hosts(source)
         _check_videos(source)
         _check_roles(source)
-        geometries = _read_geometries(source, path.parent)
+        geometries = _read_geometries(source, path.parent, warnings)
         _check_fence(source)
         _check_shared_space(source)
         if model is not None:
@@ -80,7 +84,7 @@ def load_fleet(path: str | Path) -> Fleet:
     if source.findings or model is None:
         findings = sorted(source.findings, key=lambda finding: finding.line)
         raise FleetError(f"{path} cannot be used as a fleet", findings)
-    return _build(source, model, geometries)
+    return replace(_build(source, model, geometries), warnings=tuple(warnings))
 
 
 # The checks look at the file's values as they were read, not at the models, so that a mistake in
@@ -254,16 +258,31 @@ def _check_distances(
                 source.error((section, name), "out-of-reach", f"{file}: {wrong[0]}", wrong[1])
 
 
-def _read_geometries(source: YamlSource, folder: Path) -> dict[str, Geometry]:
+def _read_geometries(
+    source: YamlSource, folder: Path, warnings: list[Finding]
+) -> dict[str, Geometry]:
     geometries: dict[str, Geometry] = {}
     for section, kind in _GEOMETRY_KINDS.items():
         for name, file in source.mapping(section).items():
             if not isinstance(file, str) or not file:
                 continue
+            problems: list[FileProblem] = []
             try:
-                geometries[name] = read_geometry(folder / file, kind)
+                geometries[name] = read_geometry(folder / file, kind, problems.append)
             except GeometryError as error:
                 source.error((section, name), "geometry", str(error))
+            warnings += [
+                Finding(
+                    Severity.WARNING,
+                    source.file,
+                    source.line((section, name)),
+                    f"{section}.{name}",
+                    "geometry",
+                    f"{file}: {each.feature}: {each.message}".replace(": :", ":"),
+                    each.remedy,
+                )
+                for each in problems
+            ]
     return geometries
 
 

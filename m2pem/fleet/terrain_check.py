@@ -85,7 +85,7 @@ class GroundCheck:
                 raise
         [terrain] = self._terrain
         home_m = None
-        if route.altitude_frame == "relative" and self.fleet.origin != NO_ORIGIN:
+        if "relative" in route.frames and self.fleet.origin != NO_ORIGIN:
             home_m = terrain.height_m(self.fleet.origin[:2])
         points = profile(route, terrain, _STEP_M, home_m)
         unknown = next((each for each in points if each.ground_m is None), None)
@@ -102,13 +102,14 @@ def _ways(values: Mapping[str, ResolvedValue]) -> Iterator[tuple[str, Route]]:
     altitude_m, frame = values.get("altitude"), values.get("altitude_frame")
     for name, value in values.items():
         if isinstance(value, Route):
-            waypoints, own_frame = value.waypoints, value.altitude_frame
+            waypoints, frames = value.waypoints, value.frames
         elif isinstance(value, Point):
-            waypoints, own_frame = (value.position,), value.altitude_frame
+            waypoints, frames = (value.position,), (value.altitude_frame,)
         else:
             continue
         if isinstance(altitude_m, int | float):
             raised: list[Coordinate] = [(each[0], each[1], float(altitude_m)) for each in waypoints]
-            waypoints, own_frame = tuple(raised), frame if isinstance(frame, str) else "relative"
+            waypoints = tuple(raised)
+            frames = (frame if isinstance(frame, str) else "relative",) * len(waypoints)
         if any(each[2] is not None for each in waypoints):
-            yield name, Route(waypoints, own_frame)
+            yield name, Route.of(waypoints, frames)

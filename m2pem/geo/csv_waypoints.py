@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from io import StringIO
 
-from m2pem.geo.geojson import ALTITUDE_FRAMES, GeometryError, checked, coordinate
+from m2pem.geo.geojson import ALTITUDE_FRAMES, GeometryError, checked, coordinate, with_frames
 from m2pem.mission.geometry import Area, Coordinate, Point, Route
 from m2pem.suggestions import suggest
 from m2pem.units import UNITS, Dimension
@@ -33,8 +33,8 @@ def parse_csv(text: str, kind: str) -> Point | Route | Area:
 
     The first line names the columns, in any order: `lat_deg` and `lon_deg` (WGS-84), and if wanted
     `alt_m` (another unit of length may stand there: `alt_ft`) and `altitude_frame` (the same in all
-    rows; `relative`, to home, if left out). Lines that are empty or begin with `#` are skipped. The
-    corners of an area need not repeat the first one.
+    rows, but of a route; `relative`, to home, if left out). Lines that are empty or begin with `#`
+    are skipped. The corners of an area need not repeat the first one.
 
     Raises:
         GeometryError: a column without its unit, or of another; a row that cannot be read.
@@ -42,7 +42,7 @@ def parse_csv(text: str, kind: str) -> Point | Route | Area:
     rows = csv_rows(text)
     columns = _columns(*next(rows, (1, [""])))
     positions: list[Coordinate] = []
-    frames: dict[str, int] = {}
+    frames: list[str] = []
     for line, row in rows:
         if len(row) != len(columns):
             raise GeometryError(
@@ -50,11 +50,13 @@ def parse_csv(text: str, kind: str) -> Point | Route | Area:
             )
         cells = {column.name: (cell, column) for cell, column in zip(row, columns, strict=True)}
         positions.append(csv_position(cells, f"line {line}"))
-        frames.setdefault(csv_frame(cells, f"line {line}"), line)
-    if len(frames) > 1:
-        (first, _), (second, line) = list(frames.items())[:2]
-        raise GeometryError(f"line {line}: altitude_frame is {second!r}, but {first!r} before")
-    return positions_as(positions, next(iter(frames), "relative"), kind)
+        frames.append(csv_frame(cells, f"line {line}"))
+        if kind != "route" and frames[-1] != frames[0]:
+            raise GeometryError(
+                f"line {line}: altitude_frame is {frames[-1]!r}, but {frames[0]!r} before"
+            )
+    geometry = positions_as(positions, next(iter(frames), "relative"), kind)
+    return with_frames(geometry, frames) if isinstance(geometry, Route) else geometry
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,36 +1,41 @@
 """Reads the file of one route, area or point, which a fleet names."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from m2pem.findings import Severity, unreadable_remedy
 from m2pem.geo.csv_waypoints import parse_csv
 from m2pem.geo.file_text import decoded, parsed_json
 from m2pem.geo.geojson import GeometryError, is_wgs84, kind_of, parse_geojson
-from m2pem.geo.geometry_files import read_geometry_file
-from m2pem.geo.qgroundcontrol import parse_plan, parse_waypoints
+from m2pem.geo.geometry_files import KEEP_OUT, FileProblem, read_geometry_file
 from m2pem.mission.geometry import Area, Point, Route
 from m2pem.units import article
 
 __all__ = ["GeometryError", "parse_geojson", "read_geometry"]
 
 MAX_BYTES = 5_000_000
+_SHOWN = 3
+"""Errors of a file that a message has; of more, it has the number."""
 
-_OF_MANY = (".kml", ".kmz", ".wpml", ".zip")
+_OF_MANY = (".plan", ".waypoints", ".mission", ".txt", ".kml", ".kmz", ".wpml", ".zip")
 """Files of any number of geometries: one of the kind that is asked for is expected."""
 
-_SUFFIXES = (".geojson", ".json", ".plan", ".waypoints", ".csv", *_OF_MANY)
+_SUFFIXES = (".geojson", ".json", ".csv", *_OF_MANY)
 
 
-def read_geometry(path: Path, kind: str) -> Point | Route | Area:
+def read_geometry(
+    path: Path, kind: str, warn: Callable[[FileProblem], object] | None = None
+) -> Point | Route | Area:
     """Read `path` as a geometry of `kind`: "route", "area" or "point".
+
+    `warn`: takes what is doubtful of it, such as what was left out.
 
     Raises:
         GeometryError: unreadable, not what its suffix says, or another kind of geometry; the
             message begins with the path (and the line, where there is one).
     """
     try:
-        geometry = _read(path, kind)
+        geometry = _read(path, kind, warn)
     except GeometryError as error:
         raise GeometryError(f"{path}: {error}") from None
     if kind_of(geometry) != kind:
@@ -39,7 +44,9 @@ def read_geometry(path: Path, kind: str) -> Point | Route | Area:
     return geometry
 
 
-def _read(path: Path, kind: str) -> Point | Route | Area:
+def _read(
+    path: Path, kind: str, warn: Callable[[FileProblem], object] | None
+) -> Point | Route | Area:
     if path.suffix.lower() not in _SUFFIXES:
         raise GeometryError(f"has another suffix than {', '.join(_SUFFIXES)}")
     try:
@@ -51,30 +58,34 @@ def _read(path: Path, kind: str) -> Point | Route | Area:
     if len(content) > MAX_BYTES:
         raise GeometryError(f"is larger than {MAX_BYTES:,} bytes")
     if path.suffix.lower() in _OF_MANY:
-        return _only_one(path, content, kind)
+        return _only_one(path, content, kind, warn)
     text = decoded(content)
-    if path.suffix.lower() == ".waypoints":
-        return parse_waypoints(text)
     if path.suffix.lower() == ".csv":
         return parse_csv(text, kind)
     value = parsed_json(text)
     if not isinstance(value, Mapping):
         raise GeometryError("a JSON object is expected")
     if path.suffix.lower() in (".geojson", ".json") and not is_wgs84(value.get("crs")):
-        return _only_one(path, content, kind)
-    if path.suffix.lower() == ".plan":
-        return parse_plan(value, area=kind == "area")
+        return _only_one(path, content, kind, warn)
     return parse_geojson(value)
 
 
-def _only_one(path: Path, content: bytes, kind: str) -> Point | Route | Area:
+def _only_one(
+    path: Path, content: bytes, kind: str, warn: Callable[[FileProblem], object] | None
+) -> Point | Route | Area:
     file = read_geometry_file(path.name, content)
-    for problem in file.problems:
-        if problem.severity is Severity.ERROR:
-            raise GeometryError(str(problem))
+    problems = [each for each in file.problems if each.kind in ("", kind)]
+    if errors := [str(each) for each in problems if each.severity is Severity.ERROR]:
+        more = f" (and {len(errors) - _SHOWN} more)" if len(errors) > _SHOWN else ""
+        raise GeometryError(" / ".join(errors[:_SHOWN]) + more)
     found = [each for each in file.geometries if kind_of(each.geometry) == kind]
+    if len(found) > 1:  # a plan's fence is inside of its inclusion polygon
+        found = [each for each in found if not each.name.startswith(KEEP_OUT)] or found
     if len(found) != 1:
         names = ", ".join(each.name for each in found[:5])
         listed = f" ({names})" if names else ""
         raise GeometryError(f"has {len(found)} {kind}s{listed}; exactly one is expected")
+    if warn is not None:
+        for each in problems:
+            warn(each)
     return found[0].geometry

@@ -20,6 +20,7 @@ from m2pem.units import article
 ALTITUDE_FRAMES = ("relative", "amsl", "terrain")
 
 SPEEDS = "speeds_m_s"
+FRAMES = "altitude_frames"
 """The property, and the extended data of KML, with the speeds of a route's waypoints."""
 
 _ROUNDING_DEG = 1e-9
@@ -58,6 +59,8 @@ def as_geojson(geometry: Point | Route | Area) -> dict[str, Any]:
     properties: dict[str, Any] = {"altitude_frame": geometry.altitude_frame}
     if isinstance(geometry, Route) and geometry.speeds_m_s:
         properties[SPEEDS] = list(geometry.speeds_m_s)
+    if isinstance(geometry, Route) and geometry.altitude_frames:
+        properties[FRAMES] = list(geometry.altitude_frames)
     return {
         "type": "Feature",
         "properties": properties,
@@ -86,6 +89,7 @@ def _parse(value: object, altitude_frame: str, depth: int) -> Point | Route | Ar
         given = value.get("properties")
         properties: Mapping[str, Any] = given if isinstance(given, Mapping) else {}
         geometry = _parse(value.get("geometry"), _frame(properties), depth=2)
+        geometry = with_frames(geometry, properties.get(FRAMES))
         return with_speeds(geometry, properties.get(SPEEDS))
     coordinates = value.get("coordinates")
     if kind == "Point":
@@ -127,6 +131,23 @@ def is_wgs84(crs: object) -> bool:
     return crs is None or bool(re.search(r"(^|\W)(CRS84|4326)$", crs_name(crs)))
 
 
+def with_frames(geometry: Point | Route | Area, value: object) -> Point | Route | Area:
+    """Return a route with the altitude frames of its waypoints: a list of texts; None: no list.
+
+    Raises:
+        GeometryError: it is no route, or the list does not fit it.
+    """
+    if value is None:
+        return geometry
+    if not isinstance(geometry, Route):
+        raise GeometryError(f"{FRAMES}: only a route has them, not {article(kind_of(geometry))}")
+    count = len(geometry.waypoints)
+    if not isinstance(value, list | tuple) or len(value) != count:
+        raise GeometryError(f"{FRAMES}: a list of {count} is expected, one a position")
+    frames = [checked_frame(each) for each in value]
+    return Route.of(geometry.waypoints, frames, geometry.speeds_m_s)
+
+
 def with_speeds(geometry: Point | Route | Area, value: object) -> Point | Route | Area:
     """Return a route with the speeds of its waypoints: a list of numbers and nulls; None: no list.
 
@@ -153,8 +174,15 @@ def with_speeds(geometry: Point | Route | Area, value: object) -> Point | Route 
 
 def _frame(properties: Mapping[str, Any]) -> str:
     frame = properties.get("altitude_frame")
-    if frame is None:
-        return "relative"
+    return "relative" if frame is None else checked_frame(frame)
+
+
+def checked_frame(frame: object) -> str:
+    """Return an altitude frame.
+
+    Raises:
+        GeometryError: there is none of that name.
+    """
     if frame not in ALTITUDE_FRAMES:
         hint = suggest(str(frame), ALTITUDE_FRAMES, "frames")
         raise GeometryError(f"altitude_frame {frame!r} is not known; {hint}")

@@ -243,19 +243,30 @@ def profile(
 
     `home_m`: the altitude above mean sea level from which `relative` altitudes count; None: the
     ground at the first waypoint. Altitudes change evenly from one waypoint to the next, those above
-    ground over the ground below.
+    ground over the ground below; where frames differ, above mean sea level.
 
     Raises:
         TerrainError: an elevation file cannot be used.
     """
     waypoints = route.waypoints
-    if home_m is None and route.altitude_frame == "relative":
+    if home_m is None and "relative" in route.frames:
         home_m = terrain.height_m(waypoints[0][:2])
+
+    def amsl_m(height_m: float | None, ground_m: float | None, frame: str) -> float | None:
+        base_m = {"amsl": 0.0, "relative": home_m, "terrain": ground_m}[frame]
+        return None if height_m is None or base_m is None else height_m + base_m
+
+    frame = route.altitude_frame
+    if route.altitude_frames:
+        frame = "amsl"
+        waypoints = tuple(
+            (*each[:2], amsl_m(each[2], terrain.height_m(each[:2]), own))
+            for each, own in zip(waypoints, route.frames, strict=True)
+        )
     points: list[ProfilePoint] = []
     for along_m, place, height_m, waypoint in along_route(waypoints, step_m):
         ground_m = terrain.height_m(place)
-        base_m = {"amsl": 0.0, "relative": home_m, "terrain": ground_m}[route.altitude_frame]
-        altitude_m = None if height_m is None or base_m is None else height_m + base_m
+        altitude_m = amsl_m(height_m, ground_m, frame)
         points.append(ProfilePoint(along_m, place, ground_m, altitude_m, waypoint))
     return points
 

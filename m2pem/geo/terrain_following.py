@@ -32,12 +32,16 @@ def follow_terrain(
     looked up every `step_m`. Waypoints of the route stay, with their speeds.
 
     Raises:
-        GeometryError: a waypoint has no altitude and `height_m` is None, or it needs more than
-            `MOST_WAYPOINTS`.
+        GeometryError: a waypoint has no altitude, or they have different frames, and `height_m` is
+            None; or it needs more than `MOST_WAYPOINTS`.
         TerrainError: no elevation file has a place of the route, or one cannot be used.
     """
     if not (tolerance_m > 0 and step_m > 0):
         raise GeometryError("the tolerance and the step are above 0")
+    if route.altitude_frames and height_m is None:
+        raise GeometryError(
+            "the altitudes of the waypoints count from different heights: say a height above ground"
+        )
     places: list[LatLon] = []
     alongs: list[float] = []
     wanted: list[float] = []

@@ -33,8 +33,8 @@ class LocalParameters(BehaviorParameters):
     def places(self, craft: Craft, route: Route, up_m: float) -> list[Vector]:
         """A route's waypoints as `craft` passes them; `up_m` where they say no height."""
         return [
-            (*self._level("route", waypoint), self._up(craft, waypoint, route.altitude_frame, up_m))
-            for waypoint in route.waypoints
+            (*self._level("route", waypoint), self._up(craft, waypoint, frame, up_m))
+            for waypoint, frame in zip(route.waypoints, route.frames, strict=True)
         ]
 
     def target_place(self, craft: Craft, up_m: float) -> Vector:

@@ -139,6 +139,11 @@ def _refuse_wrong_order(marchers: Sequence[Marcher], spacing_m: float) -> None:
 def _ways(
     context: PlanningContext, route: Route, offsets: Sequence[tuple[float, float]]
 ) -> list[_Way]:
+    if route.altitude_frames and context.parameters.altitude_m is None:
+        raise TeamRefusedError(
+            "parameter 'route': the altitudes of its waypoints count from different heights, which "
+            "a formation cannot keep: set 'altitude'"
+        )
     places = [(*context.level(each), each[2] or 0.0) for each in _apart(context, route)]
     return [
         _Way(context, member, places, offset)

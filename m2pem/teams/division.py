@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise, permutations
 
 from m2pem.api.behavior_parameters import BehaviorParameters
@@ -53,7 +53,7 @@ def work_of(
     raw, given = raw_parameters(parameters), BehaviorParameters(parameters)
     if behavior == "single_vehicle_routing" and given.route is not None:
         # A team goes at its own speed: `m2pem check` says that it ignores those of waypoints.
-        route = Route(given.route.waypoints, given.route.altitude_frame)
+        route = replace(given.route, speeds_m_s=())
         return RemainingRoute(raw, route, frame)
     if behavior != "area_survey" or given.area is None:
         return None
@@ -80,7 +80,7 @@ def from_nearer_end(
     given = BehaviorParameters(parameters)
     turned = dict(parameters)
     if given.route is not None:
-        turned["route"] = Route(given.route.waypoints[::-1], given.route.altitude_frame)
+        turned["route"] = Route.of(given.route.waypoints[::-1], given.route.frames[::-1])
     if given.heading_rad is not None:
         turned["heading"] = (given.heading_rad + math.pi) % math.tau
     works = [(each, work_of(behavior, each, frame)) for each in (parameters, turned)]

@@ -31,6 +31,9 @@ def test_the_frame_of_the_altitudes_is_kept() -> None:
     text = "lat_deg,lon_deg,alt_m,altitude_frame\n1,2,60,amsl\n3,4,61,amsl\n"
     assert parse_csv(text, "route").altitude_frame == "amsl"
     assert parse_csv("lat_deg,lon_deg\n1,2\n", "point").altitude_frame == "relative"
+    mixed = parse_csv(text.replace("61,amsl", "61,"), "route")
+    assert isinstance(mixed, Route)
+    assert mixed.frames == ("amsl", "relative")
 
 
 def test_a_comment_and_empty_lines_are_skipped() -> None:
@@ -83,7 +86,7 @@ def test_the_ring_of_an_area_is_closed(last: str) -> None:
         ),
         (
             "lat_deg,lon_deg,altitude_frame\n1,2,amsl\n1,2,terrain\n",
-            "route",
+            "area",
             "line 3: altitude_frame is 'terrain', but 'amsl' before",
         ),
         ("lat_deg,lon_deg\n1,2\n3,4\n", "point", "has 2 positions; a point is one"),

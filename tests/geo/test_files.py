@@ -4,14 +4,15 @@ import pytest
 
 from m2pem.geo import files as geofiles
 from m2pem.geo.files import GeometryError, read_geometry
+from m2pem.geo.geometry_files import FileProblem
 from m2pem.mission.geometry import Area, Point, Route
 
 from ..fleet.fleets import LINE, POINT, SQUARE, write_json
-from .test_qgroundcontrol import SURVEY, WAYPOINTS, plan
+from .geometry_files.test_mission_plans import ROWS, SURVEY, item, plan
 
 
 def test_the_suffix_says_how_to_read(tmp_path: Path) -> None:
-    (tmp_path / "a.waypoints").write_text(WAYPOINTS)
+    (tmp_path / "a.waypoints").write_text(f"QGC WPL 110\n{ROWS}")
     write_json(tmp_path / "a.plan", plan(SURVEY))
     assert isinstance(read_geometry(tmp_path / "a.waypoints", "route"), Route)
     assert isinstance(read_geometry(tmp_path / "a.plan", "area"), Area)
@@ -100,3 +101,35 @@ def test_a_kml_file_holds_one_of_the_kind_that_is_asked_for(tmp_path: Path) -> N
     path.write_text("<kml><Placemark><name>x</name></Placemark></kml>")
     with pytest.raises(GeometryError, match="placemark 'x': has no point, line or polygon"):
         read_geometry(path, "route")
+
+
+def test_what_is_left_out_of_a_plan_is_a_warning_for_the_kind_that_is_asked_for(
+    tmp_path: Path,
+) -> None:
+    items = (item(22, None, None, 20), item(16, 38.0, -77.0, 30), SURVEY, item(21, 38.0, -77.0, 0))
+    path = write_json(tmp_path / "a.plan", plan(*items))
+    warnings: list[FileProblem] = []
+    assert isinstance(read_geometry(path, "route", warnings.append), Route)
+    assert [each.feature.partition(" (")[0] for each in warnings] == ["item 1", "item 4"]
+    warnings.clear()
+    assert isinstance(read_geometry(path, "area", warnings.append), Area)
+    assert [each.feature for each in warnings] == ["item 3 (survey)"]
+
+
+def test_a_plan_without_a_route_says_why_and_keeps_its_area(tmp_path: Path) -> None:
+    curve = item(82, 38.1, -77.0, 30)
+    path = write_json(tmp_path / "a.plan", plan(item(16, 38.0, -77.0, 30), curve, SURVEY))
+    with pytest.raises(GeometryError, match=r"a\.plan: item 2: MAV_CMD_NAV_SPLINE_WAYPOINT cannot"):
+        read_geometry(path, "route")
+    assert isinstance(read_geometry(path, "area"), Area)
+
+
+def test_a_fence_with_ponds_in_it_is_its_outer_polygon(tmp_path: Path) -> None:
+    pond = {"polygon": [[38.01, -77.0], [38.02, -77.0], [38.02, -77.01]], "inclusion": False}
+    both = {"polygons": [pond, {"polygon": SURVEY["polygon"]}]}
+    path = write_json(tmp_path / "a.plan", plan(geoFence=both))
+    area = read_geometry(path, "area")
+    assert isinstance(area, Area)
+    assert area.rings[0][0] == (38.0, -77.0, None)
+    write_json(path, plan(geoFence={"polygons": [pond]}))
+    assert isinstance(read_geometry(path, "area"), Area)

@@ -11,8 +11,10 @@ from m2pem.geo.geometry_files.formats import (
     read_geometry_file,
     write_geometry_file,
 )
+from m2pem.geo.geometry_files.mission_commands import KEEP_OUT
 
 __all__ = [
+    "KEEP_OUT",
     "MAX_BYTES",
     "READ_SUFFIXES",
     "FileFormat",

@@ -32,13 +32,15 @@ class FileProblem:
     """What is wrong with a file, or with one feature of it, and what would be right.
 
     ERROR: the feature was left out. WARNING: it was read, and something of it was not kept.
-    `feature`: how people find it in the file; "" means the whole file.
+    `feature`: how people find it in the file; "" means the whole file. `kind`: the geometries that
+    it is about, "route", "area" or "point"; "": any.
     """
 
     severity: Severity
     feature: str
     message: str
     remedy: str = ""
+    kind: str = ""
 
     def __str__(self) -> str:
         where = f"{self.feature}: " if self.feature else ""
@@ -75,14 +77,13 @@ class Contents:
         self._positions = 0
 
     @contextmanager
-    def feature(self, name: str) -> Iterator[None]:
+    def feature(self, name: str, kind: str = "") -> Iterator[None]:
         """Turn a `GeometryError` of the block into a problem of the feature with that name."""
         try:
             yield
-        except FeatureProblemError as error:
-            self._note(FileProblem(Severity.ERROR, name, str(error), error.remedy))
         except GeometryError as error:
-            self._note(FileProblem(Severity.ERROR, name, str(error)))
+            remedy = error.remedy if isinstance(error, FeatureProblemError) else ""
+            self.note(FileProblem(Severity.ERROR, name, str(error), remedy, kind))
 
     def add(self, name: str, geometry: Point | Route | Area) -> None:
         """Add a geometry under a valid and unique form of its name.
@@ -110,11 +111,12 @@ class Contents:
                 f"the file has more than {MAX_POSITIONS:,} positions", "simplify its lines"
             )
 
-    def warn(self, feature: str, message: str, remedy: str = "") -> None:
+    def warn(self, feature: str, message: str, remedy: str = "", kind: str = "") -> None:
         """Add a warning: the feature was read, and something of it was not kept."""
-        self._note(FileProblem(Severity.WARNING, feature, message, remedy))
+        self.note(FileProblem(Severity.WARNING, feature, message, remedy, kind))
 
-    def _note(self, problem: FileProblem) -> None:
+    def note(self, problem: FileProblem) -> None:
+        """Add a problem, if the file has not too many."""
         self._has_error = self._has_error or problem.severity is Severity.ERROR
         if len(self._problems) < MAX_PROBLEMS:
             self._problems.append(problem)

@@ -18,7 +18,14 @@ from m2pem.geo.csv_waypoints import (
     positions_as,
 )
 from m2pem.geo.file_text import decoded
-from m2pem.geo.geojson import ALTITUDE_FRAMES, GeometryError, checked, kind_of, with_speeds
+from m2pem.geo.geojson import (
+    ALTITUDE_FRAMES,
+    GeometryError,
+    checked,
+    kind_of,
+    with_frames,
+    with_speeds,
+)
 from m2pem.geo.geometry_files.contents import (
     MAX_POSITIONS,
     Contents,
@@ -164,9 +171,11 @@ def write_csv(geometries: Sequence[NamedGeometry]) -> bytes:
     out.writerow((*_HEADER, _SPEED) if have_speeds else _HEADER)
     for each in geometries:
         geometry = each.geometry
-        kind, frame = kind_of(geometry), geometry.altitude_frame
+        kind = kind_of(geometry)
         for ring, positions in enumerate(_rings(geometry)):
-            for position, speed in zip_longest(positions, _speeds(geometry)):
+            frames = geometry.frames if isinstance(geometry, Route) else ()
+            frames = frames or (geometry.altitude_frame,) * len(positions)
+            for position, frame, speed in zip_longest(positions, frames, _speeds(geometry)):
                 row = (each.name, kind, ring, *position, frame, speed)
                 out.writerow(row if have_speeds else row[:-1])
     return table.getvalue().encode()
@@ -265,7 +274,7 @@ def _words(text: str) -> list[str]:
 
 def _geometry(rows: Iterable[tuple[int, _Cells]]) -> Point | Route | Area:
     kind = ""
-    frame = ""
+    frames: list[str] = []
     rings: dict[str, list[Coordinate]] = {}
     speeds = []
     for number, cells in rows:
@@ -275,15 +284,17 @@ def _geometry(rows: Iterable[tuple[int, _Cells]]) -> Point | Route | Area:
             raise FeatureProblemError(
                 f"{where}: kind {given!r} is not known", f"one of {', '.join(_KINDS)}"
             )
-        its_frame = csv_frame(cells, where)
-        if (kind and given != kind) or (frame and its_frame != frame):
+        frames.append(csv_frame(cells, where))
+        is_mixed = frames[-1] != frames[0] and given in ("area", "point")
+        if (kind and given != kind) or is_mixed:
             raise FeatureProblemError(
                 f"{where}: kind or altitude_frame differs from the rows before",
-                "rows of one name have the same ones",
+                "rows of one name have the same ones, but the altitude_frame of a route",
             )
-        kind, frame = given, its_frame
+        kind = given
         rings.setdefault(_cell(cells, "ring"), []).append(csv_position(cells, where))
         speeds.append(_speed(cells, where))
+    frame = frames[0]
     if kind == "area" and len(rings) > 1:
         areas = [positions_as(ring, frame, "area") for ring in rings.values()]
         return Area(
@@ -291,6 +302,7 @@ def _geometry(rows: Iterable[tuple[int, _Cells]]) -> Point | Route | Area:
         )
     positions = [position for ring in rings.values() for position in ring]
     geometry = positions_as(positions, frame, kind or ("route" if len(positions) > 1 else "point"))
+    geometry = with_frames(geometry, frames) if isinstance(geometry, Route) else geometry
     return with_speeds(geometry, speeds) if any(each is not None for each in speeds) else geometry
 
 

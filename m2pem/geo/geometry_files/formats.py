@@ -42,7 +42,7 @@ _READERS: Mapping[str, Reader] = {
     ".wpml": read_kml,
     ".csv": read_csv,
     ".plan": read_plan,
-    ".waypoints": read_waypoints,
+    **dict.fromkeys((".waypoints", ".mission", ".txt"), read_waypoints),
     ".zip": _read_shapefiles,
 }
 

@@ -1,7 +1,8 @@
 """KML 2.3 and KMZ (OGC 12-007r2): its placemarks and tracks.
 
 An altitude above home, which KML does not have, is written as above ground, and the extended data
-`altitude_frame` says what it is; the extended data `speeds_m_s` are those of a route's waypoints.
+`altitude_frame` says what it is; the extended data `speeds_m_s` and `altitude_frames` are those of
+a route's waypoints.
 """
 
 import json
@@ -13,7 +14,15 @@ from urllib.parse import unquote
 from lxml import etree
 
 from m2pem.geo.file_text import parsed_json
-from m2pem.geo.geojson import ALTITUDE_FRAMES, SPEEDS, GeometryError, checked, with_speeds
+from m2pem.geo.geojson import (
+    ALTITUDE_FRAMES,
+    FRAMES,
+    SPEEDS,
+    GeometryError,
+    checked,
+    with_frames,
+    with_speeds,
+)
 from m2pem.geo.geometry_files.archive import archive_of, member
 from m2pem.geo.geometry_files.contents import (
     MAX_POSITIONS,
@@ -133,8 +142,9 @@ def _read_placemark(placemark: Element, contents: Contents) -> None:
         read = [_geometry(part, frame, where, contents) for part in parts]
         if not read:
             raise GeometryError("has no point, line or polygon")
-        speeds = _data(placemark, SPEEDS)
-        for geometry in read:
+        speeds, frames = _data(placemark, SPEEDS), _data(placemark, FRAMES)
+        for each in read:
+            geometry = with_frames(each, parsed_json(frames)) if frames else each
             contents.add(name, with_speeds(geometry, parsed_json(speeds)) if speeds else geometry)
 
 
@@ -257,6 +267,8 @@ def write_kml(geometries: Sequence[NamedGeometry]) -> bytes:
         data = {"altitude_frame": each.geometry.altitude_frame}
         if isinstance(each.geometry, Route) and each.geometry.speeds_m_s:
             data[SPEEDS] = json.dumps(each.geometry.speeds_m_s)
+        if isinstance(each.geometry, Route) and each.geometry.altitude_frames:
+            data[FRAMES] = json.dumps(each.geometry.altitude_frames)
         extended = _child(placemark, "ExtendedData")
         for name, value in data.items():
             element = _child(extended, "Data")
@@ -268,6 +280,8 @@ def write_kml(geometries: Sequence[NamedGeometry]) -> bytes:
 
 def _write_geometry(placemark: Element, geometry: Point | Route | Area) -> None:
     mode = _MODE_OF[geometry.altitude_frame]
+    if isinstance(geometry, Route) and geometry.altitude_frames:
+        mode = "clampToGround"  # one mode holds for all of a line
     if isinstance(geometry, Area):
         polygon = _child(placemark, "Polygon")
         _child(polygon, "altitudeMode", mode)

@@ -1,31 +1,43 @@
-"""Files of ground stations: QGroundControl's `.plan`, and `.waypoints` (QGC WPL 110).
+"""Files of ground stations: QGroundControl's `.plan`, and mission files with the header QGC WPL.
 
-Places and speeds are read: other commands (camera triggers) belong into the mission.
-https://docs.qgroundcontrol.com/master/en/qgc-dev-guide/file_formats/plan.html
+https://docs.qgroundcontrol.com/master/en/qgc-dev-guide/file_formats/plan.html,
+https://mavlink.io/en/file_formats/.
 """
 
 import json
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import zip_longest
 from typing import Any
 
+from m2pem.findings import Severity
 from m2pem.geo.file_text import decoded, parsed_json
 from m2pem.geo.geojson import GeometryError, coordinate
-from m2pem.geo.geometry_files.contents import Contents, FeatureProblemError, NamedGeometry
-from m2pem.geo.qgroundcontrol import (
-    CHANGE_SPEED,
-    PLACE_COMMANDS,
-    WPL_HEADER,
-    RouteItems,
-    parse_waypoints,
-    plan_items,
-    plan_polygon,
+from m2pem.geo.geometry_files.contents import (
+    Contents,
+    FeatureProblemError,
+    FileProblem,
+    NamedGeometry,
 )
+from m2pem.geo.geometry_files.mission_commands import KEEP_OUT
+from m2pem.geo.geometry_files.mission_items import (
+    MissionItem,
+    MissionReader,
+    circle,
+    parameters,
+    polygon,
+)
+from m2pem.geo.local_frame import LatLon, LocalFrame
+from m2pem.geo.polyline import shifted
 from m2pem.mission.geometry import Area, Coordinate, Point, Route
 
 _WAYPOINT = 16
 """MAV_CMD_NAV_WAYPOINT."""
+
+_CHANGE_SPEED = 178
+"""MAV_CMD_DO_CHANGE_SPEED: param 1 is the type of the speed, param 2 the speed in m/s."""
+
+_TAKE_OFFS = (22, 84)
+"""MAV_CMD_NAV_TAKEOFF, MAV_CMD_NAV_VTOL_TAKEOFF."""
 
 _GROUND_SPEED = 1
 """SPEED_TYPE_GROUNDSPEED."""
@@ -38,9 +50,26 @@ _FRAME_NUMBERS = {"amsl": 0, "relative": 3, "terrain": 10}
 
 _ALTITUDE_MODES = {"relative": 1, "amsl": 2, "terrain": 4}
 """QGroundControl's AltitudeMode."""
+_CALCULATED = 3
+"""AltitudeMode of a height above ground that QGroundControl has made an altitude above sea level:
+the altitude is null until it knows the ground."""
+_MIXED = 0
 
-_SURVEYS = {"survey": "polygon", "StructureScan": "polygon"}
-_CORRIDOR = "CorridorScan"
+_PX4 = 12
+"""MAV_AUTOPILOT_PX4: its waypoints have null where they have no heading."""
+
+WPL_HEADER = "QGC WPL 110"
+_WPL_COLUMNS = 12
+_WITHOUT_HOME = "QGC WPL 120"
+"""QGroundControl's own of old: its first row is the first item."""
+
+_LANDINGS = ("fwLandingPattern", "vtolLandingPattern")
+_PATTERNS = {"survey": "polygon", "CorridorScan": "polyline"}
+_FLOWN = (
+    *("angle", "AdjustedFootprintSide", "DistanceToSurface", "TurnAroundDistance", "FollowTerrain"),
+    *("Refly90Degrees", "CameraName", "spacing", "altitude", "turnAroundDistance"),
+)
+"""How a pattern is flown, by QGroundControl's keys; the last three are its old ones."""
 
 
 def read_plan(content: bytes, contents: Contents) -> None:
@@ -52,90 +81,195 @@ def read_plan(content: bytes, contents: Contents) -> None:
     plan = parsed_json(decoded(content))
     if not isinstance(plan, Mapping):
         raise GeometryError("a JSON object is expected")
-    items = plan_items(plan)
-    _read_waypoints(items, contents)
-    for index, item in enumerate(items):
-        if item.get("type") != "SimpleItem":
-            _read_complex(item, f"mission.items[{index}]", contents)
-    for index, polygon in enumerate(_members(plan, "geoFence", "polygons")):
-        where = f"geoFence.polygons[{index}]"
-        with contents.feature(where):
-            if not isinstance(polygon, Mapping):
-                raise GeometryError("an object with 'polygon' is expected")
-            name = "fence" if polygon.get("inclusion", True) else "keep_out"
-            contents.add(name, plan_polygon(polygon.get("polygon"), f"{where}.polygon"))
-    for index, _ in enumerate(_members(plan, "geoFence", "circles")):
-        with contents.feature(f"geoFence.circles[{index}]"):
-            raise FeatureProblemError("a circle is no area", "draw it as a polygon")
+    if plan.get("fileType") != "Plan":
+        raise GeometryError("is not a QGroundControl plan: 'fileType' is not 'Plan'")
+    mission = _mapping(plan.get("mission"))
+    items = mission.get("items")
+    if not isinstance(items, list) or not all(isinstance(item, Mapping) for item in items):
+        raise GeometryError("mission.items: a list of items is expected")
+    reader = MissionReader(contents, zero_is_north=mission.get("firmwareType") == _PX4)
+    with contents.feature("mission", "route"):
+        number = 0
+        for index, item in enumerate(items):
+            given = item.get("doJumpId")
+            number = given if isinstance(given, int) else number + 1
+            where = f"item {number} (mission.items[{index}])"
+            if item.get("type") == "SimpleItem":
+                reader.add(_simple_item_of(item, number, where))
+            else:
+                _read_complex(item, number, contents, reader)
+        reader.finish()
+    _read_fence(plan, contents)
     for index, place in enumerate(_members(plan, "rallyPoints", "points")):
         where = f"rallyPoints.points[{index}]"
-        with contents.feature(where):
-            if not isinstance(place, list) or len(place) != 3:
-                raise GeometryError("a rally point is [latitude, longitude, altitude]")
-            contents.add("rally", Point(coordinate(place[0], place[1], place[2], where)))
+        with contents.feature(where, "point"):
+            contents.add("rally", Point(_place_of(place, where)))
 
 
-def _read_waypoints(items: Sequence[Mapping[str, Any]], contents: Contents) -> None:
-    with contents.feature("mission"):
-        read = RouteItems()
-        others: Counter[object] = Counter()
-        for index, item in enumerate(items):
-            if item.get("type") != "SimpleItem":
-                continue
-            is_read = read.add(item, f"mission.items[{index}]")
-            if not is_read and item.get("command") not in PLACE_COMMANDS:
-                others[item.get("command")] += 1
-        if others:
-            numbers = ", ".join(str(command)[:20] for command in sorted(others, key=str)[:10])
-            contents.warn(
-                "mission",
-                f"{others.total()} items with other commands than places and speeds (MAV_CMD "
-                f"{numbers})",
-                "draw what they do as tasks of the mission",
-            )
-        if read.places:
-            contents.add("", read.route())
+def _simple_item_of(item: Mapping[str, Any], number: int, where: str) -> MissionItem:
+    params, place, command = item.get("params"), item.get("coordinate"), item.get("command")
+    if not isinstance(params, list) or type(command) is not int:
+        raise GeometryError(f"{where}: 'command', a number, and 'params', seven, are expected")
+    if isinstance(place, list) and len(params) == 4:
+        params = [*params, *place]  # as QGroundControl wrote it at first
+    if item.get("AltitudeMode") == _CALCULATED and params[6:] == [None]:
+        raise FeatureProblemError(
+            f"{where}: its altitude above the terrain is not calculated",
+            "save the plan again in QGroundControl, once it has the heights of the ground",
+        )
+    known, goes_on = parameters(params, where), item.get("autoContinue") is not False
+    return MissionItem(number, where, command, item.get("frame"), known, goes_on)
 
 
-def _read_complex(item: Mapping[str, Any], where: str, contents: Contents) -> None:
-    kind = item.get("complexItemType")
-    with contents.feature(where):
-        if kind in _SURVEYS:
-            contents.add("survey", plan_polygon(item.get("polygon"), f"{where}.polygon"))
-        elif kind == _CORRIDOR:
-            line = item.get("polyline")
-            if not isinstance(line, list) or len(line) < 2:
-                raise GeometryError("polyline: at least two positions are expected")
-            contents.add(
-                "corridor",
-                Route(tuple(_flat(each, f"polyline[{n}]") for n, each in enumerate(line))),
-            )
+def _read_complex(
+    item: Mapping[str, Any], number: int, contents: Contents, reader: MissionReader
+) -> None:
+    kind = str(item.get("complexItemType") or item.get("type"))[:40]
+    where = f"item {number} ({kind})"
+    reader.add_pattern(number, f"a {kind}", "do that by a task")
+    with contents.feature(where, "area"):
+        if kind in _PATTERNS:
+            is_corridor = kind == "CorridorScan"
+            area = _corridor(item) if is_corridor else _polygon(item.get("polygon"), "polygon")
+            contents.add("corridor" if is_corridor else kind, area)
+            style = _mapping(item.get("TransectStyleComplexItem"))
+            given = {
+                **_mapping(item.get("grid")),
+                **item,
+                **style,
+                **_mapping(style.get("CameraCalc")),
+            }
+            flown = ", ".join(f"{key} {given[key]}" for key in _FLOWN if given.get(key))[:200]
+            remedy = "set heading, spacing, altitude and overshoot of a task `area_survey`"
+            contents.warn(where, f"only its area is read, not {flown or 'more'}", remedy, "area")
+        elif kind in _LANDINGS:
+            remedy = "a task `land` or `return_to_launch`"
+            contents.warn(where, "a landing is left out", remedy, "route")
+        elif kind == "StructureScan":
+            remedy = "a task `orbit` around its middle, or a route around it at each height"
+            raise FeatureProblemError("its polygon is a building, no area to survey", remedy)
         else:
-            raise FeatureProblemError(
-                f"a {str(kind or item.get('type'))[:40]!r} item has no waypoints that are read",
-                "draw what it does as tasks of the mission",
-            )
+            remedy = "draw what it does as tasks of the mission"
+            contents.note(FileProblem(Severity.ERROR, where, "is not read", remedy))
 
 
-def _flat(value: object, where: str) -> Coordinate:
+def _mapping(value: object) -> Mapping[str, Any]:
+    return value if isinstance(value, Mapping) else {}
+
+
+def _corridor(item: Mapping[str, Any]) -> Area:
+    """Return the corridor along a line as an area.
+
+    Raises:
+        GeometryError: it has no line or width, or its sides cross.
+    """
+    line, width_m = item.get("polyline"), item.get("CorridorWidth")
+    if not isinstance(line, list) or len(line) < 2:
+        raise GeometryError("polyline: at least two positions are expected")
+    if not isinstance(width_m, int | float) or not width_m > 0:
+        raise FeatureProblemError(f"its CorridorWidth is {width_m!r}", "give it a width in m")
+    places = [_corner(each, f"polyline[{index}]") for index, each in enumerate(line)]
+    frame = LocalFrame(places[0])
+    middle = [(*frame.to_local(place), 0.0) for place in places]
+    sides = [*shifted(middle, width_m / 2), *reversed(shifted(middle, -width_m / 2))]
+    try:
+        return polygon([frame.to_latlon(each[:2]) for each in sides])
+    except GeometryError as error:
+        remedy = f"draw it as an area, {width_m:g} m wide"
+        raise FeatureProblemError(f"its sides cross: {error}", remedy) from None
+
+
+def _read_fence(plan: Mapping[str, Any], contents: Contents) -> None:
+    for section, key in (("polygons", "polygon"), ("circles", "circle")):
+        for index, each in enumerate(_members(plan, "geoFence", section)):
+            where = f"geoFence.{section}[{index}]"
+            with contents.feature(where, "area"):
+                shape = _mapping(each).get(key)
+                name = "fence" if _mapping(each).get("inclusion", True) else KEEP_OUT
+                if isinstance(shape, Mapping):
+                    contents.add(name, _circle(shape, where, name))
+                else:
+                    contents.add(name, _polygon(shape, f"{where}.{key}"))
+    fence = _mapping(plan.get("geoFence"))
+    if fence.get("polygon"):  # as QGroundControl wrote it at first
+        with contents.feature("geoFence.polygon", "area"):
+            contents.add("fence", _polygon(fence["polygon"], "geoFence.polygon"))
+    if fence.get("breachReturn"):
+        with contents.feature("geoFence.breachReturn", "point"):
+            contents.add("fence_return", Point(_place_of(fence["breachReturn"], "breachReturn")))
+
+
+def _circle(shape: Mapping[str, Any], where: str, name: str) -> Area:
+    radius = shape.get("radius")
+    radius_m = radius if isinstance(radius, int | float) else None
+    return circle(_corner(shape.get("center"), where), radius_m, name == "fence")
+
+
+def _polygon(corners: object, where: str) -> Area:
+    if not isinstance(corners, list) or len(corners) < 3:
+        raise GeometryError(f"{where}: at least three corners are expected")
+    return polygon([_corner(each, f"{where}[{index}]") for index, each in enumerate(corners)])
+
+
+def _corner(value: object, where: str) -> LatLon:
     if not isinstance(value, list) or len(value) != 2:
-        raise GeometryError(f"{where}: a position is [latitude, longitude]")
-    return coordinate(value[0], value[1], None, where)
+        raise GeometryError(f"{where}: [latitude, longitude] is expected")
+    return coordinate(value[0], value[1], None, where)[:2]
+
+
+def _place_of(value: object, where: str) -> Coordinate:
+    if not isinstance(value, list) or len(value) not in (2, 3):
+        raise GeometryError(f"{where}: [latitude, longitude, altitude] is expected")
+    return coordinate(value[0], value[1], value[2] if len(value) == 3 else None, where)
 
 
 def _members(plan: Mapping[str, Any], section: str, key: str) -> list[Any]:
-    found = plan.get(section)
-    members = found.get(key) if isinstance(found, Mapping) else None
+    members = _mapping(plan.get(section)).get(key)
     return members if isinstance(members, list) else []
 
 
 def read_waypoints(content: bytes, contents: Contents) -> None:
-    """Collect the route of a file.
+    """Collect the route, the fences and the rally points of a file with the header `QGC WPL`.
+
+    The first row is the home position, which is no waypoint; in version 120 only if it is absolute
+    and a take-off follows.
 
     Raises:
-        GeometryError: a row cannot be read, or the rows have different frames.
+        GeometryError: another header, or a row that cannot be read.
     """
-    contents.add("", parse_waypoints(decoded(content)))
+    lines = [line.split() for line in decoded(content).splitlines()]
+    rows = [(number, line) for number, line in enumerate(lines, 1) if line and line[0][0] != "#"]
+    header = " ".join(rows[0][1]) if rows else ""
+    if header not in (WPL_HEADER, _WITHOUT_HOME):
+        raise FeatureProblemError(
+            f"is not a waypoint file: line {rows[0][0] if rows else 1} is not '{WPL_HEADER}'",
+            "save the mission, fence or rally points again by the ground station",
+        )
+    items = [_row_item(columns, line) for line, columns in rows[1:]]
+    first, after = (items[0] if items else None), items[1:2]
+    is_absolute = first is not None and first.frame == _FRAME_NUMBERS["amsl"]
+    takes_off = is_absolute and any(each.command in _TAKE_OFFS for each in after)
+    if first and first.command == _WAYPOINT and (header == WPL_HEADER or takes_off):
+        del items[0]
+        if header == _WITHOUT_HOME or not is_absolute or first.number != 0:
+            remedy = f"'{_WITHOUT_HOME}' is the header of files without it"
+            contents.warn(first.where, "is taken as the home position", remedy, "route")
+    reader = MissionReader(contents)
+    for item in items:
+        reader.add(item)
+    reader.finish()
+
+
+def _row_item(columns: Sequence[str], line: int) -> MissionItem:
+    if len(columns) != _WPL_COLUMNS:
+        raise GeometryError(f"line {line}: has {len(columns)} columns, not {_WPL_COLUMNS}")
+    try:
+        numbers = [float(each) for each in columns]
+        index, _, frame, command = (int(each) for each in numbers[:4])
+    except (ValueError, OverflowError):
+        raise GeometryError(f"line {line}: a number is expected in every column") from None
+    where, params = f"item {index} (line {line})", numbers[4:11]
+    return MissionItem(index, where, command, frame, parameters(params, where), bool(numbers[11]))
 
 
 def write_plan(geometries: Sequence[NamedGeometry], altitude_m: float | None) -> bytes:
@@ -148,7 +282,7 @@ def write_plan(geometries: Sequence[NamedGeometry], altitude_m: float | None) ->
     """
     route = _only_route(geometries)
     waypoints = list(_waypoints(route, altitude_m)) if route is not None else []
-    frame = route.geometry.altitude_frame if route is not None else "relative"
+    frames = _frames(route)
     polygons = [
         {
             "polygon": [list(corner[:2]) for corner in ring[:-1]],
@@ -171,11 +305,13 @@ def write_plan(geometries: Sequence[NamedGeometry], altitude_m: float | None) ->
             "vehicleType": 2,
             "cruiseSpeed": 15,
             "hoverSpeed": 5,
-            "globalPlanAltitudeMode": _ALTITUDE_MODES[frame],
+            "globalPlanAltitudeMode": _ALTITUDE_MODES[frames[0]]
+            if len(set(frames)) == 1
+            else _MIXED,
             "plannedHomePosition": [*home, 0],
             "items": [
-                _simple_item(number, command, params, frame)
-                for number, (command, params) in enumerate(_items(route, waypoints), start=1)
+                _simple_item(number, *item)
+                for number, item in enumerate(_items(route, waypoints), start=1)
             ],
         },
         "geoFence": {"version": 2, "circles": [], "polygons": polygons},
@@ -197,10 +333,9 @@ def write_waypoints(geometries: Sequence[NamedGeometry], altitude_m: float | Non
             "holds one route and nothing else: choose a route, or .plan or .geojson"
         )
     waypoints = list(_waypoints(route, altitude_m))
-    frame = _FRAME_NUMBERS[route.geometry.altitude_frame]
     rows: list[tuple[float, ...]] = [(0, 1, 0, _WAYPOINT, 0, 0, 0, 0, *waypoints[0][:2], 0.0, 1)]
-    for index, (command, params) in enumerate(_items(route, waypoints), start=1):
-        own = frame if command == _WAYPOINT else _MISSION_FRAME
+    for index, (command, params, frame) in enumerate(_items(route, waypoints), start=1):
+        own = _FRAME_NUMBERS[frame] if command == _WAYPOINT else _MISSION_FRAME
         rows.append((index, 0, own, command, *(each or 0 for each in params), 1))
     lines = ("\t".join(str(number) for number in row) for row in rows)
     return "\n".join((WPL_HEADER, *lines, "")).encode()
@@ -208,15 +343,20 @@ def write_waypoints(geometries: Sequence[NamedGeometry], altitude_m: float | Non
 
 def _items(
     route: NamedGeometry | None, waypoints: Sequence[tuple[float, float, float]]
-) -> Iterator[tuple[int, tuple[float | None, ...]]]:
-    """Yield the commands of a route with their seven parameters: waypoints, and the speed behind
-    each that has one."""
+) -> Iterator[tuple[int, tuple[float | None, ...], str]]:
+    """Yield the commands of a route with their seven parameters and altitude frames: waypoints, and
+    the speed behind each that has one."""
     geometry = route.geometry if route is not None else None
     speeds = geometry.speeds_m_s if isinstance(geometry, Route) else ()
-    for place, speed in zip_longest(waypoints, speeds):
-        yield _WAYPOINT, (0, 0, 0, None, *place)
+    for place, frame, speed in zip_longest(waypoints, _frames(route)[: len(waypoints)], speeds):
+        yield _WAYPOINT, (0, 0, 0, None, *place), frame
         if speed is not None:
-            yield CHANGE_SPEED, (_GROUND_SPEED, speed, -1, 0, 0, 0, 0)
+            yield _CHANGE_SPEED, (_GROUND_SPEED, speed, -1, 0, 0, 0, 0), frame
+
+
+def _frames(route: NamedGeometry | None) -> tuple[str, ...]:
+    geometry = route.geometry if route is not None else None
+    return geometry.frames if isinstance(geometry, Route) else ("relative",)
 
 
 def _simple_item(
@@ -258,6 +398,11 @@ def _waypoints(
             raise GeometryError(
                 f"{route.name}: waypoint {number} has no altitude, and one is needed: give it one, "
                 "or say which those without one get (altitude_m)"
+            )
+        if not latitude and not longitude:
+            raise GeometryError(
+                f"{route.name}: waypoint {number} is at 0, 0, which in such files means where the "
+                "vehicle is: move it by a little"
             )
         yield latitude, longitude, height
 

@@ -68,6 +68,8 @@ def archive(members: Mapping[str, bytes]) -> bytes:
         ("a.zip", archive({"readme.txt": b""}), "has no .shp"),
         ("a.plan", b"{}", "'fileType' is not 'Plan'"),
         ("a.waypoints", b"QGC WPL 100\n", "line 1 is not 'QGC WPL 110'"),
+        ("a.txt", b"notes\n", "line 1 is not 'QGC WPL 110'"),
+        ("a.mission", b"{}", "line 1 is not 'QGC WPL 110'"),
         ("a.csv", b"name;speed\n", "there is no column 'lat'"),
     ],
 )
@@ -329,45 +331,6 @@ def test_layers_of_shapefiles_are_read() -> None:
 
 
 # --- ground stations ----------------------------------------------------------------------------
-
-
-def test_everything_with_a_place_in_a_plan_is_read() -> None:
-    square = [[53, 7], [53, 8], [54, 8]]
-    plan = {
-        "fileType": "Plan",
-        "mission": {
-            "items": [
-                simple(22, 53.0, 7.0, 10.0),
-                {**simple(178, 0, 0, 0), "params": [1, 4.5, -1, 0, 0, 0, 0]},
-                simple(206, 0, 0, 0),
-                {"type": "ComplexItem", "complexItemType": "survey", "polygon": square},
-                {"type": "ComplexItem", "complexItemType": "CorridorScan", "polyline": square},
-                {"type": "ComplexItem", "complexItemType": "fwLandingPattern"},
-                simple(16, 53.5, 7.5, 20.0),
-            ]
-        },
-        "geoFence": {
-            "polygons": [{"polygon": square}, {"polygon": square[:2], "inclusion": False}],
-            "circles": [{"circle": {"center": [53, 7], "radius": 5}}],
-        },
-        "rallyPoints": {"points": [[53.0, 7.0, 30.0]]},
-    }
-    file = read("north.plan", json.dumps(plan))
-    assert [(each.name, type(each.geometry)) for each in file.geometries] == [
-        ("north", Route),
-        ("survey", Area),
-        ("corridor", Route),
-        ("fence", Area),
-        ("rally", Point),
-    ]
-    places = ((53.0, 7.0, 10.0), (53.5, 7.5, 20.0))
-    assert file.geometries[0].geometry == Route(places, speeds_m_s=(4.5, None))
-    assert [(each.severity, each.feature) for each in file.problems] == [
-        (Severity.WARNING, "mission"),
-        (Severity.ERROR, "mission.items[5]"),
-        (Severity.ERROR, "geoFence.polygons[1]"),
-        (Severity.ERROR, "geoFence.circles[0]"),
-    ]
 
 
 def simple(command: int, latitude: float, longitude: float, altitude: float) -> dict[str, Any]:

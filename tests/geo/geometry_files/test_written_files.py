@@ -178,7 +178,7 @@ def areas(draw: st.DrawFn) -> Area:
 
 
 positions = st.tuples(latitudes, longitudes, st.none() | altitudes)
-flown = st.tuples(latitudes, longitudes, altitudes)
+flown = st.tuples(latitudes.filter(bool), longitudes, altitudes)
 
 
 @st.composite
@@ -187,7 +187,9 @@ def with_speeds(draw: st.DrawFn, routes: st.SearchStrategy[Route]) -> Route:
     count = len(route.waypoints)
     speeds = draw(st.lists(st.none() | st.floats(0.01, 99.0), min_size=count, max_size=count))
     has_some = any(speed is not None for speed in speeds)
-    return replace(route, speeds_m_s=tuple(speeds) if has_some else ())
+    own_frames = [draw(frames) for _ in range(count if draw(st.booleans()) else 0)]
+    mixed = Route.of(route.waypoints, own_frames) if own_frames else route
+    return replace(mixed, speeds_m_s=tuple(speeds) if has_some else ())
 
 
 routes = with_speeds(
@@ -209,6 +211,19 @@ def test_all_kinds_survive_the_round_trip(
     file_format: str, geometries: list[NamedGeometry]
 ) -> None:
     assert list(read_again(written(file_format, *geometries), file_format)) == geometries
+
+
+def test_a_place_at_0_0_cannot_be_written_as_a_waypoint() -> None:
+    nowhere = NamedGeometry("a", Route(((0.0, 0.0, 20.0),)))
+    with pytest.raises(GeometryError, match="waypoint 1 is at 0, 0, which in such files means"):
+        written("waypoints", nowhere)
+
+
+def test_a_plan_of_different_altitude_frames_says_so_of_each_item() -> None:
+    mixed = Route.of(((38.1, -77.3, 20.0), (38.2, -77.3, 95.0)), ("relative", "amsl"))
+    mission = json.loads(written("plan", NamedGeometry("road", mixed)))["mission"]
+    assert mission["globalPlanAltitudeMode"] == 0
+    assert [(each["frame"], each["AltitudeMode"]) for each in mission["items"]] == [(3, 1), (0, 2)]
 
 
 @pytest.mark.parametrize("file_format", ["plan", "waypoints"])

@@ -393,18 +393,16 @@ class Routing(MissionFlight):
         if route is None or not route.waypoints:
             raise BehaviorFailedError("parameter 'route': it has no waypoints")
         return [
-            waypoint(
-                (latitude, longitude), *self.parameters.altitude_to_fly(own, route.altitude_frame)
-            )
-            for latitude, longitude, own in route.waypoints
+            waypoint(place[:2], *self.parameters.altitude_to_fly(place[2], frame))
+            for place, frame in zip(route.waypoints, route.frames, strict=True)
         ]
 
     def work(self, way: Sequence[MissionItem]) -> RemainingWork:
         """Return the account of the route; after a restart of the one that is stored."""
         own = [self._speeds.get(index + 1) for index in self._moves]
-        stored = Route(
-            tuple((item.latitude_deg, item.longitude_deg, item.altitude_m) for item in way),
-            frame_name(way[0]),
+        stored = Route.of(
+            ((item.latitude_deg, item.longitude_deg, item.altitude_m) for item in way),
+            map(frame_name, way),
             tuple(own) if any(speed is not None for speed in own) else (),
         )
         route = self.parameters.route or stored

@@ -87,7 +87,8 @@ def _items(behavior: str, parameters: Mapping[str, Value], geometries: Geometrie
     if behavior == "single_vehicle_routing":
         route = _geometry(parameters["route"], geometries)
         if isinstance(route, Route):
-            return [item(*each, route.altitude_frame) for each in route.waypoints]
+            of_each = zip(route.waypoints, route.frames, strict=True)
+            return [item(*place, frame) for place, frame in of_each]
     elif behavior == "area_survey":
         area = _geometry(parameters["area"], geometries)
         if isinstance(area, Area):

@@ -4,7 +4,8 @@ Both topics are latched, and published when something has changed: `~/markers` h
 `~/footprints` what payloads see of the ground.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import repeat
 from typing import Any
 
 from builtin_interfaces.msg import Time
@@ -90,12 +91,14 @@ class MarkersPublisher:
 
     def _of_geometry(self, name: str, geometry: Any) -> list[Any]:
         match geometry:
-            case Route(waypoints, altitude_frame):
-                lines = [self._line("routes", ROUTE_COLOR, waypoints, altitude_frame)]
+            case Route(waypoints):
+                lines = [self._line("routes", ROUTE_COLOR, waypoints, geometry.frames)]
             case Area(rings, altitude_frame):
                 fence = name == self._fleet.fence
                 namespace, color = ("fence", FENCE_COLOR) if fence else ("areas", AREA_COLOR)
-                lines = [self._line(namespace, color, ring, altitude_frame) for ring in rings]
+                lines = [
+                    self._line(namespace, color, ring, repeat(altitude_frame)) for ring in rings
+                ]
             case Point(position, altitude_frame):
                 sphere = self._marker("points", Marker.SPHERE, POINT_COLOR, POINT_M)
                 sphere.pose.position = _point(self._place(position, altitude_frame))
@@ -115,10 +118,11 @@ class MarkersPublisher:
         return markers
 
     def _line(
-        self, namespace: str, color: Any, places: Sequence[Coordinate], altitude_frame: str
+        self, namespace: str, color: Any, places: Sequence[Coordinate], frames: Iterable[str]
     ) -> Any:
         line = self._marker(namespace, Marker.LINE_STRIP, color, LINE_M)
-        line.points = [_point(self._place(each, altitude_frame)) for each in places[:MOST_POINTS]]
+        of_each = zip(places[:MOST_POINTS], frames, strict=False)
+        line.points = [_point(self._place(place, frame)) for place, frame in of_each]
         return line
 
     def _label(self, name: str, at: Any) -> Any:

@@ -63,6 +63,8 @@ def _encoded(key: str, value: ResolvedValue) -> str:
             tree = _feature("MultiPoint", [_lonlat(waypoints[0])], frame)
         case Route(waypoints, frame) if waypoints:
             tree = _feature("LineString", [_lonlat(point) for point in waypoints], frame)
+            if value.altitude_frames:
+                tree["properties"]["altitude_frames"] = list(value.altitude_frames)
         case Area(rings, frame) if rings:
             tree = _feature("Polygon", [[_lonlat(corner) for corner in r] for r in rings], frame)
         case bool() | int() | float() | str():
@@ -129,9 +131,9 @@ def _geometry(feature: Mapping[str, Any]) -> Point | Route | Area:
     if kind == "Point":
         return Point(_position(coordinates), frame)
     if kind == "LineString":
-        return Route(_positions(coordinates, 2), frame)
+        return _route(_positions(coordinates, 2), frame, feature.get("properties"))
     if kind == "MultiPoint":
-        return Route(_positions(coordinates, 1), frame)
+        return _route(_positions(coordinates, 1), frame, feature.get("properties"))
     if kind == "Polygon":
         if not isinstance(coordinates, list) or not coordinates:
             raise WireError("a Polygon is a list of rings")
@@ -140,10 +142,21 @@ def _geometry(feature: Mapping[str, Any]) -> Point | Route | Area:
     raise WireError(f"a geometry of type {_short(repr(kind))} is none of {known}")
 
 
+def _route(waypoints: tuple[Coordinate, ...], frame: str, properties: Any) -> Route:
+    frames = properties.get("altitude_frames") if isinstance(properties, dict) else None
+    if frames is None:
+        return Route(waypoints, frame)
+    if not isinstance(frames, list) or len(frames) != len(waypoints):
+        raise WireError(f"altitude_frames is no list of {len(waypoints)}, one a position")
+    return Route.of(waypoints, [_known_frame(each) for each in frames])
+
+
 def _frame(properties: Any) -> str:
     frame = properties.get("altitude_frame") if isinstance(properties, dict) else None
-    if frame is None:
-        return ALTITUDE_FRAMES[0]
+    return ALTITUDE_FRAMES[0] if frame is None else _known_frame(frame)
+
+
+def _known_frame(frame: Any) -> str:
     if frame not in ALTITUDE_FRAMES:
         known = ", ".join(ALTITUDE_FRAMES)
         raise WireError(f"altitude_frame {_short(repr(frame))} is none of {known}")

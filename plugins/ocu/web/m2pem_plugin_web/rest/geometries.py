@@ -32,7 +32,8 @@ class GeometryModel(BaseModel):
     """A route, area or point (GeoJSON). `altitude_frame`: what its altitudes are above.
 
     `speeds_m_s`: of a route, how fast vehicles leave each waypoint, null: as fast as before; []:
-    no waypoint has a speed.
+    no waypoint has a speed. `altitude_frames`: of a route whose waypoints have different ones, that
+    of each; []: `altitude_frame` holds for all.
     """
 
     model_config = ConfigDict(populate_by_name=True)
@@ -47,6 +48,7 @@ class GeometryModel(BaseModel):
     by: str
     at_us: int | None
     speeds_m_s: list[float | None] = []
+    altitude_frames: list[str] = []
 
 
 class HandOverModel(Body):
@@ -182,6 +184,7 @@ def _model(
         by=by,
         at_us=at_us,
         speeds_m_s=list(geometry.speeds_m_s) if isinstance(geometry, Route) else [],
+        altitude_frames=list(geometry.altitude_frames) if isinstance(geometry, Route) else [],
     )
 
 
