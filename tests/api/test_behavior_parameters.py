@@ -131,6 +131,7 @@ def test_parameters_come_back_from_json_without_areas_and_long_routes() -> None:
         "count": 3,
         "loop": True,
         "text": "x",
+        "mixed": Route.of(((0.0, 0.0, 5.0), (0.0, 1.0, 95.0)), ("relative", "amsl")),
     }
     area = Area(((0.0, 0.0, None), (0.0, 1.0, None), (1.0, 1.0, None)))
     text = json.dumps(encode_parameters({**kept, "area": area, "unset": None}, longest_route=2))

@@ -87,6 +87,20 @@ def test_the_rest_goes_on_at_the_speed_of_the_waypoint_before() -> None:
     assert left(again).speeds_m_s == (8.0, None)
 
 
+def test_the_rest_keeps_the_altitude_frame_of_each_waypoint() -> None:
+    frames = ("relative", "amsl", "amsl", "terrain")
+    route = Route.of(ROUTE.waypoints, frames)
+    work = RemainingRoute(raw_parameters({**PARAMETERS, "route": route}), route, FRAME)
+    work.moved((25.0, 3.0), 1)
+    rest = left(work)
+    assert rest.frames == ("amsl", "amsl", "amsl", "terrain")
+    assert rest.waypoints[0][2] is None, "between two frames it keeps the height that it has"
+    again = restored_work(json.loads(json.dumps(work.state())), FRAME)
+    assert left(again) == rest
+    work.reached(1)
+    assert left(work).frames == ("amsl", "amsl", "terrain")
+
+
 def test_a_waypoint_that_was_reached_is_where_the_rest_begins() -> None:
     work = routing()
     work.reached(2)

@@ -5,6 +5,8 @@ import pytest
 
 from tests.cli.conftest import Invoke
 from tests.command_line import FLEET, MISSION, REPOSITORY
+from tests.fleet.fleets import write_json
+from tests.geo.geometry_files.test_mission_plans import item, plan
 
 
 def test_a_fleet_is_shown(invoke: Invoke) -> None:
@@ -91,3 +93,17 @@ def test_a_fleet_without_an_origin_is_asked_for_one(invoke: Invoke, tmp_path: Pa
     status, _, err = invoke("fleet", fleet)
     assert status == 2
     assert "set the fleet's `origin` near its vehicles" in err
+
+
+def test_what_is_left_out_of_a_plan_is_shown(invoke: Invoke, tmp_path: Path) -> None:
+    write_json(tmp_path / "north.plan", plan(item(16, 38.0, -77.0, 30), item(20, 0, 0, 0)))
+    fleet = tmp_path / "fleet.yaml"
+    fleet.write_text("version: 1\nroutes: {north: north.plan}\n")
+    status, out, _ = invoke("fleet", fleet)
+    said = (
+        f"{fleet}:2: routes.north: warning: north.plan: item 2: MAV_CMD_NAV_RETURN_TO_LAUNCH is "
+        "left out; a task `return_to_launch` [geometry]"
+    )
+    assert (status, out.splitlines()[-1]) == (0, said)
+    (warning,) = json.loads(invoke("fleet", fleet, "--format", "json")[1])["warnings"]
+    assert warning["element"] == "routes.north"

@@ -7,7 +7,7 @@ import pytest
 from m2pem.api.telemetry import LinkState
 from m2pem.mission.behavior import BehaviorType
 from m2pem.mission.catalogue import ResourceId
-from m2pem.mission.geometry import VehiclePosition
+from m2pem.mission.geometry import Route, VehiclePosition
 
 from .sky import GROUND_M, NOW_US, airspace, area, claim, point, request, route, state
 
@@ -50,6 +50,17 @@ def test_homes_at_different_heights_are_compared_above_the_sea() -> None:
     assert claim(sky, request("goto", "two", altitude=-25.0, **goto))
     assert claim(sky, request("goto", "two", altitude=82.0, altitude_frame="amsl", **goto))
     assert not claim(sky, request("goto", "two", altitude=2.0, **goto))
+
+
+def test_each_waypoint_is_compared_in_its_own_frame() -> None:
+    sky = airspace("one", "two")
+    sky.received(state("one", 0, 0, 20))  # 80 m above the sea
+    sky.received(state("two", 0, -200, 60))
+    places = route((0, -200, 60), (0, 100, 140)).waypoints
+    low = Route.of((places[0], (*places[1][:2], 20.0)), ("relative", "relative"))
+    assert claim(sky, request("single_vehicle_routing", "two", route=low))
+    high = Route.of(places, ("relative", "amsl"))  # 120 m above the sea, then 140 m
+    assert not claim(sky, request("single_vehicle_routing", "two", route=high))
 
 
 @pytest.mark.parametrize(

@@ -241,6 +241,18 @@ def test_a_geometry_that_operators_hand_over_is_a_warning_until_they_have(fleet:
     assert not check(fleet, task, handed_over=("moon",))
 
 
+def test_what_a_file_leaves_out_of_a_route_is_a_warning_where_the_route_is_named(
+    fleet: Fleet,
+) -> None:
+    warned = Finding(
+        Severity.WARNING, fleet.file, 9, "routes.alpha", "geometry", "item 1: left out"
+    )
+    other = replace(warned, element="routes.beta")
+    doubtful = replace(fleet, warnings=(warned, other))
+    assert check(doubtful, drive(vehicle("evsg1"), route="alpha")) == [warned]
+    assert check(doubtful, drive(vehicle("evsg1"), route=READ_LATER)) == []
+
+
 def test_a_geometry_of_the_missions_own_is_known_and_stands_in_place_of_the_fleets(
     fleet: Fleet,
 ) -> None:

@@ -6,10 +6,12 @@ import pytest
 
 import m2pem
 from m2pem.errors import FleetError
+from m2pem.findings import Severity
 from m2pem.fleet.fleet import Domain, LostMemberPolicy, OnConflict, SharedSpace, dump, restore
 from m2pem.fleet.fleet_file import load_fleet
 from m2pem.mission.geometry import Area, Point, Route
 
+from ..geo.geometry_files.test_mission_plans import item, plan
 from .fleets import patrol, write_fleet, write_json
 
 FLEETS = Path(__file__).parents[2] / "fleet_configs"
@@ -93,6 +95,18 @@ def test_geometries_are_read_relative_to_the_fleet_file(tmp_path: Path) -> None:
     assert fleet.geometries["alpha"] == Route(((38.0, -77.0, None), (38.1, -77.1, 5.0)))
     assert isinstance(fleet.geometries["field"], Area)
     assert fleet.geometries["gate"] == Point((38.0, -77.0, None))
+
+
+def test_what_is_left_out_of_a_file_is_a_warning_at_its_name(tmp_path: Path) -> None:
+    items = (item(22, None, None, 20), item(16, 38.0, -77.0, 30))
+    write_json(tmp_path / "north.plan", plan(*items))
+    text = "version: 1\nroutes:\n  north: north.plan\n"
+    fleet = load_fleet(write_fleet(tmp_path, text))
+    assert fleet.geometries["north"] == Route(((38.0, -77.0, 30.0),))
+    assert [(each.severity, each.line, each.element) for each in fleet.warnings] == [
+        (Severity.WARNING, 3, "routes.north")
+    ]
+    assert "north.plan: item 1 (to 20 m): MAV_CMD_NAV_TAKEOFF is left" in fleet.warnings[0].message
 
 
 def test_without_an_origin_it_is_where_the_first_geometry_begins(tmp_path: Path) -> None:

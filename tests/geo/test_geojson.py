@@ -188,3 +188,34 @@ def test_the_speeds_of_waypoints_hold_until_another_one() -> None:
 def test_speeds_that_cannot_be_meant_are_refused(feature: dict[str, object], says: str) -> None:
     with pytest.raises(GeometryError, match=says):
         parse_geojson(feature)
+
+
+def with_frames(frames: object, geometry: object = LANE) -> dict[str, object]:
+    return {"type": "Feature", "properties": {"altitude_frames": frames}, "geometry": geometry}
+
+
+def test_each_position_of_a_route_may_have_an_altitude_frame() -> None:
+    route = parse_geojson(with_frames(["relative", "amsl", "terrain"]))
+    assert isinstance(route, Route)
+    assert (route.altitude_frame, route.frames) == ("relative", ("relative", "amsl", "terrain"))
+    assert parse_geojson(as_geojson(route)) == route
+    alike = parse_geojson(with_frames(["amsl", "amsl", "amsl"]))
+    assert as_geojson(alike)["properties"] == {"altitude_frame": "amsl"}
+
+
+@pytest.mark.parametrize(
+    ("feature", "says"),
+    [
+        (with_frames(["amsl"]), "altitude_frames: a list of 3 is expected"),
+        (with_frames("amsl"), "altitude_frames: a list of 3 is expected"),
+        (with_frames(["amsl", "agl", "amsl"]), "altitude_frame 'agl' is not known"),
+        (with_frames(["amsl", ["agl"], "amsl"]), "is not known"),
+        (
+            with_frames(["amsl"], {"type": "Point", "coordinates": [10, 50]}),
+            "only a route has them, not a point",
+        ),
+    ],
+)
+def test_frames_that_cannot_be_meant_are_refused(feature: dict[str, object], says: str) -> None:
+    with pytest.raises(GeometryError, match=says):
+        parse_geojson(feature)

@@ -160,6 +160,17 @@ def test_a_profile_has_the_height_above_ground(tile: Path, frame: str, above: li
     assert points[-1].along_m == pytest.approx(1110, abs=5)
 
 
+def test_a_profile_of_different_frames_is_even_above_the_sea(tile: Path) -> None:
+    # The ground is at 600 m at the first waypoint, and 10 m higher at each of the others.
+    places = ((38.5, -78.0, 150.0), (38.51, -78.0, 760.0), (38.52, -78.0, 150.0))
+    route = Route.of(places, ("relative", "amsl", "terrain"))
+    points = profile(route, Terrain(tile.parent), home_m=590.0)
+    ends = [each.altitude_m for each in points if each.waypoint is not None]
+    assert ends == pytest.approx([740, 760, 770], abs=1.1)
+    middle = min(points, key=lambda each: abs(each.place[0] - 38.505))
+    assert middle.altitude_m == pytest.approx(750, abs=1.5)
+
+
 def test_the_lowest_place_is_between_two_waypoints(tmp_path: Path) -> None:
     def ridge(latitude: float, _: float) -> float:
         return max(0.0, 100 - abs(latitude - 38.5) * 20_000)

@@ -51,3 +51,10 @@ def test_ground_that_no_file_has_is_said_with_the_file_that_would_have_it() -> N
     east = Route(((38.10, -77.001, 20.0), (38.10, -76.99, 20.0)))
     with pytest.raises(TerrainError, match=r"no elevation file has .* put N38W077.hgt"):
         follow_terrain(east, Hill())
+
+
+def test_altitudes_of_different_frames_are_no_heights_above_ground() -> None:
+    mixed = Route.of(((*SOUTH, 40.0), (*NORTH, 140.0)), ("relative", "amsl"))
+    with pytest.raises(GeometryError, match="count from different heights: say a height above"):
+        follow_terrain(mixed, Hill())
+    assert follow_terrain(mixed, Hill(), height_m=40.0).altitude_frame == "amsl"

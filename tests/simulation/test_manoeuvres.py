@@ -79,6 +79,20 @@ def test_altitudes_are_read_in_their_frame(simulate: Simulate) -> None:
     simulate(UAV, main)
 
 
+def test_waypoints_of_a_route_are_passed_in_their_own_frames(simulate: Simulate) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
+        await do(bench, "r1.b1", "takeoff", "uav", altitude=20.0)
+        there, back = place(0, 100, 85), place(0, 0, 30)  # home is 60 m above the sea
+        for number, way, up in (
+            (2, Route.of((back, there), ("relative", "amsl")), 25.0),
+            (3, Route.of((there, back), ("amsl", "relative")), 30.0),
+        ):
+            await do(bench, f"r1.b{number}", "single_vehicle_routing", "uav", route=way)
+            assert at(bench, "uav")[2] == pytest.approx(up)
+
+    simulate(UAV, main)
+
+
 def test_a_ground_vehicle_stays_on_the_ground(simulate: Simulate) -> None:
     async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
         await do(bench, "r1.b1", "goto", "ugv", target=Point(place(50, 0, 90)), altitude=30.0)

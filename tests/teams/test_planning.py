@@ -118,6 +118,14 @@ def test_the_faster_survey_more() -> None:
     assert len(waypoints(even, "v1")) == len(waypoints(even, "v0"))
 
 
+MIXED = Route.of((*route((50, 0), (500, 0)).waypoints,), ("relative", "amsl"))
+
+
+def test_a_route_of_different_frames_is_marched_at_the_altitude_of_the_task() -> None:
+    plan = PLANS["road_sweep"](setting("air", "air", route=MIXED, altitude=30.0))
+    assert {leg.parameters["altitude"] for leg in plan.legs} == {30.0}
+
+
 def test_only_aircraft_are_told_an_altitude() -> None:
     plan = PLANS["area_survey"](setting("ground", "air", area=FIELD, altitude=40.0))
     assert [leg.parameters.get("altitude") for leg in plan.legs] == [None, 40.0]
@@ -132,6 +140,7 @@ def test_only_aircraft_are_told_an_altitude() -> None:
         ("area_survey", setting("ground", area=FIELD, spacing=0.001), "spacing"),
         ("road_sweep", setting("ground", route=route((0, 0), (0, 0))), "the lead is there"),
         ("road_sweep", setting("ground", route=route((0, 0), (0, 200_000))), "100 km away"),
+        ("road_sweep", setting("air", route=MIXED), "count from different heights"),
     ],
 )
 def test_what_cannot_be_done_is_refused_by_name(

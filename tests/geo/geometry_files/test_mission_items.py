@@ -1,6 +1,7 @@
 """What becomes of the items of a mission: carried over, left out with a warning, or refused."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -18,7 +19,7 @@ PLACES = ((38.1085, -77.3192, 30.0), (38.1085, -77.3180, 40.0))
 
 
 def read(*items: str, header: str = "QGC WPL 110") -> GeometryFile:
-    """A file with a home position and items: frame, command, seven parameters, perhaps autoContinue."""
+    """A file with a home position and items: frame, command, parameters, perhaps autoContinue."""
     rows = [
         f"{n} 0 {item}{'' if len(item.split()) == 10 else ' 1'}" for n, item in enumerate(items, 1)
     ]
@@ -249,9 +250,7 @@ def test_a_circle_is_an_area_that_errs_to_the_safe_side(
     assert isinstance(found.geometry, Area)
     frame = LocalFrame((38.115, -77.315))
     corners = [frame.to_local(each[:2]) for each in found.geometry.rings[0]]
-    sides = [
-        ((a[0] + b[0]) / 2, (a[1] + b[1]) / 2) for a, b in zip(corners, corners[1:], strict=False)
-    ]
+    sides = [((a[0] + b[0]) / 2, (a[1] + b[1]) / 2) for a, b in pairwise(corners)]
     reaches = [(e * e + n * n) ** 0.5 for e, n in (corners if command == 5003 else sides)]
     assert least_m - 1e-6 <= min(reaches)
     assert max(reaches) <= most_m + 1e-6

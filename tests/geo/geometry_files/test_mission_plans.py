@@ -194,7 +194,7 @@ def test_items_of_the_first_plans_have_a_coordinate_and_four_parameters() -> Non
 def test_a_plan_that_cannot_be_read_says_where(value: Any, message: str) -> None:
     file = read(value)
     assert file.geometries == ()
-    assert message in [text for severity, text in said(file) if severity == "error"][0]
+    assert message in next(text for severity, text in said(file) if severity == "error")
 
 
 # --- QGC WPL ------------------------------------------------------------------------------------

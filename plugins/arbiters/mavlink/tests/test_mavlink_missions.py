@@ -83,6 +83,22 @@ def test_waypoints_have_the_altitude_and_frame_that_were_asked_for(way, asked, s
     play(Body().fly(33.0), main)
 
 
+MIXED = Route.of(
+    route((30, 0, 20.0), (60, 0, 500.0), (60, 40, 30.0)).waypoints, ("relative", "amsl", "terrain")
+)
+
+
+def test_each_waypoint_is_sent_in_its_own_frame() -> None:
+    async def main(bench) -> None:
+        await bench.start("r1.b1", "single_vehicle_routing", "v", route=MIXED)
+        await bench.running("r1.b1")
+        sent = [(item.frame, item.altitude_m) for item in bench.body.mission]
+        assert sent == [(3, 20.0), (0, 500.0), (10, 30.0)]
+        await bench.until(lambda: way_left(bench).frames == ("relative", "amsl", "terrain"), 20)
+
+    play(Body().fly(33.0), main)
+
+
 FAST_THEN_SLOW = replace(L_SHAPE, speeds_m_s=(8.0, 2.0, None))
 
 

@@ -31,6 +31,9 @@ values = st.one_of(
     st.text(),
     st.builds(Point, positions, frames),
     st.builds(Route, st.lists(positions, min_size=1, max_size=6).map(tuple), frames),
+    st.lists(st.tuples(positions, frames), min_size=1, max_size=6).map(
+        lambda both: Route.of((place for place, _ in both), (frame for _, frame in both))
+    ),
     st.builds(Area, st.lists(rings, min_size=1, max_size=3).map(tuple), frames),
     st.builds(VehiclePosition, st.text(min_size=1)),
 )
@@ -117,6 +120,10 @@ def feature(kind: str, coordinates: object, **properties: str) -> str:
         (feature("Polygon", []), "a Polygon is a list of rings"),
         (feature("Polygon", [[[0, 0], [1, 0], [1, 1], [0, 1]]]), "a ring ends where it begins"),
         (feature("Point", [0, 0], altitude_frame="agl"), "altitude_frame 'agl' is none of"),
+        (
+            feature("MultiPoint", [[0, 0]], altitude_frames="amsl"),
+            "altitude_frames is no list of 1",
+        ),
     ],
 )
 def test_what_is_no_value_is_refused(text: str, problem: str) -> None:

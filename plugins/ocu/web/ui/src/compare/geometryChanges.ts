@@ -53,7 +53,7 @@ function changeOf(name: string, before: Geometry | null, after: Geometry | null)
     const frames = { before: before.altitude_frame, after: after.altitude_frame };
     details.push(fill(words.frame, frames));
   }
-  const heights = (all: readonly Vertex[]) => all.map(({ altitude }) => altitude).join();
+  const heights = (all: readonly Vertex[]) => all.map(({ altitude, frame }) => [altitude, frame]).join();
   if (details.length === 0 && heights(old) !== heights(now)) details.push(words.altitudes);
   const isClosed = after.kind === "area";
   const lengths = [old, now].map((all) => writtenLength(length_m(all, isClosed)));

@@ -5,6 +5,7 @@ import {
   emptyDraft,
   featureOf,
   geometryOf,
+  inFrame,
   moved,
   problemOf,
   removed,
@@ -128,4 +129,36 @@ it("the speeds of a route's waypoints go along with them", () => {
   expect(featureOf(removed(removed(lane, 1), 1)).properties).toEqual({
     altitude_frame: "relative",
   });
+});
+
+it("keeps the altitude frame of each waypoint of a route", () => {
+  const lane = draftOf({
+    name: "lane",
+    kind: "route",
+    geometry: {
+      type: "LineString",
+      coordinates: [
+        [10, 50, 20],
+        [10.1, 50, 95],
+        [10.2, 50, 30],
+      ],
+    },
+    altitude_frame: "relative",
+    altitude_frames: ["relative", "amsl", "relative"],
+    from: "mission",
+    by: "",
+    at_us: null,
+  });
+  const properties = {
+    altitude_frame: "relative",
+    altitude_frames: ["relative", "amsl", "relative"],
+  };
+  expect(featureOf(lane).properties).toEqual(properties);
+  const reversed = { ...lane, vertices: lane.vertices.slice(1) };
+  expect(featureOf(reversed).properties).toEqual({
+    altitude_frame: "amsl",
+    altitude_frames: ["amsl", "relative"],
+  });
+  expect(featureOf(removed(lane, 1)).properties).toEqual({ altitude_frame: "relative" });
+  expect(featureOf(inFrame(lane, "terrain")).properties).toEqual({ altitude_frame: "terrain" });
 });

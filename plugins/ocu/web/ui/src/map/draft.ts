@@ -10,6 +10,8 @@ export interface Vertex {
   altitude: number | null;
   /** Of a route: how fast vehicles go from here on, in m/s; left out: as fast as before. */
   speed?: number | null;
+  /** Of a route: what its altitude is above; left out: as the draft says. */
+  frame?: AltitudeFrame;
 }
 
 export interface Draft {
@@ -34,10 +36,12 @@ export const emptyDraft = (kind: Kind): Draft => ({
 
 export function draftOf(of: Geometry): Draft {
   const { kind, name, geometry, altitude_frame: frame, speeds_m_s: speeds } = of;
+  const frames = of.altitude_frames;
   const holes = geometry.type === "Polygon" ? geometry.coordinates.slice(1) : [];
   const vertices = verticesOf(geometry).map((vertex, index) => {
     const speed = speeds?.[index];
-    return speed ? { ...vertex, speed } : vertex;
+    const own = frames?.[index];
+    return { ...vertex, ...(speed && { speed }), ...(own && { frame: own }) };
   });
   return { kind, name, frame, vertices, holes, before: [] };
 }
@@ -90,6 +94,17 @@ export function undone(draft: Draft): Draft {
   return vertices ? { ...draft, vertices, before: draft.before.slice(0, -1) } : draft;
 }
 
+/** What altitudes are above, at each vertex. */
+export const framesOf = ({ frame, vertices }: Draft): AltitudeFrame[] =>
+  vertices.map((vertex) => vertex.frame ?? frame);
+
+export const isMixed = (draft: Draft): boolean => new Set(framesOf(draft)).size > 1;
+
+/** All altitudes above the same. */
+export function inFrame(draft: Draft, frame: AltitudeFrame): Draft {
+  return { ...draft, frame, vertices: draft.vertices.map(({ frame: _, ...vertex }) => vertex) };
+}
+
 export const LEAST: Record<Kind, number> = { route: 2, area: 3, point: 1 };
 
 export type Problem = "vertices" | "name";
@@ -105,9 +120,14 @@ export function problemOf({ kind, name, vertices }: Draft): Problem | null {
 export function featureOf(draft: Draft): GeoJSON.Feature {
   const speeds_m_s = draft.vertices.map(({ speed }) => speed ?? null);
   const hasSpeeds = draft.kind === "route" && speeds_m_s.some((speed) => speed !== null);
+  const altitude_frames = framesOf(draft);
   return {
     type: "Feature",
-    properties: { altitude_frame: draft.frame, ...(hasSpeeds && { speeds_m_s }) },
+    properties: {
+      altitude_frame: altitude_frames[0] ?? draft.frame,
+      ...(hasSpeeds && { speeds_m_s }),
+      ...(isMixed(draft) && { altitude_frames }),
+    },
     geometry: geometryOf(draft),
   };
 }

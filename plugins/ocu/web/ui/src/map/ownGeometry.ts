@@ -30,8 +30,12 @@ export function ownGeometry(name: string, text: string): Geometry | undefined {
       by: "",
       at_us: null,
     };
-    const speeds: unknown = feature?.properties?.speeds_m_s;
-    return Array.isArray(speeds) ? { ...own, speeds_m_s: speeds as (number | null)[] } : own;
+    const { speeds_m_s: speeds, altitude_frames: frames } = feature?.properties ?? {};
+    return {
+      ...own,
+      ...(Array.isArray(speeds) && { speeds_m_s: speeds as (number | null)[] }),
+      ...(Array.isArray(frames) && { altitude_frames: frames as AltitudeFrame[] }),
+    };
   } catch {
     return undefined;
   }

@@ -109,6 +109,8 @@ export interface Geometry {
   altitude_frame: AltitudeFrame;
   /** Of a route with speeds: one for each waypoint. */
   speeds_m_s?: readonly (number | null)[];
+  /** Of a route whose waypoints have different ones; `altitude_frame` is that of the first. */
+  altitude_frames?: readonly AltitudeFrame[];
   from: "fleet" | "operator" | "mission";
   by: string;
   at_us: number | null;

@@ -2,7 +2,7 @@
 import { useState } from "preact/hooks";
 import { Dialog } from "../../shared/Dialog";
 import type { AltitudeFrame, Geometry } from "../../shared/types";
-import { draftOf, LEAST, moved, removed, type Draft } from "../../map/draft";
+import { draftOf, inFrame, isMixed, LEAST, moved, removed, type Draft } from "../../map/draft";
 import { VertexList } from "../../map/VertexList";
 import { fill, strings } from "../../strings";
 import type { EditorContext } from "../panels/panel";
@@ -89,9 +89,9 @@ function Own({ editor, draft }: { editor: EditorContext; draft: Draft }) {
         <label>
           {text.above}
           <select
-            value={draft.frame}
+            value={isMixed(draft) ? "" : (draft.vertices[0]?.frame ?? draft.frame)}
             onChange={({ currentTarget }) =>
-              plan.change({ ...draft, frame: currentTarget.value as AltitudeFrame })
+              plan.change(inFrame(draft, currentTarget.value as AltitudeFrame))
             }
           >
             {FRAMES.map((frame) => (

@@ -99,14 +99,16 @@ function written(
   { name, feature: { properties, geometry }, survey }: NamedFeature,
   before?: ModdleElement,
 ): ModdleElement {
-  const { altitude_frame = "relative", speeds_m_s } = (properties ?? {}) as {
-    altitude_frame?: string;
-    speeds_m_s?: readonly (number | null)[];
-  };
+  const {
+    altitude_frame = "relative",
+    speeds_m_s,
+    altitude_frames,
+  } = (properties ?? {}) as Partial<Geometry>;
+  const own = { ...(speeds_m_s && { speeds_m_s }), ...(altitude_frames && { altitude_frames }) };
   const value =
-    altitude_frame === "relative" && !speeds_m_s
+    altitude_frame === "relative" && Object.keys(own).length === 0
       ? geometry
-      : { type: "Feature", properties: { altitude_frame, ...(speeds_m_s && { speeds_m_s }) }, geometry };
+      : { type: "Feature", properties: { altitude_frame, ...own }, geometry };
   const body = JSON.stringify(value);
   const isSame = before && text(before, "body") === body;
   const kept = (attribute: string) => (isSame && text(before, attribute)) || undefined;
