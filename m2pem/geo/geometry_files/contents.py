@@ -131,7 +131,7 @@ class Contents:
                     Severity.ERROR,
                     "",
                     "has no route, area or point",
-                    "export the features themselves, not links to them or styles",
+                    "" if self._problems else "export the features, not links to them or styles",
                 )
             )
         if self._untold:

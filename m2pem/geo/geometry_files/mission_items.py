@@ -35,7 +35,7 @@ _LARGEST_CIRCLE_M = 100_000.0
 
 _BETWEEN = "between one route up to there and one from there on"
 _NO_TASK = "no task does it: set it in the autopilot"
-_SPEED_TYPES = {0.0: "", 1.0: "", 2.0: "climbing", 3.0: "descending"}
+_SPEED_TYPES = {0.0: "", 1.0: "", 2.0: "climbing ", 3.0: "descending "}
 """SPEED_TYPE; through the air and over ground are the same here."""
 _HEADING = 3
 _ASIDE = (
@@ -109,6 +109,8 @@ class MissionReader:
     """The items of a landing that the mission does not come to."""
     _corners: list[LatLon] = field(default_factory=list)
     """Of a fence polygon of which more corners follow."""
+    _polygon: int = 0
+    """The command of its corners."""
     _notes: dict[tuple[Severity, str, str], list[str]] = field(default_factory=dict)
 
     def add(self, item: MissionItem) -> None:
@@ -126,7 +128,7 @@ class MissionReader:
             return
         match command.treatment:
             case Treatment.FENCE:
-                with self.contents.feature(item.where, "area"):
+                with self.contents.feature(item.where):
                     self._add_fence(item)
             case Treatment.WAYPOINT | Treatment.WAIT | Treatment.STAY:
                 self._add_place(item, command, label)
@@ -134,12 +136,13 @@ class MissionReader:
                 self._add_speed(item)
             case Treatment.END:
                 self._end(item, command, label)
-            case Treatment.REFUSED:
-                self._refuse(label, command)
-            case Treatment.BEGIN if self._places:
-                self._refuse(label, command)
-            case _:
+            case Treatment.LEFT_OUT:
                 self._warn(label, f"{command.title} is left out", command.remedy)
+            case Treatment.BEGIN if not self._places:
+                self._warn(label, f"{command.title} is left out", command.remedy)
+            case _:
+                message = f"{command.title} cannot be flown as part of a route"
+                self._note(Severity.ERROR, label, message, command.remedy)
 
     def add_pattern(self, number: int, name: str, remedy: str) -> None:
         """Add an item that is flown by waypoints of its own, which are not read."""
@@ -148,8 +151,7 @@ class MissionReader:
 
     def finish(self) -> None:
         """Add the route, if there is one, and say what was left out of it."""
-        with self.contents.feature("fence", "area"):
-            self._check_corners()
+        self._end_polygon()
         for each in self._endings:
             if each.says:
                 self._warn(each.label, each.says, each.remedy)
@@ -169,9 +171,7 @@ class MissionReader:
     def _add_place(self, item: MissionItem, command: Command, label: str) -> None:
         for each in self._endings:
             message = f"{each.title}, with waypoints behind it, is no part of a route"
-            remedy = (
-                f"make a file of what is before it, and one of what is behind it; {each.remedy}"
-            )
+            remedy = f"make one file of what is before it, one of what is behind it; {each.remedy}"
             self._note(Severity.ERROR, each.label, message, remedy)
         self._endings.clear()
         latitude, longitude, altitude = item.params[4:]
@@ -199,25 +199,19 @@ class MissionReader:
             self._warn(str(item.number), what, f"a user task, {_BETWEEN}")
 
     def _end(self, item: MissionItem, command: Command, label: str) -> None:
-        stays = command.treatment is Treatment.STAY
-        says = f"{command.title} is {'carried over as a waypoint' if stays else 'left out'}"
+        what = ": that it stays there" if command.treatment is Treatment.STAY else ""
+        says = f"{command.title}{what} is left out"
         is_over = item.command in ENDINGS
         self._endings.append(_Ending(label, command.title, command.remedy, is_over, says))
 
     def _add_speed(self, item: MissionItem) -> None:
         kind, speed, throttle, relative = item.params[:4]
-        what = _SPEED_TYPES.get(kind or 0.0, "of an unknown type") or (
-            "relative" if relative else ""
-        )
+        what = "relative " if relative else _SPEED_TYPES.get(kind or 0.0, "unknown ")
         if speed and speed > 0 and not what:
             self._speeds_m_s[max(len(self._places) - 1, 0)] = speed
         elif speed is not None and speed != -1:
-            label = f"{item.number} ({f'{what} ' if what else ''}{speed:g} m/s)"
-            remedy = (
-                "-2 is the vehicle's own speed: give the one that is meant"
-                if speed == -2
-                else _NO_TASK
-            )
+            label = f"{item.number} ({what}{speed:g} m/s)"
+            remedy = "`speed` of a task, or a number that is the speed"
             self._warn(label, "MAV_CMD_DO_CHANGE_SPEED is left out", remedy)
         if throttle and throttle > 0:
             label = f"{item.number} ({throttle:g} %)"
@@ -234,8 +228,9 @@ class MissionReader:
         latitude, longitude, altitude = item.params[4:]
         place = coordinate(latitude, longitude, altitude, item.where)
         name = FENCES.get(item.command, "")
-        if item.command not in POLYGONS:
-            self._check_corners()
+        if item.command != self._polygon:
+            self._end_polygon()
+            self._polygon = item.command
         if item.command in POLYGONS:
             self._corners.append(place[:2])
             if len(self._corners) == item.params[0]:
@@ -247,16 +242,11 @@ class MissionReader:
             name = "rally" if item.command == RALLY_POINT else "fence_return"
             self.contents.add(name, Point(place, _frame(item)))
 
-    def _refuse(self, label: str, command: Command) -> None:
-        message = f"{command.title} cannot be flown as part of a route"
-        self._note(Severity.ERROR, label, message, command.remedy)
-
-    def _check_corners(self) -> None:
-        corners, self._corners = self._corners, []
-        if corners:
-            raise GeometryError(
-                f"a polygon has {len(corners)} corners, and its parameter 1 says another number"
-            )
+    def _end_polygon(self) -> None:
+        if self._corners:
+            message = f"has {len(self._corners)} corners, and parameter 1 says another number"
+            self.contents.note(FileProblem(Severity.ERROR, "a fence", message, kind="area"))
+            self._corners.clear()
 
     def _warn(self, label: str, message: str, remedy: str) -> None:
         self._note(Severity.WARNING, label, message, remedy)

@@ -67,7 +67,7 @@ def test_a_take_off_at_the_beginning_and_a_landing_at_the_end_are_left_out_with_
         ("2 177 1 0 0 0 0 0 0", "item 2 (to 1, 0 times): MAV_CMD_DO_JUMP is left out; it is never"),
         ("2 44444 0 0 0 0 0 0 0", "item 2: MAV_CMD_44444, which is not known, is left out; draw"),
         ("2 178 2 3 0 0 0 0 0", "item 2 (climbing 3 m/s): MAV_CMD_DO_CHANGE_SPEED is left out;"),
-        ("2 178 1 -2 0 0 0 0 0", "item 2 (-2 m/s): MAV_CMD_DO_CHANGE_SPEED is left out; -2 is"),
+        ("2 178 1 -2 0 0 0 0 0", "item 2 (-2 m/s): MAV_CMD_DO_CHANGE_SPEED is left out; `spee"),
         ("2 178 1 4 0 1 0 0 0", "item 2 (relative 4 m/s): MAV_CMD_DO_CHANGE_SPEED is left out;"),
         ("2 178 1 -1 60 0 0 0 0", "item 2 (60 %): MAV_CMD_DO_CHANGE_SPEED: the throttle is left"),
     ],
@@ -117,8 +117,8 @@ def test_a_place_to_stay_at_the_end_is_a_waypoint() -> None:
     file = read(A, B.replace("16", "17", 1))
     assert route(file) == Route(PLACES)
     assert said(file, Severity.WARNING) == [
-        "item 2: MAV_CMD_NAV_LOITER_UNLIM is carried over as a waypoint; a task `hold`, or `orbit` "
-        "for a plane"
+        "item 2: MAV_CMD_NAV_LOITER_UNLIM: that it stays there is left out; a task `hold`, or "
+        "`orbit` for a plane"
     ]
 
 
@@ -259,7 +259,17 @@ def test_a_circle_is_an_area_that_errs_to_the_safe_side(
 def test_a_polygon_with_another_number_of_corners_is_refused() -> None:
     square = polygon(5001, "38.10 -77.32", "38.12 -77.32", "38.12 -77.30", "38.10 -77.30")
     (error,) = said(read(*square[:3]), Severity.ERROR)
-    assert "a polygon has 3 corners, and its parameter 1 says another number" in error
+    assert error == "a fence: has 3 corners, and parameter 1 says another number"
+
+
+def test_corners_of_two_polygons_are_not_mixed() -> None:
+    inner = polygon(5001, "38.10 -77.32", "38.12 -77.32", "38.12 -77.30", "38.10 -77.30")
+    outer = polygon(5002, "38.110 -77.311", "38.112 -77.311", "38.111 -77.310")
+    file = read(*inner[:2], *outer)
+    assert said(file, Severity.ERROR) == [
+        "a fence: has 2 corners, and parameter 1 says another number"
+    ]
+    assert [each.name for each in file.geometries] == ["keep_out"]
 
 
 def test_a_circle_without_a_radius_is_refused() -> None:
