@@ -66,10 +66,11 @@ _WITHOUT_HOME = "QGC WPL 120"
 _LANDINGS = ("fwLandingPattern", "vtolLandingPattern")
 _PATTERNS = {"survey": "polygon", "CorridorScan": "polyline"}
 _FLOWN = (
-    *("angle", "AdjustedFootprintSide", "DistanceToSurface", "TurnAroundDistance", "FollowTerrain"),
-    *("Refly90Degrees", "CameraName", "spacing", "altitude", "turnAroundDistance"),
+    *("angle", "AdjustedFootprintSide", "DistanceToSurface", "DistanceMode", "TurnAroundDistance"),
+    *("FollowTerrain", "Refly90Degrees", "flyAlternateTransects", "entryLocation", "EntryPoint"),
+    *("CameraName", "spacing", "altitude", "relativeAltitude", "turnAroundDistance"),
 )
-"""How a pattern is flown, by QGroundControl's keys; the last three are its old ones."""
+"""How a pattern is flown, by QGroundControl's keys; the last four are its old ones."""
 
 
 def read_plan(content: bytes, contents: Contents) -> None:
@@ -85,10 +86,10 @@ def read_plan(content: bytes, contents: Contents) -> None:
         raise GeometryError("is not a QGroundControl plan: 'fileType' is not 'Plan'")
     mission = _mapping(plan.get("mission"))
     items = mission.get("items")
-    if not isinstance(items, list) or not all(isinstance(item, Mapping) for item in items):
-        raise GeometryError("mission.items: a list of items is expected")
     reader = MissionReader(contents, zero_is_north=mission.get("firmwareType") == _PX4)
     with contents.feature("mission", "route"):
+        if not isinstance(items, list) or not all(isinstance(item, Mapping) for item in items):
+            raise GeometryError("items: a list of items is expected")
         number = 0
         for index, item in enumerate(items):
             given = item.get("doJumpId")
@@ -139,9 +140,10 @@ def _read_complex(
                 **style,
                 **_mapping(style.get("CameraCalc")),
             }
-            flown = ", ".join(f"{key} {given[key]}" for key in _FLOWN if given.get(key))[:200]
+            flown = [f"{key} {given[key]}" for key in _FLOWN if given.get(key) is not None]
+            message = f"only its area is read, not {', '.join(flown)[:300] or 'more'}"
             remedy = "set heading, spacing, altitude and overshoot of a task `area_survey`"
-            contents.warn(where, f"only its area is read, not {flown or 'more'}", remedy, "area")
+            contents.warn(where, message, remedy, "area")
         elif kind in _LANDINGS:
             remedy = "a task `land` or `return_to_launch`"
             contents.warn(where, "a landing is left out", remedy, "route")

@@ -116,10 +116,10 @@ def test_how_a_survey_is_flown_is_said() -> None:
         "FollowTerrain": True,
         "Items": [item(16, 38.0, -77.0, 50)],
     }
-    file = read(plan({**SURVEY, "angle": 45, "TransectStyleComplexItem": style}))
+    file = read(plan({**SURVEY, "angle": 0, "TransectStyleComplexItem": style}))
     ((_, text),) = said(file)
     assert text == (
-        "item 1 (survey): only its area is read, not angle 45, AdjustedFootprintSide 25, "
+        "item 1 (survey): only its area is read, not angle 0, AdjustedFootprintSide 25, "
         "DistanceToSurface 50, TurnAroundDistance 10, FollowTerrain True, CameraName Sony; set "
         "heading, spacing, altitude and overshoot of a task `area_survey`"
     )
@@ -161,6 +161,13 @@ def test_a_survey_between_waypoints_is_no_part_of_a_route() -> None:
     assert said(file)[1][1].startswith("item 2: a survey, with waypoints behind it, is no part")
 
 
+def test_fences_and_rally_points_are_read_without_a_mission() -> None:
+    points = {"points": [[53.0, 7.0, 30.0]]}
+    file = read({"fileType": "Plan", "rallyPoints": points})
+    assert [each.name for each in file.geometries] == ["rally"]
+    assert [each.kind for each in file.problems] == ["route"]
+
+
 def test_items_of_the_first_plans_have_a_coordinate_and_four_parameters() -> None:
     old = {**item(16, 0, 0, 0), "params": [0, 0, 0, 0], "coordinate": [38.0, -77.0, 30]}
     fence = {"polygon": SQUARE, "version": 1}
@@ -173,8 +180,8 @@ def test_items_of_the_first_plans_have_a_coordinate_and_four_parameters() -> Non
     ("value", "message"),
     [
         ({"fileType": "Fence"}, "'fileType' is not 'Plan'"),
-        ({"fileType": "Plan"}, "mission.items: a list"),
-        (plan("x"), "mission.items: a list"),
+        ({"fileType": "Plan"}, "mission: items: a list"),
+        (plan("x"), "mission: items: a list"),
         (plan(), "has no route, area or point"),
         (plan(item(20, 0, 0, 0, frame=2)), "has no route, area or point"),
         (plan(item(16, 1, 2, 3, frame=7)), "item 1 (mission.items[0]): MAV_FRAME 7"),
