@@ -190,7 +190,10 @@ def geometry(text: str) -> tuple[str, Any, str]:
     feature = json.loads(Path(file).read_text(encoding="utf-8"))
     if feature["type"] == "FeatureCollection":
         (feature,) = feature["features"]
-    frame = (feature.get("properties") or {}).get("altitude_frame", "")
+    properties = feature.get("properties") or {}
+    frame = properties.get("altitude_frame", "")
+    if "altitude_frames" in properties:
+        sys.exit(f"{file}: its altitudes count from different heights, and a request has one frame")
     return name, feature.get("geometry", feature)["coordinates"], frame
 
 
