@@ -92,7 +92,10 @@ def test_a_route_is_a_feature_with_the_longitude_first() -> None:
     ]
 
 
-def feature(kind: str, coordinates: object, **properties: str) -> str:
+LINE = [[0, 0], [1, 1]]
+
+
+def feature(kind: str, coordinates: object, **properties: object) -> str:
     geometry = {"type": kind, "coordinates": coordinates}
     return json.dumps({"type": "Feature", "geometry": geometry, "properties": properties})
 
@@ -121,9 +124,14 @@ def feature(kind: str, coordinates: object, **properties: str) -> str:
         (feature("Polygon", [[[0, 0], [1, 0], [1, 1], [0, 1]]]), "a ring ends where it begins"),
         (feature("Point", [0, 0], altitude_frame="agl"), "altitude_frame 'agl' is none of"),
         (
-            feature("MultiPoint", [[0, 0]], altitude_frames="amsl"),
-            "altitude_frames is no list of 1",
+            feature("LineString", LINE, altitude_frame=["amsl"]),
+            "is a list of 1, not one a position",
         ),
+        (
+            feature("LineString", LINE, altitude_frame=["amsl", "x"]),
+            "altitude_frame 'x' is none of",
+        ),
+        (feature("MultiPoint", [[0, 0]], altitude_frame=["amsl"]), "['amsl'] is none of"),
     ],
 )
 def test_what_is_no_value_is_refused(text: str, problem: str) -> None:

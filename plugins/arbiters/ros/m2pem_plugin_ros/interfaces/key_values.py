@@ -62,9 +62,8 @@ def _encoded(key: str, value: ResolvedValue) -> str:
         case Route(waypoints, frame) if len(waypoints) == 1:  # a LineString has two or more
             tree = _feature("MultiPoint", [_lonlat(waypoints[0])], frame)
         case Route(waypoints, frame) if waypoints:
-            tree = _feature("LineString", [_lonlat(point) for point in waypoints], frame)
-            if value.altitude_frames:
-                tree["properties"]["altitude_frames"] = list(value.altitude_frames)
+            frames = list(value.altitude_frames) or frame
+            tree = _feature("LineString", [_lonlat(point) for point in waypoints], frames)
         case Area(rings, frame) if rings:
             tree = _feature("Polygon", [[_lonlat(corner) for corner in r] for r in rings], frame)
         case bool() | int() | float() | str():
@@ -77,7 +76,7 @@ def _encoded(key: str, value: ResolvedValue) -> str:
         raise WireError(f"parameter '{key}': {value!r} is not finite") from None
 
 
-def _feature(kind: str, coordinates: Any, frame: str) -> dict[str, Any]:
+def _feature(kind: str, coordinates: Any, frame: str | list[str]) -> dict[str, Any]:
     return {
         "type": "Feature",
         "geometry": {"type": kind, "coordinates": coordinates},
@@ -126,14 +125,21 @@ def _geometry(feature: Mapping[str, Any]) -> Point | Route | Area:
     geometry = feature.get("geometry")
     if not isinstance(geometry, dict):
         raise WireError("the Feature has no geometry")
-    frame = _frame(feature.get("properties"))
     kind, coordinates = geometry.get("type"), geometry.get("coordinates")
+    properties = feature.get("properties")
+    frames = properties.get("altitude_frame") if isinstance(properties, dict) else None
+    if kind == "LineString" and isinstance(frames, list):
+        waypoints = _positions(coordinates, 2)
+        if len(frames) != len(waypoints):
+            raise WireError(f"altitude_frame is a list of {len(frames)}, not one a position")
+        return Route.of(waypoints, [_frame({"altitude_frame": each}) for each in frames])
+    frame = _frame(properties)
     if kind == "Point":
         return Point(_position(coordinates), frame)
     if kind == "LineString":
-        return _route(_positions(coordinates, 2), frame, feature.get("properties"))
+        return Route(_positions(coordinates, 2), frame)
     if kind == "MultiPoint":
-        return _route(_positions(coordinates, 1), frame, feature.get("properties"))
+        return Route(_positions(coordinates, 1), frame)
     if kind == "Polygon":
         if not isinstance(coordinates, list) or not coordinates:
             raise WireError("a Polygon is a list of rings")
@@ -142,21 +148,10 @@ def _geometry(feature: Mapping[str, Any]) -> Point | Route | Area:
     raise WireError(f"a geometry of type {_short(repr(kind))} is none of {known}")
 
 
-def _route(waypoints: tuple[Coordinate, ...], frame: str, properties: Any) -> Route:
-    frames = properties.get("altitude_frames") if isinstance(properties, dict) else None
-    if frames is None:
-        return Route(waypoints, frame)
-    if not isinstance(frames, list) or len(frames) != len(waypoints):
-        raise WireError(f"altitude_frames is no list of {len(waypoints)}, one a position")
-    return Route.of(waypoints, [_known_frame(each) for each in frames])
-
-
 def _frame(properties: Any) -> str:
     frame = properties.get("altitude_frame") if isinstance(properties, dict) else None
-    return ALTITUDE_FRAMES[0] if frame is None else _known_frame(frame)
-
-
-def _known_frame(frame: Any) -> str:
+    if frame is None:
+        return ALTITUDE_FRAMES[0]
     if frame not in ALTITUDE_FRAMES:
         known = ", ".join(ALTITUDE_FRAMES)
         raise WireError(f"altitude_frame {_short(repr(frame))} is none of {known}")
