@@ -50,3 +50,26 @@ async def test_geometries_and_drawings_are_exported(tmp_path: Path) -> None:
         assert file["features"][0]["geometry"] == LINE
         drawn["geometries"] = [{"name": "a", "geojson": {"type": "Point"}}]
         await rest.post("/geometry-files/export", drawn, 422)
+
+
+async def test_a_route_of_different_altitude_frames_is_handed_over_and_shown(
+    tmp_path: Path,
+) -> None:
+    rows = ["0 1 0 16 0 0 0 0 38 -77.3 9 1", "1 0 3 16 0 0 0 0 38.107 -77.319 20 1"]
+    rows += ["2 0 0 16 0 0 0 0 38.108 -77.318 95 1", "3 0 2 20 0 0 0 0 0 0 0 1"]
+    async with rest_world(tmp_path) as rest:
+        answer = await rest.http.post(
+            "/api/geometry-files/read",
+            params={"name": "north.waypoints"},
+            content="\n".join(["QGC WPL 110", *rows]).encode(),
+            headers={"Content-Type": "application/octet-stream", "x-role": "viewer"},
+        )
+        found = answer.json()
+        feature = found["geometries"][0]["geojson"]
+        assert feature["properties"]["altitude_frames"] == ["relative", "amsl"]
+        (problem,) = found["problems"]
+        assert (problem["severity"], problem["feature"]) == ("warning", "item 3")
+        await rest.put("/geometries/north", {"geometry": feature}, 204)
+        known = {each["name"]: each for each in await rest.get("/geometries")}
+        assert known["north"]["altitude_frame"] == "relative"
+        assert known["north"]["altitude_frames"] == ["relative", "amsl"]
