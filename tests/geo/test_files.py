@@ -110,7 +110,8 @@ def test_what_is_left_out_of_a_plan_is_a_warning_for_the_kind_that_is_asked_for(
     path = write_json(tmp_path / "a.plan", plan(*items))
     warnings: list[FileProblem] = []
     assert isinstance(read_geometry(path, "route", warnings.append), Route)
-    assert [each.feature.partition(" (")[0] for each in warnings] == ["item 1", "item 4"]
+    left_out = [each.feature.partition(" (")[0] for each in warnings]
+    assert left_out == ["item 3", "item 1", "item 4"]
     warnings.clear()
     assert isinstance(read_geometry(path, "area", warnings.append), Area)
     assert [each.feature for each in warnings] == ["item 3 (survey)"]

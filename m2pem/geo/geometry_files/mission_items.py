@@ -31,7 +31,7 @@ _NAMED = 8
 """Items that a problem names; of more, only their number is said."""
 
 _CIRCLE_CORNERS = 64
-_LARGEST_CIRCLE_M = 100_000.0
+LARGEST_M = 100_000.0
 
 _BETWEEN = "between one route up to there and one from there on"
 _NO_TASK = "no task does it: set it in the autopilot"
@@ -281,10 +281,8 @@ def circle(center: LatLon, radius_m: float | None, is_inside: bool) -> Area:
     Raises:
         GeometryError: the radius is not above 0, or the circle meets the antimeridian.
     """
-    if radius_m is None or not 0 < radius_m < _LARGEST_CIRCLE_M:
-        raise GeometryError(
-            f"a radius of {radius_m} m is not between 0 and {_LARGEST_CIRCLE_M:g} m"
-        )
+    if radius_m is None or not 0 < radius_m < LARGEST_M:
+        raise GeometryError(f"a radius of {radius_m} m is not between 0 and {LARGEST_M:g} m")
     frame, step = LocalFrame(center), math.tau / _CIRCLE_CORNERS
     reach = radius_m if is_inside else radius_m / math.cos(step / 2)
     return polygon(

@@ -9,17 +9,16 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import zip_longest
 from typing import Any
 
-from m2pem.findings import Severity
 from m2pem.geo.file_text import decoded, parsed_json
 from m2pem.geo.geojson import GeometryError, coordinate
 from m2pem.geo.geometry_files.contents import (
     Contents,
     FeatureProblemError,
-    FileProblem,
     NamedGeometry,
 )
 from m2pem.geo.geometry_files.mission_commands import KEEP_OUT
 from m2pem.geo.geometry_files.mission_items import (
+    LARGEST_M,
     MissionItem,
     MissionReader,
     circle,
@@ -64,7 +63,7 @@ _WITHOUT_HOME = "QGC WPL 120"
 """QGroundControl's own of old: its first row is the first item."""
 
 _LANDINGS = ("fwLandingPattern", "vtolLandingPattern")
-_PATTERNS = {"survey": "polygon", "CorridorScan": "polyline"}
+_PATTERNS = ("survey", "CorridorScan")
 _FLOWN = (
     *("angle", "AdjustedFootprintSide", "DistanceToSurface", "DistanceMode", "TurnAroundDistance"),
     *("FollowTerrain", "Refly90Degrees", "flyAlternateTransects", "entryLocation", "EntryPoint"),
@@ -128,22 +127,18 @@ def _read_complex(
     kind = str(item.get("complexItemType") or item.get("type"))[:40]
     where = f"item {number} ({kind})"
     reader.add_pattern(number, f"a {kind}", "do that by a task")
-    with contents.feature(where, "area"):
+    with contents.feature(where):
         if kind in _PATTERNS:
             is_corridor = kind == "CorridorScan"
             area = _corridor(item) if is_corridor else _polygon(item.get("polygon"), "polygon")
             contents.add("corridor" if is_corridor else kind, area)
             style = _mapping(item.get("TransectStyleComplexItem"))
-            given = {
-                **_mapping(item.get("grid")),
-                **item,
-                **style,
-                **_mapping(style.get("CameraCalc")),
-            }
+            old, camera = _mapping(item.get("grid")), _mapping(style.get("CameraCalc"))
+            given = {**old, **item, **style, **camera}
             flown = [f"{key} {given[key]}" for key in _FLOWN if given.get(key) is not None]
             message = f"only its area is read, not {', '.join(flown)[:300] or 'more'}"
             remedy = "set heading, spacing, altitude and overshoot of a task `area_survey`"
-            contents.warn(where, message, remedy, "area")
+            contents.warn(where, message, remedy)
         elif kind in _LANDINGS:
             remedy = "a task `land` or `return_to_launch`"
             contents.warn(where, "a landing is left out", remedy, "route")
@@ -151,8 +146,7 @@ def _read_complex(
             remedy = "a task `orbit` around its middle, or a route around it at each height"
             raise FeatureProblemError("its polygon is a building, no area to survey", remedy)
         else:
-            remedy = "draw what it does as tasks of the mission"
-            contents.note(FileProblem(Severity.ERROR, where, "is not read", remedy))
+            raise FeatureProblemError("is not read", "draw what it does as tasks of the mission")
 
 
 def _mapping(value: object) -> Mapping[str, Any]:
@@ -168,8 +162,8 @@ def _corridor(item: Mapping[str, Any]) -> Area:
     line, width_m = item.get("polyline"), item.get("CorridorWidth")
     if not isinstance(line, list) or len(line) < 2:
         raise GeometryError("polyline: at least two positions are expected")
-    if not isinstance(width_m, int | float) or not width_m > 0:
-        raise FeatureProblemError(f"its CorridorWidth is {width_m!r}", "give it a width in m")
+    if not isinstance(width_m, int | float) or not 0 < width_m < LARGEST_M:
+        raise FeatureProblemError("its CorridorWidth is no width", "give it one in metres")
     places = [_corner(each, f"polyline[{index}]") for index, each in enumerate(line)]
     frame = LocalFrame(places[0])
     middle = [(*frame.to_local(place), 0.0) for place in places]

@@ -60,7 +60,7 @@ def test_everything_with_a_place_in_a_plan_is_read() -> None:
     places = ((38.5, -77.5, 20.0), (38.6, -77.5, 20.0))
     assert file.geometries[1].geometry == Route(places, speeds_m_s=(4.5, None))
     assert [(each.severity, each.feature, each.kind) for each in file.problems] == [
-        (Severity.WARNING, "item 5 (survey)", "area"),
+        (Severity.WARNING, "item 5 (survey)", ""),
         (Severity.WARNING, "item 6 (fwLandingPattern)", "route"),
         (Severity.WARNING, "item 1 (to 10 m)", "route"),
         (Severity.ERROR, "geoFence.polygons[1]", "area"),
