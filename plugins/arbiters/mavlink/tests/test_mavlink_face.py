@@ -201,8 +201,9 @@ def test_the_plan_is_of_the_missions_own_route_and_of_one_that_was_handed_over(
         async with gateway(tmp_path) as (control, port), ground_station(port) as station:
             await station.hears("HEARTBEAT", lambda each: each.get_srcSystem() == ROVER1)
             mission = scenarios.one_behavior("single_vehicle_routing", "rover1", route="round")
-            places = [(38.1075 + each / 1000, -77.319, None) for each in range(5)]
-            own = scenarios.drawn(mission, round=Route(tuple(places)))
+            places = [(38.1075 + each / 1000, -77.319, 95.0) for each in range(5)]
+            frames = ["relative", "amsl", "terrain", "amsl", "relative"]
+            own = scenarios.drawn(mission, round=Route.of(places, frames))
             for source, count in ((own, 5), (mission, 2)):
                 if source is mission:
                     given = as_geojson(Route(tuple(places[:2])))
@@ -213,6 +214,10 @@ def test_the_plan_is_of_the_missions_own_route_and_of_one_that_was_handed_over(
                 station.mav.mission_request_list_send(ROVER1, 1, 0)
                 found = await station.hears("MISSION_COUNT", since=since)
                 assert found.count == count
+                if source is own:
+                    station.mav.mission_request_int_send(ROVER1, 1, 1, 0)
+                    item = await station.hears("MISSION_ITEM_INT", since=since)
+                    assert (item.frame, item.z) == (dialect.MAV_FRAME_GLOBAL_INT, 95.0)
                 await control.stop(run)
                 await control.wait(run)
 
