@@ -178,6 +178,9 @@ class MissionReader:
         place, frame = None, _frame(item)
         if latitude or longitude:
             place = coordinate(latitude, longitude, altitude, item.where)
+            if altitude == 0 and frame != "amsl" and self._places and self._places[-1][2]:
+                what = "is at 0 m, which to a copter of ArduPilot is the altitude that it has"
+                self._warn(str(item.number), what, "give it the altitude that is meant")
         elif self._places:  # "here": the place before, at an altitude of its own if it has one
             before, its_frame = self._places[-1], self._frames[-1]
             place, frame = ((*before[:2], altitude), frame) if altitude else (before, its_frame)

@@ -178,6 +178,18 @@ def test_no_place_at_the_beginning_is_where_the_vehicle_is() -> None:
     )
 
 
+def test_an_altitude_of_0_below_others_is_doubtful() -> None:
+    # ArduCopter 4.7 (mode_auto.cpp, loc_from_cmd) keeps its altitude there; PX4 descends.
+    file = read(A, B.replace("40", "0"), "3 16 0 0 0 0 38.1 -77.3 30")
+    assert route(file).waypoints[1][2] == 0.0
+    assert said(file, Severity.WARNING) == [
+        "item 2: is at 0 m, which to a copter of ArduPilot is the altitude that it has; give it "
+        "the altitude that is meant"
+    ]
+    rover = "3 16 0 0 0 0 38.1085 -77.3192 0"
+    assert read(rover, B.replace("40", "0")).problems == ()
+
+
 def test_each_waypoint_keeps_its_altitude_frame() -> None:
     third = "10 16 0 0 0 0 38.109 -77.318 25"
     file = read(A, B.replace("3", "0", 1), third)

@@ -178,7 +178,7 @@ def areas(draw: st.DrawFn) -> Area:
 
 
 positions = st.tuples(latitudes, longitudes, st.none() | altitudes)
-flown = st.tuples(latitudes.filter(bool), longitudes, altitudes)
+flown = st.tuples(latitudes.filter(bool), longitudes, altitudes.filter(bool))
 
 
 @st.composite
