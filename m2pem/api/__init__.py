@@ -176,6 +176,7 @@ if TYPE_CHECKING:
     from m2pem.fleet.endurance import lasts_s
     from m2pem.fleet.fleet import Fleet
     from m2pem.geo.cameras import KNOWN_CAMERAS, ImagePlan, SurveyCamera, image_plan
+    from m2pem.geo.elevation_files import TerrainError
     from m2pem.geo.fence import Fence
     from m2pem.geo.geoid import ellipsoidal_m, mean_sea_level_m, undulation_m
     from m2pem.geo.geojson import GeometryError, as_geojson, kind_of, parse_geojson
@@ -200,14 +201,7 @@ if TYPE_CHECKING:
         survey_routes,
     )
     from m2pem.geo.survey_tracks import SurveyTracks
-    from m2pem.geo.terrain import (
-        TERRAIN_FOLDER,
-        ProfilePoint,
-        Terrain,
-        TerrainError,
-        lowest,
-        profile,
-    )
+    from m2pem.geo.terrain import TERRAIN_FOLDER, ProfilePoint, Terrain, lowest, profile
     from m2pem.geo.terrain_following import TOLERANCE_M, follow_terrain, not_covered
     from m2pem.mission.behavior import BehaviorType, Decision
     from m2pem.mission.catalogue import (
@@ -325,7 +319,8 @@ _MODULES = {
     "m2pem.geo.polyline": "Polyline Segment",
     "m2pem.geo.survey_pattern": "SurveyPattern SurveyRoute Surveyor best_heading_rad survey_routes",
     "m2pem.geo.survey_tracks": "SurveyTracks",
-    "m2pem.geo.terrain": ("ProfilePoint TERRAIN_FOLDER Terrain TerrainError lowest profile"),
+    "m2pem.geo.elevation_files": "TerrainError",
+    "m2pem.geo.terrain": "ProfilePoint TERRAIN_FOLDER Terrain lowest profile",
     "m2pem.geo.terrain_following": "TOLERANCE_M follow_terrain not_covered",
     "m2pem.suggestions": "did_you_mean",
     "m2pem.units": "US_PER_S Dimension UnitError quantity",

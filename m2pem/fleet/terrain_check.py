@@ -12,8 +12,9 @@ from m2pem.findings import Severity
 from m2pem.fleet.fleet import Domain, Fleet
 from m2pem.fleet.parameters import ResolvedValue
 from m2pem.fleet.task_findings import TaskFindings
+from m2pem.geo.elevation_files import TerrainError
 from m2pem.geo.positions import NO_ORIGIN
-from m2pem.geo.terrain import Terrain, TerrainError, lowest, profile
+from m2pem.geo.terrain import Terrain, lowest, profile
 from m2pem.geo.terrain_following import not_covered
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.geometry import Coordinate, Point, Route

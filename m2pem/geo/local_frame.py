@@ -3,8 +3,9 @@
 One accuracy holds for all of m2pem. East, north and up are exact to 1 micrometre. A place on the
 ground that goes from metres to degrees and back moves by less than 1 mm within 50 km of the origin,
 1 cm within 100 km and 1 m within 500 km. A distance is that of the geodesic to 1 mm within 10 km,
-1 cm within 50 km and 2 m within 500 km. Heights above mean sea level and above the ellipsoid are
-treated as the same.
+1 cm within 50 km and 2 m within 500 km. Altitudes count from mean sea level, which is taken as
+parallel to the ellipsoid: the geoid's slope, mostly below 0.1 m and at most 2 m in 10 km, is left
+out.
 
 This is plain arithmetic: a simulation converts single places many thousand times, for which an
 array library takes some twenty times as long, and the command line need not load NumPy.
@@ -13,6 +14,8 @@ array library takes some twenty times as long, and the command line need not loa
 import math
 from collections.abc import Sequence
 from typing import TypeAlias
+
+from m2pem.geo.geoid import ellipsoidal_m
 
 LatLon: TypeAlias = tuple[float, float]
 """Latitude and longitude in WGS-84 degrees."""
@@ -23,7 +26,8 @@ EastNorth: TypeAlias = tuple[float, float]
 Origin: TypeAlias = tuple[float, float, float]
 """Latitude and longitude in degrees, altitude in metres above mean sea level."""
 
-_SEMI_MAJOR_M = 6_378_137.0
+SEMI_MAJOR_M = 6_378_137.0
+"""Of the ellipsoids WGS 84 and GRS 80."""
 _MEAN_RADIUS_M = 6_371_008.8
 _FLATTENING = 1 / 298.257223563
 _ECCENTRICITY2 = _FLATTENING * (2 - _FLATTENING)
@@ -60,12 +64,12 @@ class LocalFrame:
         than an Earth radius, so that what is far never seems near.
         """
         east, north, up = self.to_enu(place[0], place[1], self.origin[2])
-        if up >= -_SEMI_MAJOR_M:
+        if up >= -SEMI_MAJOR_M:
             return east, north
         distance_m = math.hypot(east, north)
         if distance_m == 0.0:
-            return 2 * _SEMI_MAJOR_M, 0.0
-        stretch = (2 * _SEMI_MAJOR_M - distance_m) / distance_m
+            return 2 * SEMI_MAJOR_M, 0.0
+        stretch = (2 * SEMI_MAJOR_M - distance_m) / distance_m
         return east * stretch, north * stretch
 
     def to_latlon(self, point: EastNorth) -> LatLon:
@@ -98,7 +102,8 @@ class LocalFrame:
     @property
     def geocentric(self) -> tuple[float, float, float]:
         """The origin as x, y and z from the Earth's centre, in metres (ECEF, EPSG:4978)."""
-        return self._centre
+        latitude_deg, longitude_deg, _ = self.origin
+        return _geocentric(latitude_deg, longitude_deg, ellipsoidal_m(*self.origin))
 
     def _ground_up_m(self, east_m: float, north_m: float) -> float:
         """Return how high the ground is there: below 0, as the Earth is round.
@@ -109,7 +114,7 @@ class LocalFrame:
         if distance2 == 0.0:
             return 0.0
         bent = 1 - _ECCENTRICITY2 * self._sin_lat * self._sin_lat
-        normal_m = _SEMI_MAJOR_M / math.sqrt(bent)
+        normal_m = SEMI_MAJOR_M / math.sqrt(bent)
         meridian_m = normal_m * (1 - _ECCENTRICITY2) / bent
         radius_m = distance2 / (east_m * east_m / normal_m + north_m * north_m / meridian_m)
         radius_m += self.origin[2]
@@ -134,7 +139,7 @@ def _geocentric(
     """Return x, y and z from the Earth's centre, in metres (ECEF)."""
     latitude, longitude = math.radians(latitude_deg), math.radians(longitude_deg)
     sin = math.sin(latitude)
-    normal_m = _SEMI_MAJOR_M / math.sqrt(1 - _ECCENTRICITY2 * sin * sin)
+    normal_m = SEMI_MAJOR_M / math.sqrt(1 - _ECCENTRICITY2 * sin * sin)
     aside_m = (normal_m + altitude_m) * math.cos(latitude)
     return (
         aside_m * math.cos(longitude),
@@ -149,13 +154,13 @@ def _geodetic(x: float, y: float, z: float) -> tuple[float, float, float]:
     latitude = math.atan2(z, aside_m * (1 - _ECCENTRICITY2))
     for _ in range(_ROUNDS):
         sin = math.sin(latitude)
-        normal_m = _SEMI_MAJOR_M / math.sqrt(1 - _ECCENTRICITY2 * sin * sin)
+        normal_m = SEMI_MAJOR_M / math.sqrt(1 - _ECCENTRICITY2 * sin * sin)
         found = math.atan2(z + _ECCENTRICITY2 * normal_m * sin, aside_m)
         done = abs(found - latitude) < _CLOSE_ENOUGH_RAD
         latitude = found
         if done:
             break
     sin = math.sin(latitude)
-    bent_m = _SEMI_MAJOR_M * math.sqrt(1 - _ECCENTRICITY2 * sin * sin)
+    bent_m = SEMI_MAJOR_M * math.sqrt(1 - _ECCENTRICITY2 * sin * sin)
     altitude_m = aside_m * math.cos(latitude) + z * sin - bent_m
     return math.degrees(latitude), math.degrees(math.atan2(y, x)), altitude_m

@@ -1,27 +1,22 @@
 """Heights of the ground from elevation files of this machine: SRTM tiles (.hgt) and GeoTIFF.
 
-Heights are in metres above mean sea level, bilinear between the samples. Where no file has a place,
-or a file has no value there, the height is not known. GeoTIFF files need the extra `terrain`.
+Heights are in metres above mean sea level (EGM96), bilinear between the samples, also of files side
+by side. Where no file has a place, or a file has no value there, the height is not known. GeoTIFF
+files need the extra `terrain`.
 """
 
 import math
-import mmap
-import re
-import struct
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from functools import cache, partial
+from itertools import pairwise, product
 from pathlib import Path
 from threading import Lock
-from typing import TYPE_CHECKING, Protocol
 
-from m2pem.errors import M2pemError
 from m2pem.findings import unreadable_remedy
+from m2pem.geo.elevation_files import Raster, TerrainError, Tile, corner_of
 from m2pem.geo.local_frame import LatLon, distance_m
 from m2pem.mission.geometry import Coordinate, Route
-
-if TYPE_CHECKING:
-    from rasterio.io import DatasetReader
 
 TERRAIN_FOLDER = "M2PEM_TERRAIN"
 """The variable of the environment with the folder of elevation files."""
@@ -29,24 +24,9 @@ TERRAIN_FOLDER = "M2PEM_TERRAIN"
 MOST_SAMPLES = 2_000
 """Of a profile: over a longer route they are farther apart."""
 
-_TILE = re.compile(r"([NS])(\d{2})([EW])(\d{3})", re.IGNORECASE)
-_SIDES = {2 * side * side: side for side in (1201, 3601)}
-"""Samples of a side of a tile, by its bytes: 3 and 1 seconds of arc apart."""
-
-_VOID = -32768
 _TIFF = (".tif", ".tiff")
-
-
-class TerrainError(M2pemError):
-    """An elevation file cannot be used; the message says which, why, and what would be right."""
-
-    exit_status = 2
-
-
-class _ElevationFile(Protocol):
-    def height_m(self, latitude_deg: float, longitude_deg: float) -> float | None:
-        """Return the height of the ground; None: it is not known."""
-        ...
+_FILES_BESIDE = 2
+"""At a corner, files beside the file beside may be needed: where spacings differ."""
 
 
 class Terrain:
@@ -60,8 +40,8 @@ class Terrain:
 
     def __init__(self, folder: Path) -> None:
         self._lock = Lock()
+        self._tile, self._raster = cache(Tile), cache(Raster)
         self._tiles: dict[tuple[int, int], Path] = {}
-        self._open: dict[Path, _ElevationFile] = {}
         self._rasters: list[Path] = []
         try:
             files = sorted(folder.iterdir())
@@ -69,7 +49,7 @@ class Terrain:
             remedy = unreadable_remedy(error)
             raise TerrainError(f"{folder}: cannot be read: {error.strerror}; {remedy}") from None
         for file in files:
-            corner = _corner(file)
+            corner = corner_of(file)
             if corner is not None:
                 self._tiles[corner] = file
             elif file.suffix.lower() in _TIFF:
@@ -85,133 +65,34 @@ class Terrain:
         Raises:
             TerrainError: the file of that place is damaged, or GeoTIFF cannot be read here.
         """
-        latitude_deg, longitude_deg = place
         with self._lock:
-            for file in self._files(latitude_deg, longitude_deg):
-                height_m = file.height_m(latitude_deg, longitude_deg)
-                if height_m is not None:
-                    return height_m
+            return self._height_m(_FILES_BESIDE, *place)
+
+    def _height_m(
+        self, files_beside: int, latitude_deg: float, longitude_deg: float
+    ) -> float | None:
+        """Look into the files that have the place, then between those around it."""
+        longitude_deg = (longitude_deg + 180.0) % 360.0 - 180.0
+        for tile, longitude in self._tiles_at(latitude_deg, longitude_deg):
+            if (height_m := tile.height_m(latitude_deg, longitude)) is not None:
+                return height_m
+        lookups = (None, partial(self._height_m, files_beside - 1)) if files_beside else (None,)
+        for beside, path in product(lookups, self._rasters):
+            height_m = self._raster(path).height_m(latitude_deg, longitude_deg, beside)
+            if height_m is not None:
+                return height_m
         return None
 
-    def _files(self, latitude_deg: float, longitude_deg: float) -> Iterator[_ElevationFile]:
-        corner = math.floor(latitude_deg), math.floor(longitude_deg)
-        if corner in self._tiles:
-            path = self._tiles[corner]
-            if path not in self._open:
-                self._open[path] = _Tile(path, corner)
-            yield self._open[path]
-        for path in self._rasters:
-            if path not in self._open:
-                self._open[path] = _Raster(path)
-            yield self._open[path]
-
-
-def _corner(file: Path) -> tuple[int, int] | None:
-    """Return the latitude and longitude of a tile's south-west corner; None: it is no tile."""
-    found = _TILE.fullmatch(file.stem)
-    if found is None or file.suffix.lower() != ".hgt":
-        return None
-    north, latitude, east, longitude = found.groups()
-    return (
-        int(latitude) * (1 if north.upper() == "N" else -1),
-        int(longitude) * (1 if east.upper() == "E" else -1),
-    )
-
-
-class _Tile:
-    """A tile of one degree: rows from north to south, as big-endian 16-bit integers."""
-
-    def __init__(self, path: Path, corner: tuple[int, int]) -> None:
-        try:
-            size = path.stat().st_size
-            side = _SIDES.get(size)
-            if side is None:
-                expected = " or ".join(f"{each:,}" for each in _SIDES)
-                raise TerrainError(f"{path}: has {size:,} bytes; an SRTM tile has {expected}")
-            with path.open("rb") as file:
-                self._samples = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
-        except OSError as error:
-            raise TerrainError(f"{path}: cannot be read: {error.strerror}") from None
-        self._side = side
-        self._corner = corner
-
-    def height_m(self, latitude_deg: float, longitude_deg: float) -> float | None:
-        """Return the height between the four samples around a place."""
-        last = self._side - 1
-        row = (1 - (latitude_deg - self._corner[0])) * last
-        column = (longitude_deg - self._corner[1]) * last
-        return _between(row, column, self._side, self._side, self._sample)
-
-    def _sample(self, row: int, column: int) -> float | None:
-        (value,) = struct.unpack_from(">h", self._samples, 2 * (row * self._side + column))
-        return None if value == _VOID else float(value)
-
-
-class _Raster:
-    """A GeoTIFF in any projection."""
-
-    def __init__(self, path: Path) -> None:
-        try:
-            import rasterio  # noqa: PLC0415
-            from rasterio.errors import RasterioError  # noqa: PLC0415
-        except ImportError:
-            raise TerrainError(
-                f"{path}: GeoTIFF is read with rasterio: pip install 'm2pem[terrain]'"
-            ) from None
-        try:
-            self._data: DatasetReader = rasterio.open(path)
-        except (RasterioError, OSError) as error:
-            raise TerrainError(f"{path}: cannot be read as GeoTIFF: {error}") from None
-        if self._data.crs is None:
-            raise TerrainError(f"{path}: does not say its projection; georeference it")
-        self._in_degrees = self._data.crs.to_epsg() == 4326
-
-    def height_m(self, latitude_deg: float, longitude_deg: float) -> float | None:
-        """Return the height between the four samples around a place."""
-        from rasterio.warp import transform  # noqa: PLC0415
-
-        x, y = longitude_deg, latitude_deg
-        if not self._in_degrees:
-            xs, ys, *_ = transform("EPSG:4326", self._data.crs, [longitude_deg], [latitude_deg])
-            x, y = xs[0], ys[0]
-        column, row = ~self._data.transform @ (x, y)
-        # A sample is the height in the middle of its cell.
-        row, column = row - 0.5, column - 0.5
-        height, width = self._data.height, self._data.width
-        return _between(row, column, height, width, self._sample)
-
-    def _sample(self, row: int, column: int) -> float | None:
-        from rasterio.errors import RasterioError  # noqa: PLC0415
-
-        try:
-            values = self._data.read(1, window=((row, row + 1), (column, column + 1)), masked=True)
-        except (RasterioError, OSError) as error:
-            raise TerrainError(f"{self._data.name}: is damaged: {error}") from None
-        value = values[0, 0]
-        return None if values.mask.any() or not math.isfinite(value) else float(value)
-
-
-class _Sample(Protocol):
-    def __call__(self, row: int, column: int) -> float | None: ...
-
-
-def _between(row: float, column: float, rows: int, columns: int, sample: _Sample) -> float | None:
-    """Return the bilinear mean of the four samples around a place; None: one is not known."""
-    if not (0 <= row <= rows - 1 and 0 <= column <= columns - 1):
-        return None
-    top, left = min(int(row), rows - 2), min(int(column), columns - 2)
-    down, right = row - top, column - left
-    total = 0.0
-    for at_row, weight_row in ((top, 1 - down), (top + 1, down)):
-        for at_column, weight_column in ((left, 1 - right), (left + 1, right)):
-            weight = weight_row * weight_column
-            if weight == 0:
-                continue
-            value = sample(at_row, at_column)
-            if value is None:
-                return None
-            total += weight * value
-    return total
+    def _tiles_at(self, latitude_deg: float, longitude_deg: float) -> Iterator[tuple[Tile, float]]:
+        """Yield the tiles of a place, two or four on an edge, with its longitude by theirs."""
+        south, west = math.floor(latitude_deg), math.floor(longitude_deg)
+        souths = (south, south - 1) if latitude_deg == south else (south,)
+        wests = (west, west - 1) if longitude_deg == west else (west,)
+        for lowest, leftmost in product(souths, wests):
+            turn = 360 if leftmost < -180 else 0
+            corner = lowest, leftmost + turn
+            if corner in self._tiles:
+                yield self._tile(self._tiles[corner], corner), longitude_deg + turn
 
 
 # --- profiles -----------------------------------------------------------------------------------

@@ -8,9 +8,10 @@ import math
 from collections.abc import Sequence
 from itertools import pairwise
 
+from m2pem.geo.elevation_files import TerrainError
 from m2pem.geo.geojson import GeometryError
 from m2pem.geo.local_frame import LatLon
-from m2pem.geo.terrain import Terrain, TerrainError, along_route
+from m2pem.geo.terrain import Terrain, along_route
 from m2pem.mission.geometry import Coordinate, Route
 
 TOLERANCE_M = 2.0

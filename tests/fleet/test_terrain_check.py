@@ -3,7 +3,10 @@
 import struct
 from pathlib import Path
 
+import numpy as np
 import pytest
+import rasterio
+from rasterio.transform import from_origin
 
 from m2pem.fleet.fleet_file import load_fleet
 from m2pem.scripting.checking import check
@@ -41,9 +44,10 @@ def found(
     folder: Path, route: str, *, clearance: str = ", clearance: 20 m", more: str = "", who: str = ""
 ) -> list[tuple[str, str, str]]:
     elevation = folder / "elevation"
-    elevation.mkdir(exist_ok=True)
-    row = struct.pack(f">{SIDE}h", *([75] * SIDE))
-    (elevation / "N38W078.hgt").write_bytes(row * SIDE)
+    if not elevation.exists():
+        elevation.mkdir()
+        row = struct.pack(f">{SIDE}h", *([75] * SIDE))
+        (elevation / "N38W078.hgt").write_bytes(row * SIDE)
     (folder / "fleet.yaml").write_text(FLEET.format(clearance=clearance))
     mission = MISSION.format(lane=route, properties=ROUTE + more, vehicle=who or "uav")
     (folder / "m.bpmn").write_text(mission)
@@ -67,6 +71,26 @@ def test_a_route_below_the_clearance_is_found_at_its_task(
     assert (rule, element) == ("low-over-ground", "fly")
     assert says in text
     assert load_fleet(tmp_path / "fleet.yaml").clearance_m == 20.0
+
+
+@pytest.mark.parametrize("route", [lane(70, "amsl"), lane(36, "ellipsoid")])
+def test_ground_and_route_are_compared_in_one_datum(tmp_path: Path, route: str) -> None:
+    # 41 m above the ellipsoid are 75 m above mean sea level there.
+    (tmp_path / "elevation").mkdir()
+    with rasterio.open(
+        tmp_path / "elevation" / "dem.tif",
+        "w",
+        width=10,
+        height=10,
+        count=1,
+        dtype="float32",
+        crs="EPSG:4979",
+        transform=from_origin(-77.35, 38.15, 0.01, 0.01),
+    ) as data:
+        data.write(np.full((10, 10), 41.0, "float32"), 1)
+    [(rule, element, text)] = found(tmp_path, route)
+    assert (rule, element) == ("low-over-ground", "fly")
+    assert "uav would be 5 m below the ground" in text
 
 
 def test_enough_height_other_vehicles_and_fleets_without_a_clearance_are_fine(

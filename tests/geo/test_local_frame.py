@@ -30,6 +30,12 @@ def test_east_north_and_up_agree_with_pymap3d(lat, lon, alt, east, north, up) ->
     )
 
 
+def test_the_origin_in_ecef_is_at_its_height_above_the_ellipsoid() -> None:
+    # 60 m above mean sea level, which is 33.97 m below the ellipsoid there.
+    expected = pymap3d.geodetic2ecef(38.1075, -77.3192, 26.03)
+    assert LocalFrame((38.1075, -77.3192, 60.0)).geocentric == pytest.approx(expected, abs=0.01)
+
+
 @pytest.mark.parametrize(("within_m", "by_m"), [(50_000, 0.001), (100_000, 0.01), (500_000, 1.0)])
 @given(latitudes, longitudes, altitudes, st.floats(0, math.tau), st.floats(0, 1))
 def test_a_place_on_the_ground_comes_back(within_m, by_m, lat, lon, alt, bearing, part) -> None:

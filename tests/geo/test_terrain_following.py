@@ -4,9 +4,10 @@ import math
 
 import pytest
 
+from m2pem.geo.elevation_files import TerrainError
 from m2pem.geo.geojson import GeometryError
 from m2pem.geo.local_frame import LatLon
-from m2pem.geo.terrain import Terrain, TerrainError, profile
+from m2pem.geo.terrain import Terrain, profile
 from m2pem.geo.terrain_following import follow_terrain
 from m2pem.mission.geometry import Route
 
