@@ -17,7 +17,8 @@ from m2pem.mission.catalogue import ResourceId
 
 @dataclass(frozen=True, slots=True)
 class GeoPosition:
-    """WGS-84 latitude and longitude in degrees, altitude in metres above mean sea level."""
+    """WGS-84 latitude and longitude in degrees, altitude in metres above mean sea
+    level (EGM96)."""
 
     latitude_deg: float
     longitude_deg: float

@@ -9,7 +9,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from io import StringIO
 
-from m2pem.geo.geojson import ALTITUDE_FRAMES, GeometryError, checked, coordinate, with_frames
+from m2pem.geo.geojson import (
+    FILE_FRAMES,
+    GeometryError,
+    above_sea_level,
+    checked,
+    coordinate,
+    with_frames,
+)
 from m2pem.mission.geometry import Area, Coordinate, Point, Route
 from m2pem.suggestions import suggest
 from m2pem.units import UNITS, Dimension
@@ -56,7 +63,9 @@ def parse_csv(text: str, kind: str) -> Point | Route | Area:
                 f"line {line}: altitude_frame is {frames[-1]!r}, but {frames[0]!r} before"
             )
     geometry = positions_as(positions, next(iter(frames), "relative"), kind)
-    return with_frames(geometry, frames) if isinstance(geometry, Route) else geometry
+    if isinstance(geometry, Route):
+        geometry = with_frames(geometry, frames)
+    return above_sea_level(geometry)
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,8 +161,8 @@ def csv_frame(cells: Mapping[str, tuple[str, Column]], where: str) -> str:
         GeometryError: the frame is not known.
     """
     frame = cells["altitude_frame"][0] if "altitude_frame" in cells else ""
-    if frame and frame not in ALTITUDE_FRAMES:
-        hint = suggest(frame, ALTITUDE_FRAMES, "frames")
+    if frame and frame not in FILE_FRAMES:
+        hint = suggest(frame, FILE_FRAMES, "frames")
         raise GeometryError(f"{where}: altitude_frame {frame!r} is not known; {hint}")
     return frame or "relative"
 

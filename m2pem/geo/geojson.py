@@ -1,7 +1,8 @@
 """Geometries as GeoJSON (RFC 7946): how fleets, editors and operators name places.
 
 Positions are WGS-84 `[longitude, latitude, altitude]`, in degrees and metres. Altitudes are
-relative to home unless a Feature's properties say `"altitude_frame": "amsl"` or `"terrain"`. A
+relative to home unless a Feature's properties say `"altitude_frame": "amsl"`, `"terrain"` or
+`"ellipsoid"`; those above the WGS-84 ellipsoid are read as altitudes above mean sea level. A
 route's property `"speeds_m_s"` has a speed or null for each position (`Route.speeds_m_s`).
 """
 
@@ -12,12 +13,15 @@ from dataclasses import replace
 from typing import Any
 
 from m2pem.errors import M2pemError
+from m2pem.geo.geoid import mean_sea_level_m
 from m2pem.geo.polygon import ring_problem
 from m2pem.mission.geometry import Area, Coordinate, Geometry, Point, Route
 from m2pem.suggestions import suggest
 from m2pem.units import article
 
 ALTITUDE_FRAMES = ("relative", "amsl", "terrain")
+FILE_FRAMES = (*ALTITUDE_FRAMES, "ellipsoid")
+"""What a file may say; `above_sea_level` makes the last of it "amsl"."""
 
 SPEEDS = "speeds_m_s"
 FRAMES = "altitude_frames"
@@ -43,7 +47,35 @@ def parse_geojson(value: Mapping[str, Any]) -> Point | Route | Area:
     Raises:
         GeometryError: not GeoJSON, another type, a position out of range, a ring not closed.
     """
-    return _parse(value, "relative", depth=0)
+    return above_sea_level(_parse(value, "relative", depth=0))
+
+
+def above_sea_level(geometry: Point | Route | Area) -> Point | Route | Area:
+    """Return a geometry whose altitudes count from the ellipsoid with those above mean sea level;
+    any other one as it is."""
+    frames = geometry.frames if isinstance(geometry, Route) else (geometry.altitude_frame,)
+    if "ellipsoid" not in frames:
+        return geometry
+    match geometry:
+        case Point(position):
+            return replace(geometry, position=_lowered(position), altitude_frame="amsl")
+        case Route(waypoints):
+            places = [
+                _lowered(each) if frame == "ellipsoid" else each
+                for each, frame in zip(waypoints, frames, strict=True)
+            ]
+            named = ["amsl" if each == "ellipsoid" else each for each in frames]
+            return Route.of(places, named, geometry.speeds_m_s)
+        case Area(rings):
+            lowered = tuple(tuple(map(_lowered, ring)) for ring in rings)
+            return replace(geometry, rings=lowered, altitude_frame="amsl")
+
+
+def _lowered(place: Coordinate) -> Coordinate:
+    latitude_deg, longitude_deg, height_m = place
+    if height_m is None:
+        return place
+    return latitude_deg, longitude_deg, mean_sea_level_m(latitude_deg, longitude_deg, height_m)
 
 
 def as_geojson(geometry: Point | Route | Area) -> dict[str, Any]:
@@ -183,8 +215,8 @@ def checked_frame(frame: object) -> str:
     Raises:
         GeometryError: there is none of that name.
     """
-    if frame not in ALTITUDE_FRAMES:
-        hint = suggest(str(frame), ALTITUDE_FRAMES, "frames")
+    if frame not in FILE_FRAMES:
+        hint = suggest(str(frame), FILE_FRAMES, "frames")
         raise GeometryError(f"altitude_frame {frame!r} is not known; {hint}")
     return str(frame)
 

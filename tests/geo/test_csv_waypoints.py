@@ -5,6 +5,14 @@ from m2pem.geo.geojson import GeometryError
 from m2pem.mission.geometry import Area, Point, Route
 
 
+def test_heights_above_the_ellipsoid_are_read_as_altitudes_above_mean_sea_level() -> None:
+    text = "lat_deg,lon_deg,alt_m,altitude_frame\n38.1075,-77.3192,60,ellipsoid\n"
+    point = parse_csv(text, "point")
+    assert isinstance(point, Point)
+    assert point.altitude_frame == "amsl"
+    assert point.position[2] == pytest.approx(93.97, abs=0.01)
+
+
 def test_the_rows_of_a_route_are_its_waypoints_in_order() -> None:
     text = "lat_deg,lon_deg,alt_m\n38.1,-77.3,2\n38.2,-77.4,3.5\n"
     assert parse_csv(text, "route") == Route(((38.1, -77.3, 2.0), (38.2, -77.4, 3.5)))
@@ -80,9 +88,9 @@ def test_the_ring_of_an_area_is_closed(last: str) -> None:
         ("lat_deg,lon_deg\nnan,2\n", "route", "line 2: latitude nan is not finite"),
         ('lat_deg,lon_deg\n"1,2\n', "route", "line 2: is not CSV"),
         (
-            "lat_deg,lon_deg,altitude_frame\n1,2,ellipsoid\n",
+            "lat_deg,lon_deg,altitude_frame\n1,2,ellipse\n",
             "route",
-            "line 2: altitude_frame 'ellipsoid' is not known; known frames: relative, amsl",
+            "line 2: altitude_frame 'ellipse' is not known; did you mean 'ellipsoid'",
         ),
         (
             "lat_deg,lon_deg,altitude_frame\n1,2,amsl\n1,2,terrain\n",

@@ -30,6 +30,23 @@ def test_a_polygon_is_an_area_with_its_holes() -> None:
     assert area.rings[0][1] == (0.0, 1.0, None)
 
 
+def test_heights_above_the_ellipsoid_are_read_as_altitudes_above_mean_sea_level() -> None:
+    # Mean sea level is 33.97 m below the ellipsoid in Virginia, 17.16 m above it at 0, 0.
+    def read(kind: str, coordinates: object) -> Any:
+        properties = {"altitude_frame": "ellipsoid"}
+        geometry = {"type": kind, "coordinates": coordinates}
+        return parse_geojson({"type": "Feature", "properties": properties, "geometry": geometry})
+
+    point = read("Point", [-77.3192, 38.1075, 60])
+    assert point == Point((38.1075, -77.3192, pytest.approx(93.97, abs=0.01)), "amsl")
+    route = read("LineString", [[-77.3192, 38.1075, 60], [0, 0, 20], [1, 1]])
+    heights = [each[2] for each in route.waypoints]
+    assert heights == [pytest.approx(93.97, abs=0.01), pytest.approx(2.84, abs=0.01), None]
+    area = read("Polygon", [[[*corner, 20] for corner in SQUARE]])
+    assert area.rings[0][0][2] == pytest.approx(2.84, abs=0.01)
+    assert {point.altitude_frame, route.altitude_frame, area.altitude_frame} == {"amsl"}
+
+
 def test_the_altitude_frame_is_a_property_of_the_feature() -> None:
     feature = {
         "type": "Feature",

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 from m2pem.findings import Severity
-from m2pem.geo.geojson import GeometryError, kind_of
+from m2pem.geo.geojson import GeometryError, above_sea_level, kind_of
 from m2pem.mission.geometry import Area, Point, Route
 
 MAX_FEATURES = 1_000
@@ -86,7 +86,8 @@ class Contents:
             self.note(FileProblem(Severity.ERROR, name, str(error), remedy, kind))
 
     def add(self, name: str, geometry: Point | Route | Area) -> None:
-        """Add a geometry under a valid and unique form of its name.
+        """Add a geometry under a valid and unique form of its name, with altitudes above mean sea
+        level in place of those above the ellipsoid.
 
         Raises:
             GeometryError: the file has too many features or positions.
@@ -98,7 +99,9 @@ class Contents:
         count = _count(geometry)
         self.expect(count)
         self._positions += count
-        self._geometries.append(NamedGeometry(self._unique(name, geometry), geometry))
+        self._geometries.append(
+            NamedGeometry(self._unique(name, geometry), above_sea_level(geometry))
+        )
 
     def expect(self, positions: int) -> None:
         """Refuse that many positions more before the work of reading them.

@@ -19,7 +19,7 @@ from m2pem.geo.csv_waypoints import (
 )
 from m2pem.geo.file_text import decoded
 from m2pem.geo.geojson import (
-    ALTITUDE_FRAMES,
+    FILE_FRAMES,
     GeometryError,
     checked,
     kind_of,
@@ -88,7 +88,7 @@ _SPEEDS = {
 _DEGREES = dict.fromkeys(("deg", "degree", "degrees", "°", "decimal_degrees", "dd", "wgs84"), 1.0)
 _UNITS = {"lat": _DEGREES, "lon": _DEGREES, "alt": _LENGTHS, _SPEED: _SPEEDS}
 _BRACKETS = re.compile(r"([^\[(]+)[\[(]([^\])]*)[\])]")
-_FRAMES = f"in a column altitude_frame one of {', '.join(ALTITUDE_FRAMES)}; or leave it out"
+_FRAMES = f"in a column altitude_frame one of {', '.join(FILE_FRAMES)}; or leave it out"
 _OF_FLIGHT = {
     re.compile(r"(?!wind)(.*_)?(speed|velocity|ground_?speed|air_?speed)"): (
         "write speed_m_s or speed_km_h; or leave it out"

@@ -7,7 +7,7 @@ from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 from m2pem.geo.file_text import decoded, parsed_json
-from m2pem.geo.geojson import GeometryError, as_geojson, check_crs, is_wgs84, parse_geojson
+from m2pem.geo.geojson import FRAMES, GeometryError, as_geojson, check_crs, is_wgs84, parse_geojson
 from m2pem.geo.geometry_files.contents import MAX_POSITIONS, Contents, NamedGeometry
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ def read_feature(
         parts = _parts(geometry)
         if system is not None:
             given = properties if isinstance(properties, Mapping) else {}
-            frame = str(given.get("altitude_frame") or "")
+            frame = str(given.get("altitude_frame") or given.get(FRAMES) or "")
             parts = [
                 {**each, "coordinates": _in_wgs84(each.get("coordinates"), system, frame)}
                 if isinstance(each, Mapping)

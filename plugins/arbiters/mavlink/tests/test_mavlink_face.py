@@ -44,6 +44,9 @@ def test_every_vehicle_is_a_system_with_its_own_position(tmp_path: Path) -> None
                 assert distance_m((position.lat / 1e7, position.lon / 1e7), place) < 0.1
             for name in ("ATTITUDE", "VFR_HUD", "SYS_STATUS", "GPS_RAW_INT", "EXTENDED_SYS_STATE"):
                 await station.hears(name, lambda each: each.get_srcSystem() == UAV1)
+            fix = await station.hears("GPS_RAW_INT", lambda each: each.get_srcSystem() == UAV1)
+            # Mean sea level is 33.97 m below the ellipsoid there.
+            assert abs(fix.alt_ellipsoid - fix.alt + 33_970) < 20
             home = await station.hears("HOME_POSITION", lambda each: each.get_srcSystem() == ROVER1)
             assert distance_m((home.latitude / 1e7, home.longitude / 1e7), HOME) < 0.1
 

@@ -5,6 +5,8 @@ from m2pem_plugin_mavlink.simulator.specification import Kind
 from mavlink_bench import Bench
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from m2pem.api import undulation_m
+
 
 def test_a_long_text_comes_in_chunks() -> None:
     bench = Bench()
@@ -39,6 +41,10 @@ def test_positions_agree_in_all_messages() -> None:
     assert (local.x, local.y, local.z) == pytest.approx((30, 40, -20), abs=0.3)
     assert place.relative_alt == pytest.approx(20_000, abs=300)
     assert hud.alt == pytest.approx(508, abs=0.3)
+    fix = bench.report(24)
+    assert fix.alt == pytest.approx(508_000, abs=300)
+    undulation_mm = undulation_m(*expected) * 1e3
+    assert fix.alt_ellipsoid - fix.alt == pytest.approx(undulation_mm, abs=2)
     assert place.hdg / 100 == pytest.approx(math.degrees(bench.report(30).yaw) % 360, abs=0.1)
     q = bench.report(31)
     yaw = math.atan2(2 * (q.q1 * q.q4 + q.q2 * q.q3), 1 - 2 * (q.q3**2 + q.q4**2))

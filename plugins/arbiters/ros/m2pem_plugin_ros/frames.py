@@ -1,16 +1,16 @@
 """Conversions between WGS-84 and the fleet's local frame: ENU (REP-103) at the fleet's origin,
-`map` in ROS.
-
-Here and elsewhere, m2pem takes heights above mean sea level for heights above the ellipsoid.
+`map` in ROS. Altitudes are above mean sea level; messages whose definition has heights above the
+ellipsoid (NavSatFix, geographic_msgs) are converted where they come in and go out.
 """
 
 import math
+from functools import lru_cache
 from typing import NamedTuple, Protocol
 
-from m2pem.api import GeoPosition, LocalFrame
+from m2pem.api import GeoPosition, LocalFrame, ellipsoidal_m, mean_sea_level_m
 
 Origin = tuple[float, float, float]
-"""Latitude and longitude in degrees, altitude in metres."""
+"""Latitude and longitude in degrees, altitude in metres above mean sea level."""
 
 
 class Quaternion(NamedTuple):
@@ -37,14 +37,21 @@ class AnyQuaternion(Protocol):
 
 def to_local(position: GeoPosition, origin: Origin) -> tuple[float, float, float]:
     """Return a position as metres east, north and up of the origin."""
-    return LocalFrame(origin).to_enu(
-        position.latitude_deg, position.longitude_deg, position.altitude_m
-    )
+    height_m = ellipsoidal_m(*position.latlon, position.altitude_m)
+    return _frame(origin).to_enu(*position.latlon, height_m)
 
 
 def to_geodetic(east_m: float, north_m: float, up_m: float, origin: Origin) -> GeoPosition:
     """Return the position at metres east, north and up of the origin."""
-    return GeoPosition(*LocalFrame(origin).from_enu(east_m, north_m, up_m))
+    latitude_deg, longitude_deg, height_m = _frame(origin).from_enu(east_m, north_m, up_m)
+    altitude_m = mean_sea_level_m(latitude_deg, longitude_deg, height_m)
+    return GeoPosition(latitude_deg, longitude_deg, altitude_m)
+
+
+@lru_cache(maxsize=16)
+def _frame(origin: Origin) -> LocalFrame:
+    """Return the frame at the origin's height above the ellipsoid, as `earth` in tf has it."""
+    return LocalFrame((*origin[:2], ellipsoidal_m(*origin)))
 
 
 def yaw_of_quaternion(q: AnyQuaternion) -> float:

@@ -107,6 +107,14 @@ class OdomFrame(StrEnum):
     TF = "tf"
 
 
+class FixAltitude(StrEnum):
+    """What the altitude of a vehicle's NavSatFix counts from: the WGS-84 ellipsoid, by the
+    message's definition, or mean sea level, as receivers have it and some drivers publish it."""
+
+    ELLIPSOID = "ellipsoid"
+    MEAN_SEA_LEVEL = "mean_sea_level"
+
+
 class DetectorMessage(StrEnum):
     """The type of a detector's messages: m2pem_interfaces/msg/Detection, or std_msgs/msg/String."""
 
@@ -161,6 +169,7 @@ class Settings:
     route_action: RouteAction = RouteAction.THROUGH
     own_behaviors: tuple[BehaviorSpec, ...] = ()
     base_frame: str = ""
+    fix_altitude: FixAltitude = FixAltitude.ELLIPSOID
 
     def topic(self, name: str) -> str:
         """Return the full name of a topic, action or service of the vehicle."""
@@ -285,6 +294,7 @@ def _read_vehicle(connection: Connection) -> Settings:
         reader.choice("route_action", RouteAction, RouteAction.THROUGH),
         read_declared_behaviors(resource, connection.settings.get("own_behaviors")),
         _base_frame(reader),
+        reader.choice("fix_altitude", FixAltitude, FixAltitude.ELLIPSOID),
     )
 
 

@@ -4,6 +4,7 @@ import asyncio
 from typing import Any
 
 import pytest
+from geographic_msgs.msg import GeoPoint, GeoPointStamped
 from geometry_msgs.msg import PointStamped
 from m2pem_plugin_ros.installation import RosError
 from nav_msgs.msg import Odometry
@@ -16,6 +17,7 @@ from std_msgs.msg import Float32, String
 
 from m2pem.api import Detection, PayloadState
 
+TAGGED = {"latitude": 38.1075, "longitude": -77.3192, "altitude": 5.0}
 BEST_EFFORT = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
@@ -57,12 +59,26 @@ async def test_a_number_above_a_bound_is_a_detection_where_the_vehicle_is(ros_do
         assert {each.type for each in found(bench)} == {"smoke 0.75"}
 
 
-async def test_a_place_in_the_message_is_that_of_the_detection(ros_domain: int) -> None:
-    tag = {"topic": "/tag", "message": "sensor_msgs/NavSatFix", "type": "tag", "position": "."}
+@pytest.mark.parametrize(
+    ("type_", "path", "message"),
+    [
+        ("sensor_msgs/NavSatFix", ".", NavSatFix(**TAGGED)),
+        (
+            "geographic_msgs/GeoPointStamped",
+            "position",
+            GeoPointStamped(position=GeoPoint(**TAGGED)),
+        ),
+    ],
+)
+async def test_a_place_in_the_message_is_that_of_the_detection(
+    ros_domain: int, type_: str, path: str, message: Any
+) -> None:
+    tag = {"topic": "/tag", "message": type_, "type": "tag", "position": path}
     async with connected(ros_domain, {GPR: tag}) as bench, Client(ros_domain) as client:
-        message = NavSatFix(latitude=38.2, longitude=-77.4, altitude=5.0)
         seen = (await publish(client, bench, "/tag", message)).position
-    assert (seen.latitude_deg, seen.longitude_deg, seen.altitude_m) == (38.2, -77.4, 5.0)
+    assert (seen.latitude_deg, seen.longitude_deg) == (38.1075, -77.3192)
+    # 5 m above the ellipsoid, which is 33.97 m above mean sea level there.
+    assert seen.altitude_m == pytest.approx(38.97, abs=0.01)
 
 
 async def test_a_point_in_the_message_is_in_the_frame_of_its_header(ros_domain: int) -> None:

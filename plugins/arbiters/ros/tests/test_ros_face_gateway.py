@@ -35,6 +35,19 @@ vehicles:
     sitl: true
     connection: {{driver: base, namespace: /robots/two, bounds: {{speed: 2 m/s}}, sim: {{home: [38.1077, -77.3192]}}}}
 """  # noqa: E501
+ONE_PLACE = """
+version: 1
+origin: {{lat: 38.1075, lon: -77.3192, alt: 60.0}}
+faces:
+  ros: {{}}
+vehicles:
+  copter: {{domain: air, arbiter: mavlink, sitl: true, connection: {{url: "udpin://127.0.0.1:{port}", system_id: 1}}}}
+  rover:
+    domain: ground
+    arbiter: ros
+    sitl: true
+    connection: {{driver: base, namespace: /robots/one, odom_frame: odom, sim: {{home: [38.1075, -77.3192]}}}}
+"""  # noqa: E501
 
 
 @pytest.fixture
@@ -55,6 +68,28 @@ def gateway(m2pem: Programs, tmp_path: Path, port: int, speed: int) -> Any:
     served = m2pem.m2pem("gateway", "--fleet", fleet, "--speed", speed)
     served.until_line("faces: ros")
     return served
+
+
+async def test_a_rover_and_a_copter_at_one_place_are_shown_at_one_height(
+    m2pem: Programs, ros_domain: int, tmp_path: Path, port: int
+) -> None:
+    """The rover's only altitude is that of its NavSatFix, the copter's that of MAVLink."""
+    fleet = tmp_path / "fleet.yaml"
+    fleet.write_text(ONE_PLACE.format(port=port))
+    home, to = "38.1075,-77.3192,60", f"udp://127.0.0.1:{port}"
+    m2pem.simulate(fleet, 1)
+    m2pem.m2pem("sim", "mavlink", "--copters", 1, "--home", home, "--to", to, "--ekf", "1s")
+    m2pem.m2pem("gateway", "--fleet", fleet).until_line("faces: ros")
+    async with Client(ros_domain) as client:
+        for vehicle in ("copter", "rover"):
+            fix = await client.hears(
+                f"/{vehicle}/fix", NavSatFix, qos_profile_sensor_data,
+                wanted=lambda each: each.status.status == NavSatStatus.STATUS_FIX,
+            )  # fmt: skip
+            # 60 m above mean sea level, which is 33.97 m below the ellipsoid there.
+            assert fix.altitude == pytest.approx(26.03, abs=0.2)
+            odom = await client.hears(f"/{vehicle}/odom", Odometry, qos_profile_sensor_data)
+            assert odom.pose.pose.position.z == pytest.approx(0.0, abs=0.2)
 
 
 @pytest.mark.long

@@ -24,7 +24,16 @@ from sensor_msgs.msg import BatteryState, Imu, JointState, NavSatFix, NavSatStat
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
-from m2pem.api import Area, GeoPosition, LinkState, PayloadState, ResourceId, Route, VehicleState
+from m2pem.api import (
+    Area,
+    GeoPosition,
+    LinkState,
+    PayloadState,
+    ResourceId,
+    Route,
+    VehicleState,
+    ellipsoidal_m,
+)
 from m2pem.testing import scenarios
 
 UGV1, CAMERA = ResourceId("ugv1"), ResourceId("ugv2/camera")
@@ -151,9 +160,9 @@ async def test_odometry_has_the_place_in_the_fleets_frame_and_the_twist_in_the_v
     async with faced(ros_domain) as world:
         odom = await hears(world, STATE, "/ugv1/odom", Odometry, of_state)
     assert (odom.header.frame_id, odom.child_frame_id) == ("ugv1/odom", "ugv1/base_link")
-    expected = pymap3d.geodetic2enu(
-        PLACE.latitude_deg, PLACE.longitude_deg, PLACE.altitude_m, *scenarios.ORIGIN
-    )
+    height_m = ellipsoidal_m(*PLACE.latlon, PLACE.altitude_m)
+    origin = LATITUDE, LONGITUDE, ellipsoidal_m(*scenarios.ORIGIN)
+    expected = pymap3d.geodetic2enu(*PLACE.latlon, height_m, *origin)
     assert vector(odom.pose.pose.position) == pytest.approx(expected, abs=1e-3)
     # Turned back into ENU, the twist is the velocity of the vehicle.
     turned = rotation(odom.pose.pose.orientation) @ vector(odom.twist.twist.linear)
@@ -187,7 +196,8 @@ async def test_the_other_topics_say_what_is_known_and_what_is_not(ros_domain: in
             lambda each: list(each.position) == [-0.5, 0.25],
         )
     assert (fix.latitude, fix.longitude) == PLACE.latlon
-    assert fix.altitude == PLACE.altitude_m
+    # Mean sea level is 34.0 m below the ellipsoid there.
+    assert fix.altitude == pytest.approx(PLACE.altitude_m - 33.98, abs=0.05)
     assert fix.header.frame_id == "ugv1/base_link"
     assert battery.percentage == pytest.approx(0.75)
     assert battery.present
@@ -252,7 +262,9 @@ async def test_the_origin_of_the_fleet_is_latched(ros_domain: int) -> None:
     async with faced(ros_domain) as world:
         origin = await world.client.hears("/face/origin", GeoPointStamped, LATCHED)
     position = origin.position
-    assert (position.latitude, position.longitude, position.altitude) == scenarios.ORIGIN
+    # 60 m above mean sea level, which is 33.97 m below the ellipsoid there.
+    expected = (LATITUDE, LONGITUDE, pytest.approx(26.03, abs=0.01))
+    assert (position.latitude, position.longitude, position.altitude) == expected
     assert origin.header.frame_id == "map"
 
 

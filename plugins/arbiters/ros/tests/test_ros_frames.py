@@ -23,8 +23,9 @@ def test_a_place_comes_back_from_the_earth(east, north, up, latitude, longitude)
 def test_a_degree_is_as_long_as_on_the_ellipsoid() -> None:
     """WGS-84's semi-axes are 6378137 m and 6356752.314245 m; at the equator a degree of longitude
     is a pi/180 and one of latitude b²/a pi/180."""
-    east, _, _ = to_local(GeoPosition(0.0, 0.001, 0.0), (0.0, 0.0, 0.0))
-    _, north, _ = to_local(GeoPosition(0.001, 0.0, 0.0), (0.0, 0.0, 0.0))
+    # The ellipsoid is 17.16 m below mean sea level there.
+    east, _, _ = to_local(GeoPosition(0.0, 0.001, -17.16), (0.0, 0.0, -17.16))
+    _, north, _ = to_local(GeoPosition(0.001, 0.0, -17.16), (0.0, 0.0, -17.16))
     assert east == pytest.approx(6378137.0 * math.radians(0.001), rel=1e-6)
     assert north == pytest.approx(6356752.314245**2 / 6378137.0 * math.radians(0.001), rel=1e-6)
 

@@ -9,7 +9,7 @@ from m2pem_plugin_ros.log_throttle import LogThrottle
 from m2pem_plugin_ros.pose import Pose, Twist
 from m2pem_plugin_ros.runtime import RosRuntime
 from m2pem_plugin_ros.sensors.localization import TopicLocalization
-from m2pem_plugin_ros.settings import OdomFrame, Settings
+from m2pem_plugin_ros.settings import FixAltitude, OdomFrame, Settings
 from m2pem_plugin_ros.testing import Peer, reserved_domain
 from ros_double import ORIGIN
 from ros_sensors import PEER, TOPICS, Sensors, V, fix, odometry, until
@@ -38,8 +38,12 @@ def teller(ros: RosRuntime) -> Sensors:
     return Sensors(ros)
 
 
-def localization(ros: RosRuntime, frame: OdomFrame = OdomFrame.MAP) -> TopicLocalization:
-    settings = Settings("/evsg1", odom_frame=frame)
+def localization(
+    ros: RosRuntime,
+    frame: OdomFrame = OdomFrame.MAP,
+    fix_altitude: FixAltitude = FixAltitude.ELLIPSOID,
+) -> TopicLocalization:
+    settings = Settings("/evsg1", odom_frame=frame, fix_altitude=fix_altitude)
     return TopicLocalization(ros, V, settings, context(SystemClock()))
 
 
@@ -110,6 +114,20 @@ async def test_odometry_that_repeats_a_stamp_is_not_news(ros: RosRuntime, teller
     assert where.pose.east_m == 1.0
     await teller.say(odometry(2.0, 2.0, stamp=3))
     await until(lambda: where.pose.east_m == 2.0, "a robot that was restarted is believed")
+
+
+@pytest.mark.parametrize(
+    ("counts_from", "altitude_m"),
+    # Mean sea level is 33.97 m below the ellipsoid in Virginia.
+    [(FixAltitude.ELLIPSOID, 93.97), (FixAltitude.MEAN_SEA_LEVEL, 60.0)],
+)
+async def test_the_altitude_of_a_fix_counts_from_what_the_vehicle_says(
+    ros: RosRuntime, teller: Sensors, counts_from: FixAltitude, altitude_m: float
+) -> None:
+    where = localization(ros, OdomFrame.ODOM, counts_from)
+    await teller.say(fix(38.1075, -77.3192, altitude=60.0))
+    await until(lambda: where.position, "the fix is heard")
+    assert where.position.altitude_m == pytest.approx(altitude_m, abs=0.01)
 
 
 async def test_odometry_that_begins_anywhere_needs_a_fix(ros: RosRuntime, teller: Sensors) -> None:

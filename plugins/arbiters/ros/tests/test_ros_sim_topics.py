@@ -15,7 +15,7 @@ from ros_sim_watch import COMMAND, Heard, Joystick, until
 from sensor_msgs.msg import BatteryState, NavSatFix, NavSatStatus
 from std_msgs.msg import UInt32
 
-from m2pem.api import GeoPosition
+from m2pem.api import GeoPosition, mean_sea_level_m
 
 ORIGIN = (38.1075, -77.3192, 60.0)
 SETTINGS = [
@@ -80,7 +80,10 @@ async def test_satellites_agree_with_odometry(ros: RosRuntime) -> None:
     fix = await Heard(ros, NavSatFix, "/usv1/fix").next()
     assert fix.status.status == NavSatStatus.STATUS_FIX
     assert fix.position_covariance_type == NavSatFix.COVARIANCE_TYPE_APPROXIMATED
-    place = to_local(GeoPosition(fix.latitude, fix.longitude, fix.altitude), ORIGIN)
+    # 60 m above mean sea level, which is 33.97 m below the ellipsoid there.
+    assert fix.altitude == pytest.approx(26.03, abs=0.01)
+    altitude_m = mean_sea_level_m(fix.latitude, fix.longitude, fix.altitude)
+    place = to_local(GeoPosition(fix.latitude, fix.longitude, altitude_m), ORIGIN)
     assert place == pytest.approx((10, 0, 0), abs=1e-3)
 
 

@@ -1,7 +1,7 @@
 """Events of Cursor on Target (version 2.0) that the face sends.
 
-Positions are WGS-84. `hae` is a height above the ellipsoid; m2pem knows altitudes above mean sea
-level alone, which differ from it by up to 107 m: `le`, the error of `hae`, says so.
+Positions are WGS-84, and `hae` is the height above the ellipsoid, of altitudes above mean sea level
+by the geoid. Altitudes above home or ground have none.
 """
 
 import math
@@ -10,11 +10,18 @@ from datetime import UTC, datetime
 
 from lxml import etree
 
-from m2pem.api import US_PER_S, Area, Detection, GeoPosition, Point, Route, VehicleState
+from m2pem.api import (
+    US_PER_S,
+    Area,
+    Detection,
+    Point,
+    Route,
+    VehicleState,
+    ellipsoidal_m,
+)
 
 UNKNOWN = "9999999.0"
 """Of `hae`, `ce` and `le`: not known."""
-GEOID_ERROR_M = "110.0"
 TYPES = {"air": "a-f-A-M-H-Q", "ground": "a-f-G-E-V", "surface": "a-f-S-C-U", "subsurface": "a-f-U"}
 """By the domain of a vehicle, friendly: an unmanned rotary-wing aircraft, a ground vehicle, an
 unmanned surface vehicle, something under water."""
@@ -26,6 +33,7 @@ MACHINE, ENTERED = "m-g", "h-e"
 """How: by a machine with GPS; entered by a human."""
 
 Coordinate = tuple[float, float, float | None]
+"""Latitude, longitude and `hae`."""
 
 
 def vehicle_event(
@@ -34,7 +42,8 @@ def vehicle_event(
     """Return the event of a vehicle; None while its position is not known."""
     if state.position is None:
         return None
-    event, detail = _event(uid, type_, MACHINE, state.time_us, stale_s, state.position)
+    at = _placed(*state.position.latlon, state.position.altitude_m)
+    event, detail = _event(uid, type_, MACHINE, state.time_us, stale_s, at)
     _add(detail, "contact", callsign=str(state.resource))
     track = {}
     if state.velocity_enu_m_s is not None:
@@ -53,7 +62,8 @@ def vehicle_event(
 
 def detection_event(uid: str, found: Detection, stale_s: float) -> bytes:
     """Return the event of something that a payload has detected."""
-    event, detail = _event(uid, SPOT, MACHINE, found.time_us, stale_s, found.position)
+    at = _placed(*found.position.latlon, found.position.altitude_m)
+    event, detail = _event(uid, SPOT, MACHINE, found.time_us, stale_s, at)
     _add(detail, "contact", callsign=_printable(found.type))
     _add(detail, "remarks").text = _printable(f"{found.type}, detected by {found.source}")
     return etree.tostring(event)
@@ -64,10 +74,13 @@ def geometry_event(
 ) -> bytes:
     """Return the event of a point, a route or an area (its outer ring) of the fleet."""
     match geometry:
-        case Point(position):
-            return _shape(uid, SPOT, name, (position,), position, now_us, stale_s)
+        case Point(position, frame):
+            at = _placed(*position, frame)
+            return _shape(uid, SPOT, name, (at,), at, now_us, stale_s)
         case Route(waypoints):
-            return _shape(uid, ROUTE, name, waypoints, waypoints[0], now_us, stale_s)
+            places = zip(waypoints, geometry.frames, strict=True)
+            corners = [_placed(*each, frame) for each, frame in places]
+            return _shape(uid, ROUTE, name, corners, corners[0], now_us, stale_s)
         case Area(rings):
             return _shape(uid, SHAPE, name, rings[0], _middle(rings[0]), now_us, stale_s)
 
@@ -91,11 +104,12 @@ def _shape(
     stale_s: float,
 ) -> bytes:
     event, detail = _event(uid, type_, ENTERED, now_us, stale_s, at)
-    for number, (lat, lon, *_) in enumerate(corners if len(corners) > 1 else ()):
+    for number, (lat, lon, hae_m) in enumerate(corners if len(corners) > 1 else ()):
         place = f"{lat:.7f},{lon:.7f}"
         if type_ == ROUTE:
+            place += "" if hae_m is None else f",{hae_m:.1f}"
             link = {"uid": f"{uid}.{number}", "type": WAYPOINT, "relation": "c"}
-            _add(detail, "link", **link, point=f"{place},0.0", callsign=f"{name} {number + 1}")
+            _add(detail, "link", **link, point=place, callsign=f"{name} {number + 1}")
         else:
             _add(detail, "link", point=place)
     if type_ == ROUTE:
@@ -111,6 +125,10 @@ def _shape(
     return etree.tostring(event)
 
 
+def _placed(lat: float, lon: float, up_m: float | None, frame: str = "amsl") -> Coordinate:
+    return lat, lon, None if up_m is None or frame != "amsl" else ellipsoidal_m(lat, lon, up_m)
+
+
 def _middle(ring: Sequence[Coordinate]) -> Coordinate:
     corners = ring[:-1] or ring
     lats, lons = [each[0] for each in corners], [each[1] for each in corners]
@@ -123,19 +141,15 @@ def _event(
     how: str,
     time_us: int,
     stale_s: float,
-    at: GeoPosition | Coordinate,
+    at: Coordinate,
 ) -> tuple[etree._Element, etree._Element]:
     event = etree.Element("event", version="2.0", uid=_printable(uid), type=type_, how=how)
     event.set("time", _written(time_us))
     event.set("start", _written(time_us))
     event.set("stale", _written(time_us + round(stale_s * US_PER_S)))
-    if isinstance(at, GeoPosition):
-        lat, lon, altitude_m = at.latitude_deg, at.longitude_deg, at.altitude_m
-        height = {"hae": f"{altitude_m:.1f}", "le": GEOID_ERROR_M}
-    else:
-        lat, lon = at[:2]
-        height = {"hae": UNKNOWN, "le": UNKNOWN}
-    _add(event, "point", lat=f"{lat:.7f}", lon=f"{lon:.7f}", ce=UNKNOWN, **height)
+    lat, lon, hae_m = at
+    hae = f"{hae_m:.1f}" if hae_m is not None and math.isfinite(hae_m) else UNKNOWN
+    _add(event, "point", lat=f"{lat:.7f}", lon=f"{lon:.7f}", hae=hae, ce=UNKNOWN, le=UNKNOWN)
     return event, _add(event, "detail")
 
 

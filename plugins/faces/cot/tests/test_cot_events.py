@@ -42,6 +42,8 @@ def test_a_vehicle_is_where_its_telemetry_says() -> None:
     sent = etree.fromstring(vehicle_event("u1", "a-f-G", STATE, 30.0, "AUTO\x07"))
     point = sent.find("point")
     assert (point.get("lat"), point.get("lon")) == ("38.1075001", "-77.3192002")
+    # 60 m above mean sea level, where that is 34.0 m below the ellipsoid.
+    assert (point.get("hae"), point.get("le")) == ("26.0", "9999999.0")
     assert sent.get("time") == "2026-01-01T00:00:00.123Z"
     assert sent.get("stale") == "2026-01-01T00:00:30.123Z"
     assert dict(sent.find("detail/track").attrib) == {"speed": "5.00", "course": "90.0"}
@@ -60,6 +62,23 @@ def test_a_geometry_that_is_sent_is_read_back(geometry: Point | Route | Area) ->
     received = read_event(geometry_event("u1", "lz", geometry, AT_US, 60.0))
     assert received is not None
     assert (received.name, received.geometry) == ("lz", geometry)
+
+
+@pytest.mark.parametrize(
+    ("frame", "hae", "corner"),
+    [
+        ("amsl", "26.0", "38.1100000,-77.3000000,66.0"),
+        ("relative", "9999999.0", "38.1100000,-77.3000000"),
+        ("terrain", "9999999.0", "38.1100000,-77.3000000"),
+    ],
+)
+def test_a_waypoint_has_a_height_above_the_ellipsoid_if_its_altitude_is_above_sea_level(
+    frame: str, hae: str, corner: str
+) -> None:
+    route = Route(((38.1075, -77.3192, 60.0), (38.11, -77.3, 100.0)), frame)
+    sent = etree.fromstring(geometry_event("u1", "lane", route, AT_US, 60.0))
+    assert sent.find("point").get("hae") == hae
+    assert sent.findall("detail/link")[1].get("point") == corner
 
 
 def test_where_somebody_is_draws_nothing() -> None:

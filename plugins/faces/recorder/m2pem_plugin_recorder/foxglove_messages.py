@@ -1,7 +1,8 @@
 """States of vehicles, alerts and geometries as Foxglove's well-known messages, in protobuf.
 
 Frames: `map` is the local east-north-up frame of the fleet's origin (REP-105), `VEHICLE/base_link`
-that of a vehicle (REP-103: x forward, y left, z up).
+that of a vehicle (REP-103: x forward, y left, z up). The altitude of a LocationFix is above the
+WGS-84 ellipsoid, as that of the NavSatFix that it is modelled on: its schema says "in meters" only.
 """
 
 import math
@@ -24,6 +25,7 @@ from m2pem.api import (
     Route,
     VehicleState,
     as_geojson,
+    ellipsoidal_m,
 )
 from m2pem_plugin_recorder.channels import (
     GEOMETRIES,
@@ -88,7 +90,7 @@ def vehicle_messages(state: VehicleState, frame: LocalFrame) -> Iterator[Channel
         frame_id=base_link(name),
         latitude=place.latitude_deg,
         longitude=place.longitude_deg,
-        altitude=place.altitude_m,
+        altitude=ellipsoidal_m(*place.latlon, place.altitude_m),
     )
     yield ChannelMessage(
         foxglove_channel(f"/{name}/location", fg.LocationFix), us, location.encode()

@@ -1,7 +1,6 @@
 """States of vehicles as messages of ROS 2 (Jazzy), in CDR, with their definitions as `ros2msg`.
 
-Frames as in `foxglove_messages`. Altitudes of NavSatFix are above the WGS-84 ellipsoid; m2pem
-treats them and those above mean sea level as the same.
+Frames as in `foxglove_messages`. Altitudes of NavSatFix are above the WGS-84 ellipsoid.
 """
 
 import math
@@ -12,7 +11,7 @@ from typing import Any
 import numpy as np
 from rosbags.typesys import Stores, get_typestore
 
-from m2pem.api import US_PER_S, LocalFrame, VehicleState
+from m2pem.api import US_PER_S, LocalFrame, VehicleState, ellipsoidal_m
 from m2pem_plugin_recorder.channels import Channel, ChannelMessage, Schema
 from m2pem_plugin_recorder.foxglove_messages import MAP, base_link, finite, rotation
 
@@ -67,7 +66,7 @@ def vehicle_messages(state: VehicleState, frame: LocalFrame) -> Iterator[Channel
             status=_FixStatus(status=_STATUS_FIX, service=_SERVICE_GPS),
             latitude=place.latitude_deg,
             longitude=place.longitude_deg,
-            altitude=place.altitude_m,
+            altitude=ellipsoidal_m(*place.latlon, place.altitude_m),
             position_covariance=_NO_COVARIANCE,
             position_covariance_type=0,
         )

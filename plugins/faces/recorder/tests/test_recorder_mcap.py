@@ -147,6 +147,8 @@ def test_positions_are_the_same_in_all_schemas(tmp_path: Path) -> None:
     assert len(lengths) == 5
     for location, fix in zip(found["/ugv1/location"], found["/ugv1/fix"], strict=True):
         assert (location.latitude, location.longitude) == (fix.latitude, fix.longitude)
+        # On the ground, 60 m above mean sea level, which is 33.97 m below the ellipsoid there.
+        assert location.altitude == fix.altitude == pytest.approx(26.03, abs=0.01)
         assert location.timestamp.seconds == fix.header.stamp.sec
         assert location.frame_id == fix.header.frame_id == "ugv1/base_link"
     nearest = 1e9

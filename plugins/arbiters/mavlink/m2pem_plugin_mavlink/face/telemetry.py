@@ -7,7 +7,7 @@ from typing import TypeAlias
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from m2pem.api import VehicleState
+from m2pem.api import VehicleState, ellipsoidal_m
 from m2pem_plugin_mavlink.face import modes
 from m2pem_plugin_mavlink.face.vehicle import ShownVehicle
 from m2pem_plugin_mavlink.protocol.messages import Message, message_type
@@ -198,6 +198,9 @@ def _gps(vehicle: ShownVehicle) -> Message | None:
         lat=_degrees_e7(state.position.latitude_deg),
         lon=_degrees_e7(state.position.longitude_deg),
         alt=_int32(state.position.altitude_m * 1000),
+        alt_ellipsoid=_int32(
+            ellipsoidal_m(*state.position.latlon, state.position.altitude_m) * 1000
+        ),
         vel=min(round(speed * 100), UINT16_UNKNOWN - 1),
         cog=course,
         **unknown,

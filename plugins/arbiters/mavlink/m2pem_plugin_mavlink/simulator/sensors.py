@@ -5,6 +5,7 @@ from collections.abc import Mapping
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from m2pem.api import ellipsoidal_m
 from m2pem_plugin_mavlink.simulator.interfaces import AutopilotInterface, Component, ReportMaker
 
 LEVELLED = 0.2
@@ -72,6 +73,7 @@ class Estimator(Component):
         autopilot, body = self.autopilot, self.autopilot.body
         fixed = self._waited >= 0.1 and not self.gps_lost
         place = autopilot.frame.to_location(autopilot.position)
+        height_m = ellipsoidal_m(place.latitude_deg, place.longitude_deg, place.altitude_amsl_m)
         return dialect.MAVLink_gps_raw_int_message(
             int(autopilot.since_boot_s * 1e6),
             dialect.GPS_FIX_TYPE_RTK_FIXED if fixed else dialect.GPS_FIX_TYPE_NO_FIX,
@@ -83,6 +85,7 @@ class Estimator(Component):
             round(body.ground_speed_mps * 100),
             round(course_cdeg(body.north_mps, body.east_mps)),
             10 if fixed else 0,
+            alt_ellipsoid=round(height_m * 1e3) if fixed else 0,
         )
 
 

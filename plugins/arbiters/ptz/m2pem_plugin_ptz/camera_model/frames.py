@@ -29,7 +29,8 @@ _EARTH = LocalFrame((0.0, 0.0, -EQUATOR_M))
 
 
 def ecef(position: GeoPosition) -> Vector:
-    """Return a position in ECEF. The altitude counts from the ellipsoid."""
+    """Return a position in ECEF. Its altitude is taken as above the ellipsoid: within the view of a
+    camera, only differences count."""
     y, z, x = _EARTH.to_enu(position.latitude_deg, position.longitude_deg, position.altitude_m)
     return np.array([x, y, z])
 

@@ -28,7 +28,7 @@ from m2pem.api import (
 from m2pem_plugin_ros.face.geometry import Vector
 from m2pem_plugin_ros.face.names import BASE, Names
 from m2pem_plugin_ros.face.telemetry_messages import written
-from m2pem_plugin_ros.frames import Quaternion
+from m2pem_plugin_ros.frames import Quaternion, to_local
 from m2pem_plugin_ros.interfaces.texts import sendable
 from m2pem_plugin_ros.runtime import qos
 
@@ -112,8 +112,9 @@ class MarkersPublisher:
         for corners in self._seen.values():
             if corners:
                 line = self._marker("footprints", Marker.LINE_STRIP, FOOTPRINT_COLOR, LINE_M)
-                places = [(*each.latlon, each.altitude_m) for each in (*corners, corners[0])]
-                line.points = [_point(self._frame.to_enu(*place)) for place in places]
+                line.points = [
+                    _point(to_local(each, self._frame.origin)) for each in (*corners, corners[0])
+                ]
                 markers.append(line)
         return markers
 
@@ -139,7 +140,8 @@ class MarkersPublisher:
             altitude_m = origin_m
         elif altitude_frame != "amsl":
             altitude_m += origin_m
-        return self._frame.to_enu(latitude_deg, longitude_deg, altitude_m)
+        position = GeoPosition(latitude_deg, longitude_deg, altitude_m)
+        return to_local(position, self._frame.origin)
 
     def _marker(self, namespace: str, kind: int, color: Any, size_m: float) -> Any:
         red, green, blue, alpha = color

@@ -15,6 +15,7 @@ from m2pem.api import (
     ResourceId,
     Telemetry,
     VehicleState,
+    ellipsoidal_m,
     shown_geometries,
 )
 from m2pem.errors import M2pemError
@@ -165,9 +166,11 @@ class Serving:
             await asyncio.sleep(WATCH_EVERY_S)
 
     def _origin_message(self) -> Any:
-        latitude, longitude, altitude = self._frame.origin
+        latitude, longitude, _ = origin = self._frame.origin
         message = GeoPointStamped(
-            position=GeoPoint(latitude=latitude, longitude=longitude, altitude=altitude)
+            position=GeoPoint(
+                latitude=latitude, longitude=longitude, altitude=ellipsoidal_m(*origin)
+            )
         )
         message.header.stamp = time_of(self._now_us())
         message.header.frame_id = self._names.map_frame

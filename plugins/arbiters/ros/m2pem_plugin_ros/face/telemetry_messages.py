@@ -11,7 +11,7 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import BatteryState, Imu, JointState, NavSatFix, NavSatStatus
 from std_msgs.msg import Header
 
-from m2pem.api import PayloadState, VehicleState
+from m2pem.api import PayloadState, VehicleState, ellipsoidal_m
 from m2pem_plugin_ros.face.geometry import Vector, quaternion_of, rotated_back
 from m2pem_plugin_ros.frames import Quaternion
 from m2pem_plugin_ros.interfaces.messages import time_of
@@ -70,7 +70,7 @@ def fix(state: VehicleState, frame: str) -> Any:
     message.status.status = NavSatStatus.STATUS_FIX
     message.latitude = state.position.latitude_deg
     message.longitude = state.position.longitude_deg
-    message.altitude = state.position.altitude_m
+    message.altitude = ellipsoidal_m(message.latitude, message.longitude, state.position.altitude_m)
     return message
 
 

@@ -13,6 +13,7 @@ from m2pem_plugin_ros.face import telemetry_messages as messages
 from m2pem_plugin_ros.face.geometry import Vector
 from m2pem_plugin_ros.face.names import BASE, Names
 from m2pem_plugin_ros.face.publisher import TelemetryPublisher
+from m2pem_plugin_ros.frames import to_local
 
 
 class VehicleTopics:
@@ -75,12 +76,9 @@ class VehicleTopics:
 
     def place(self, state: VehicleState) -> Vector | None:
         """Return where the vehicle is in the local frame of the fleet; None: that is not known."""
-        position = state.position
-        if position is None:
+        if state.position is None:
             return None
-        return self._frame.to_enu(
-            position.latitude_deg, position.longitude_deg, position.altitude_m
-        )
+        return to_local(state.position, self._frame.origin)
 
     def transform(self, state: VehicleState) -> Any:
         """Return the transform odom -> base_link; None if the position is not known."""

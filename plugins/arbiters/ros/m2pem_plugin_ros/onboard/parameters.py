@@ -23,6 +23,7 @@ from m2pem_plugin_ros.settings import (
     BOUNDS,
     DOMAINS,
     DriverName,
+    FixAltitude,
     OdomFrame,
     RouteAction,
     Settings,
@@ -91,8 +92,8 @@ def _parameters(
     yield _Parameter(
         "origin",
         list(origin),
-        "Origin of the frame map: latitude and longitude in degrees, altitude in m. That of the "
-        "fleet.",
+        "Origin of the frame map: latitude and longitude in degrees, altitude in m above "
+        "mean sea level. That of the fleet.",
     )
     yield _Parameter("domain", domain, "Domain of the vehicle.", DOMAINS)
     drivers = (DriverName.BASE.value, DriverName.NAV2.value)
@@ -107,6 +108,12 @@ def _parameters(
     )
     yield _Parameter(
         "base_frame", settings.base_frame, "Frame of the vehicle; empty: that of its odometry."
+    )
+    yield _Parameter(
+        "fix_altitude",
+        settings.fix_altitude.value,
+        "What the altitude of satellite fixes counts from.",
+        tuple(each.value for each in FixAltitude),
     )
     yield _Parameter(
         "route_action",

@@ -12,6 +12,7 @@ from m2pem.api import (
     GeoPosition,
     PayloadState,
     ResourceId,
+    mean_sea_level_m,
 )
 from m2pem_plugin_ros.frames import to_geodetic
 from m2pem_plugin_ros.log_throttle import LogThrottle
@@ -30,6 +31,10 @@ WAITING = 100
 
 LATE_S = 60.0
 """A stamp that is older than this, or in the future, comes from another clock."""
+
+_ELLIPSOIDAL = ("geographic_msgs.", "sensor_msgs.")
+"""Packages whose places (GeoPoint, NavSatFix) have altitudes above the WGS-84 ellipsoid; other
+interfaces have no rule, and m2pem's own count from mean sea level."""
 
 _GEOGRAPHIC = 1
 _LOCAL = 2
@@ -116,6 +121,8 @@ class DetectorTopic:
         position = None
         if hasattr(place, "latitude"):
             altitude_m = float(getattr(place, "altitude", math.nan))
+            if type(place).__module__.startswith(_ELLIPSOIDAL):
+                altitude_m = mean_sea_level_m(place.latitude, place.longitude, altitude_m)
             position = self._geographic(place.latitude, place.longitude, altitude_m)
         elif place is not None:
             numbers = (place.x, place.y, place.z)

@@ -4,13 +4,13 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Protocol
 
-from m2pem.api import ArbiterContext, Clock, GeoPosition, ResourceId
+from m2pem.api import ArbiterContext, Clock, GeoPosition, ResourceId, mean_sea_level_m
 from m2pem_plugin_ros.frames import Origin, to_geodetic, to_local, yaw_of_quaternion
 from m2pem_plugin_ros.log_throttle import LogThrottle
 from m2pem_plugin_ros.pose import Pose, Twist
 from m2pem_plugin_ros.sensors.tf_buffer import Transform, TransformError, transform_of
 from m2pem_plugin_ros.sensors.tf_topics import MAP, TfTopics
-from m2pem_plugin_ros.settings import OdomFrame, Settings
+from m2pem_plugin_ros.settings import FixAltitude, OdomFrame, Settings
 
 if TYPE_CHECKING:
     from m2pem_plugin_ros.runtime import RosRuntime
@@ -80,6 +80,7 @@ class TopicLocalization:
         self.log_throttle = LogThrottle(context.logger, resource)
         self._clock = context.clock
         self._frame = settings.odom_frame
+        self._fix_altitude = settings.fix_altitude
         self._where = PoseEstimator(settings.odom_frame, context.origin)
         self._resource = resource
         self._odom = settings.topic(topics.odom)
@@ -257,6 +258,8 @@ class TopicLocalization:
             self.log_throttle.log("an invalid satellite fix", f"({latitude:g}, {longitude:g})")
             return
         altitude = message.altitude if _within(FARTHEST_M, message.altitude) else math.nan
+        if self._fix_altitude is FixAltitude.ELLIPSOID:
+            altitude = mean_sea_level_m(latitude, longitude, altitude)
         self._fixed_us = self._clock.now_us()
         self._changes += 1
         self._where.fix(GeoPosition(latitude, longitude, altitude))
@@ -303,7 +306,7 @@ class PoseEstimator:
         self._odometry = pose
 
     def fix(self, position: GeoPosition) -> None:
-        """Process a satellite fix. Its altitude may be NaN."""
+        """Process a satellite fix. Its altitude is above mean sea level, and may be NaN."""
         self._fix = position
         if self._frame is OdomFrame.ODOM and self._odometry is not None:
             self._drop_anchor(self._odometry, position)

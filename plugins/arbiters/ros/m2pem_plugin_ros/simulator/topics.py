@@ -11,12 +11,13 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import BatteryState, NavSatFix, NavSatStatus
 from std_msgs.msg import String, UInt32
 
+from m2pem.api import ellipsoidal_m
 from m2pem.api.clock import Clock, RateTimer
 from m2pem_plugin_ros.frames import quaternion_of_yaw, to_geodetic
 from m2pem_plugin_ros.interfaces import set_stamp
 from m2pem_plugin_ros.pose import Twist
 from m2pem_plugin_ros.runtime import qos
-from m2pem_plugin_ros.settings import OdomFrame
+from m2pem_plugin_ros.settings import FixAltitude, OdomFrame
 from m2pem_plugin_ros.simulator.faults import TrafficFaults
 from m2pem_plugin_ros.simulator.sensors import Detector, Found, Reading
 from m2pem_plugin_ros.simulator.traffic import FilteredRuntime
@@ -109,10 +110,13 @@ class BaseTopics:
 
     def _publish_fix(self) -> None:
         lost, place = self._vehicle.gps_lost, self._vehicle.position
+        altitude_m = place.altitude_m
+        if self._vehicle.spec.settings.fix_altitude is FixAltitude.ELLIPSOID:
+            altitude_m = ellipsoidal_m(*place.latlon, altitude_m)
         message = NavSatFix(
             latitude=math.nan if lost else place.latitude_deg,
             longitude=math.nan if lost else place.longitude_deg,
-            altitude=math.nan if lost else place.altitude_m,
+            altitude=math.nan if lost else altitude_m,
         )
         status = NavSatStatus.STATUS_NO_FIX if lost else NavSatStatus.STATUS_FIX
         message.status = NavSatStatus(status=status, service=NavSatStatus.SERVICE_GPS)

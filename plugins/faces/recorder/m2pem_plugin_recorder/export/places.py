@@ -107,6 +107,7 @@ def _features(run: str, places: Places) -> Iterator[dict[str, Any]]:
                 "run": run,
                 "kind": "track",
                 "name": vehicle,
+                "altitude_frame": "amsl",
                 "coordTimes": [iso_time(time_us) for time_us, _ in track],
             },
             "geometry": {
@@ -123,6 +124,7 @@ def _features(run: str, places: Places) -> Iterator[dict[str, Any]]:
                 "name": each.type,
                 "source": each.source,
                 "time": iso_time(each.time_us),
+                "altitude_frame": "amsl",
             },
             "geometry": {"type": "Point", "coordinates": _coordinates(each.position)},
         }

@@ -2,7 +2,7 @@
 import type { AltitudeFrame, Geometry } from "../shared/types";
 
 const NAMESPACE = "https://m2pem.org/schema/1";
-const FRAMES: readonly string[] = ["relative", "amsl", "terrain"];
+const FRAMES: readonly string[] = ["relative", "amsl", "terrain", "ellipsoid"];
 const KINDS: Record<string, Geometry["kind"]> = {
   Point: "point",
   LineString: "route",

@@ -99,8 +99,8 @@ export interface Fleet {
   may_be_debugged: boolean;
 }
 
-/** What altitudes are above: home, the sea, or the ground. */
-export type AltitudeFrame = "relative" | "amsl" | "terrain";
+/** What altitudes are above: home, the sea, the ground, or (in files) the WGS-84 ellipsoid. */
+export type AltitudeFrame = "relative" | "amsl" | "terrain" | "ellipsoid";
 
 export interface Geometry {
   name: string;

@@ -134,7 +134,7 @@ export const operate = {
     altitude: "Altitude m",
     speed: "Speed from here m/s",
     above: "Altitudes above",
-    frames: { relative: "home", amsl: "sea level", terrain: "the ground" },
+    frames: { relative: "home", amsl: "sea level", terrain: "the ground", ellipsoid: "the ellipsoid" },
     addCentre: "Add map centre",
     vertex: "Vertex {number}",
     removeVertex: "Remove vertex {number}",

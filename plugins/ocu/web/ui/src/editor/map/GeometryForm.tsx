@@ -12,7 +12,7 @@ import { TerrainProfile } from "./terrain/TerrainProfile";
 
 const words = strings.plan;
 const text = strings.operate.map;
-const FRAMES: readonly AltitudeFrame[] = ["relative", "amsl", "terrain"];
+const FRAMES: readonly AltitudeFrame[] = ["relative", "amsl", "terrain", "ellipsoid"];
 
 export interface GeometryFormProps {
   editor: EditorContext;
