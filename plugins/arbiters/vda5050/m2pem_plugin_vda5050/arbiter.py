@@ -32,7 +32,7 @@ from m2pem_plugin_vda5050.checkpoint import (
 from m2pem_plugin_vda5050.messages import FROM_VEHICLE, QOS, State
 from m2pem_plugin_vda5050.reading import action_state, base_end, is_executing
 from m2pem_plugin_vda5050.settings import BrokerSettings, Settings, read_settings
-from m2pem_plugin_vda5050.vehicle import Vehicle, VehicleSetup
+from m2pem_plugin_vda5050.vehicle import OTHER_VERSION, Vehicle, VehicleSetup
 
 LOST_AFTER_S = 35.0
 """The standard's vehicles send a state every 30 s at the latest."""
@@ -112,6 +112,8 @@ class Vda5050Arbiter:
             vehicle = self._vehicles[resource] = Vehicle(setup)
             for topic in FROM_VEHICLE:
                 self._topics[f"{settings.broker.url} {settings.prefix}/{topic}"] = vehicle, topic
+            for prefix in settings.other_prefixes:
+                self._topics[f"{settings.broker.url} {prefix}/connection"] = vehicle, OTHER_VERSION
         try:
             for broker in {each.broker for each in self._settings.values()}:
                 self._brokers[broker] = self._broker(broker)
@@ -218,6 +220,11 @@ class Vda5050Arbiter:
             (f"{vehicle.settings.prefix}/{topic}", QOS.get(topic, 0))
             for vehicle in vehicles
             for topic in FROM_VEHICLE
+        ]
+        topics += [
+            (f"{prefix}/connection", QOS["connection"])
+            for vehicle in vehicles
+            for prefix in vehicle.settings.other_prefixes
         ]
         # A random part: of two clients with one name, a broker disconnects the first one.
         identifier = f"m2pem-{self._context.journal.hex[:8]}-{uuid.uuid4().hex[:8]}"

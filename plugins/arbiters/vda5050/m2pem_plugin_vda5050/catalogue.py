@@ -10,12 +10,13 @@ says what is sent:
         action: {type: startSweeping, scope: node, blocking: SOFT}
         parameters: {width: {kind: distance, required: true}}
 
-A `factsheet` offers all actions that it lists. A behavior with the parameter `target` or `route`
-drives there first, in the same order.
+A `factsheet` offers all actions that it lists, and says which parameters they require; without
+it, the version of the standard does. A behavior with the parameter `target` or `route` drives there
+first, in the same order.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any, Literal
 
@@ -69,14 +70,14 @@ class OwnBehavior:
     blocking: Blocking = "HARD"
 
 
-_STATION = {"stationType": "text", "stationName": "text"}
-_LOAD = {
-    **{"target": "position", "speed": "speed", "lhd": "text", **_STATION},
-    **{"loadType": "text", "loadId": "text", "height": "distance", "depth": "distance"},
-    "side": "text",
-}
 _REQUIRED_TEXT = {"kind": "text", "required": True}
 _REQUIRED_NUMBER = {"kind": "number", "required": True}
+_LOAD = {
+    **{"target": "position", "speed": "speed", "lhd": "text"},
+    **{"stationType": _REQUIRED_TEXT, "stationName": "text"},
+    **{"loadType": _REQUIRED_TEXT, "loadId": "text", "height": "distance", "depth": "distance"},
+    "side": "text",
+}
 _MAP = {"mapId": _REQUIRED_TEXT, "mapVersion": _REQUIRED_TEXT}
 
 PREDEFINED: Mapping[str, Mapping[str, Any]] = {
@@ -88,7 +89,10 @@ PREDEFINED: Mapping[str, Mapping[str, Any]] = {
     },
     "stopCharging": {"doc": "End charging."},
     "detectObject": {"parameters": {"objectType": "text"}, "doc": "Detect an object."},
-    "finePositioning": {"parameters": _STATION, "doc": "Position the vehicle exactly."},
+    "finePositioning": {
+        "parameters": {"stationType": "text", "stationName": "text"},
+        "doc": "Position the vehicle exactly.",
+    },
     "waitForTrigger": {
         "parameters": {"target": "position", "speed": "speed", "triggerType": _REQUIRED_TEXT},
         "doc": "Wait for a trigger at the vehicle, such as a button.",
@@ -103,13 +107,30 @@ PREDEFINED: Mapping[str, Mapping[str, Any]] = {
         "doc": "Tell the vehicle where it is on its map.",
     },
     "enableMap": {"parameters": _MAP, "action": {"scope": "instant"}, "doc": "Use a map."},
+    "downloadMap": {
+        "parameters": {**_MAP, "mapDownloadLink": _REQUIRED_TEXT, "mapHash": "text"},
+        "action": {"scope": "instant"},
+        "doc": "Load a map onto the vehicle.",
+    },
+    "deleteMap": {
+        "parameters": _MAP,
+        "action": {"scope": "instant"},
+        "doc": "Remove a map from the vehicle.",
+    },
     "logReport": {
         "parameters": {"reason": _REQUIRED_TEXT},
         "action": {"scope": "instant"},
         "doc": "Have the vehicle store a log report.",
     },
 }
-"""The actions of the standard (section 6.8.1), as `own_behaviors` would declare them."""
+"""The actions of the standard (2.0 and 2.1, section 6.8.1), as `own_behaviors` would declare them.
+
+The row of `drop` calls `stationType` and `loadType` optional and refers to `pick`, which requires
+them; there are vehicles that refuse a `drop` without. In version 3.0 both are optional for both.
+"""
+
+_NEW_IN_2_1 = ("enableMap", "downloadMap", "deleteMap")
+_ANY_SCOPE = ("startCharging", "stopCharging", "finePositioning", "initPosition", "enableMap")
 
 _ENDLESS = (ParameterKind.AREA, ParameterKind.VEHICLE, ParameterKind.OFFSETS)
 _KINDS = {
@@ -121,10 +142,50 @@ _KINDS = {
 }
 
 
+def required_parameters(action: str, factsheet: Factsheet | None) -> tuple[str, ...]:
+    """Return the keys of the parameters without which a vehicle refuses an action: by its
+    factsheet, or by versions 2.0 and 2.1."""
+    body = PREDEFINED.get(action, {}).get("parameters", {})
+    standard = tuple(
+        key for key, each in body.items() if isinstance(each, Mapping) and each.get("required")
+    )
+    listed = None if factsheet is None else factsheet.action(action)
+    if listed is None:
+        return standard
+    parameters = () if listed.action_parameters is UNSET else listed.action_parameters
+    return tuple(
+        each.key
+        for each in parameters
+        if each.is_optional is False or (each.is_optional is UNSET and each.key in standard)
+    )
+
+
+def why_unsupported(own: OwnBehavior, version: str, factsheet: Factsheet | None) -> str:
+    """Return why a vehicle refuses an action, whatever its parameters are: by its factsheet, or by
+    its version; "" if it does not."""
+    action, scope = own.action, own.scope.value
+    if factsheet is not None:
+        listed = factsheet.action(action)
+        if listed is None:
+            return f"the vehicle's factsheet has no action {action}"
+        if scope.upper() not in listed.action_scopes:
+            return f"the vehicle's factsheet has no {scope} action {action}"
+        return ""
+    if action not in PREDEFINED:
+        return ""
+    if action in _NEW_IN_2_1 and version.startswith("2.0."):
+        return f"VDA 5050 {version} has no action {action}, which is new in 2.1"
+    allowed = PREDEFINED[action].get("action", {}).get("scope", "node")
+    if scope != allowed and action not in _ANY_SCOPE:
+        return f"VDA 5050 has no {scope} action {action}: write `scope: {allowed}`"
+    return ""
+
+
 def read_own_behaviors(
-    resource: ResourceId, value: Any, factsheet: Factsheet | None
+    resource: ResourceId, value: Any, version: str, factsheet: Factsheet | None
 ) -> tuple[OwnBehavior, ...]:
     """Read `own_behaviors`, and add the actions of the factsheet that it does not declare.
+    `version`: of VDA 5050, as the vehicle speaks it.
 
     Raises:
         PluginError: something is missing or wrong; the text names the resource and the key.
@@ -137,6 +198,10 @@ def read_own_behaviors(
         }
     specs = read_declared_behaviors(resource, bodies, more_keys=("action",))
     declared = {spec.name: _declared(resource, spec, bodies[spec.name]) for spec in specs}
+    for name, own in declared.items():
+        place = f"{resource}: connection.own_behaviors.{name}"
+        is_standard = value[name] is None
+        declared[name] = _judged(place, own, version, factsheet, is_standard=is_standard)
     for usual in USUAL:
         if usual.name in declared:
             place = f"{resource}: connection.own_behaviors.{usual.name}"
@@ -179,6 +244,35 @@ def _declared(resource: ResourceId, spec: BehaviorSpec, body: Any) -> OwnBehavio
     if spec.name in CONTROL or reader.values.get("type") in CONTROL:
         raise reader.error("type", "m2pem itself sends this action to control the vehicle")
     return OwnBehavior(spec, reader.text("type", spec.name), scope, blocking)
+
+
+def _judged(
+    place: str, own: OwnBehavior, version: str, factsheet: Factsheet | None, *, is_standard: bool
+) -> OwnBehavior:
+    """Return a behavior that requires what the vehicle does. `is_standard`: only its name is given.
+
+    Raises:
+        PluginError: the vehicle would refuse the action, or a required parameter is not declared.
+    """
+    if reason := why_unsupported(own, version, factsheet):
+        raise PluginError(f"{place}: {reason}")
+    required = required_parameters(own.action, factsheet)
+    missing = [key for key in required if key not in {each.name for each in own.spec.parameters}]
+    if missing:
+        source = f"VDA 5050 {version}" if factsheet is None else "the vehicle's factsheet"
+        raise PluginError(
+            f"{place}.parameters: {source} requires {' and '.join(missing)} of {own.action}: "
+            f"declare {missing[0]}, or name the `factsheet` of a vehicle that does without"
+        )
+    parameters = tuple(
+        replace(
+            each,
+            required=(each.name in required and each.default is None)
+            or (each.required and not is_standard),
+        )
+        for each in own.spec.parameters
+    )
+    return replace(own, spec=replace(own.spec, parameters=parameters))
 
 
 def _of_factsheet(action: FactsheetAction) -> OwnBehavior | None:

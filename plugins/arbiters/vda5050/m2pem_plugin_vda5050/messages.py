@@ -13,6 +13,7 @@ import msgspec
 from msgspec import UNSET, Meta, Struct, UnsetType
 
 VERSION = "2.1.0"
+SPOKEN = "m2pem speaks VDA 5050 2.0 and 2.1, and nothing of version 3"
 LARGEST_MESSAGE = 4 << 20
 """In bytes. Larger messages are not read."""
 
@@ -207,7 +208,7 @@ class ConnectionMessage(Message):
 class FactsheetParameter(Part):
     key: str
     value_data_type: str
-    is_optional: bool = False
+    is_optional: bool | UnsetType = UNSET
     description: str | UnsetType = UNSET
 
 
@@ -237,6 +238,11 @@ class Factsheet(Part):
     protocol_features: ProtocolFeatures
     protocol_limits: ProtocolLimits | UnsetType = UNSET
     physical_parameters: PhysicalParameters | UnsetType = UNSET
+
+    def action(self, action_type: str) -> FactsheetAction | None:
+        """Return what it lists of an action; None: nothing."""
+        actions = self.protocol_features.agv_actions
+        return next((each for each in actions if each.action_type == action_type), None)
 
     @property
     def most_nodes(self) -> int | None:
@@ -289,6 +295,22 @@ def decode(payload: bytes, type_: type[T]) -> T:
     return message  # type: ignore[return-value]  # its decoder was chosen by the type
 
 
+class _AnyHeader(Struct):
+    version: str = ""
+
+
+_ANY_HEADER = msgspec.json.Decoder(_AnyHeader)
+
+
+def other_version(payload: bytes) -> str:
+    """Return the version in the header of a message, if it is none that m2pem speaks; else ""."""
+    try:
+        version = _ANY_HEADER.decode(payload[:LARGEST_MESSAGE]).version
+    except (msgspec.DecodeError, RecursionError, UnicodeDecodeError):
+        return ""
+    return "" if version.startswith("2.") else version
+
+
 def timestamp(time_us: int) -> str:
     """Return microseconds since the Unix epoch as ISO 8601, UTC, in milliseconds."""
     moment = datetime.fromtimestamp(time_us / 1e6, UTC)
@@ -307,9 +329,14 @@ class Headers:
         self._next: dict[str, int] = {}
 
     @property
+    def version(self) -> str:
+        """The version that the headers say."""
+        return self._fixed["version"]
+
+    @property
     def is_2_0(self) -> bool:
         """Whether the version is 2.0, whose schemas spell two fields otherwise than its text."""
-        return self._fixed["version"].startswith("2.0.")
+        return self.version.startswith("2.0.")
 
     def of(self, topic: str, time_us: int) -> dict[str, Any]:
         """Return the fields of the next header on a topic."""

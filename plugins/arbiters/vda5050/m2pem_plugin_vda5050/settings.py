@@ -11,7 +11,13 @@ from urllib.parse import urlsplit
 from m2pem.api import Connection, ConnectionReader, Dimension, ResourceId
 from m2pem.errors import PluginError
 from m2pem_plugin_vda5050.catalogue import OwnBehavior, read_own_behaviors
-from m2pem_plugin_vda5050.messages import Factsheet, MessageError, decode
+from m2pem_plugin_vda5050.messages import (
+    SPOKEN,
+    Factsheet,
+    MessageError,
+    decode,
+    other_version,
+)
 
 ARBITER = "vda5050"
 DOMAINS = ("ground",)
@@ -76,6 +82,15 @@ class Settings:
         return f"{self.interface}/v2/{self.manufacturer}/{self.serial_number}"
 
     @property
+    def other_prefixes(self) -> tuple[str, ...]:
+        """Where a vehicle is if it speaks another major version; 3.0 suggests `vda5050`."""
+        ends = [(self.interface, "v1"), (self.interface, "v3"), ("vda5050", "v3")]
+        return tuple(
+            f"{interface}/{major}/{self.manufacturer}/{self.serial_number}"
+            for interface, major in dict.fromkeys(ends)
+        )
+
+    @property
     def address(self) -> str:
         """What names the vehicle, on all hosts."""
         return f"mqtt {self.broker.host}:{self.broker.port} {self.prefix}"
@@ -118,7 +133,8 @@ def _read(connection: Connection) -> Settings:
     reader.refuse_others(_KEYS)
     version = str(reader.values.get("version", "2.1.0"))
     if not VERSIONS.fullmatch(version):
-        raise reader.error("version", f"{version!r} is neither 2.0.0 nor 2.1.0")
+        raise reader.error("version", f"{version!r} is neither 2.0.0 nor 2.1.0: {SPOKEN}")
+    version = version if version.count(".") == 2 else f"{version}.0"
     factsheet = _factsheet(reader, connection.folder)
     return Settings(
         _broker(reader, connection.folder),
@@ -126,12 +142,12 @@ def _read(connection: Connection) -> Settings:
         _level(reader, "serial_number", None, _SERIAL),
         _map(reader),
         _level(reader, "interface", "uagv"),
-        version if version.count(".") == 2 else f"{version}.0",
+        version,
         reader.whole("released_nodes", 0, 0, MOST_RELEASED),
         reader.quantity("deviation", 0.5, Dimension.DISTANCE, 0.0, 100.0),
         reader.quantity("start_deviation", 1.0, Dimension.DISTANCE, 0.0, 100.0),
         reader.quantity("cancel_timeout", 30.0, Dimension.DURATION, 1.0, 3600.0),
-        read_own_behaviors(resource, reader.values.get("own_behaviors"), factsheet),
+        read_own_behaviors(resource, reader.values.get("own_behaviors"), version, factsheet),
         factsheet,
         reader.inner("sim", "{heading: 60 deg}").values,
     )
@@ -214,10 +230,15 @@ def _factsheet(reader: ConnectionReader, folder: Path) -> Factsheet | None:
         return None
     file = Path(_file(reader, "factsheet", folder))
     try:
-        return decode(file.read_bytes(), Factsheet)
+        content = file.read_bytes()
     except OSError as error:
         raise reader.error("factsheet", f"{file}: {error.strerror}") from None
+    try:
+        return decode(content, Factsheet)
     except MessageError as error:
+        if version := other_version(content):
+            problem = f"{file} is one of VDA 5050 {version}: {SPOKEN}"
+            raise reader.error("factsheet", problem) from None
         raise reader.error("factsheet", f"{file} is no factsheet of VDA 5050: {error}") from None
 
 

@@ -33,6 +33,8 @@ from m2pem_plugin_vda5050.catalogue import (
     USUAL,
     OwnBehavior,
     Scope,
+    required_parameters,
+    why_unsupported,
 )
 from m2pem_plugin_vda5050.checkpoint import order_id
 from m2pem_plugin_vda5050.commander import (
@@ -44,6 +46,7 @@ from m2pem_plugin_vda5050.commander import (
 )
 from m2pem_plugin_vda5050.map_frame import MapFrame, MapPoint
 from m2pem_plugin_vda5050.messages import (
+    SPOKEN,
     Action,
     AgvPosition,
     ConnectionMessage,
@@ -54,6 +57,7 @@ from m2pem_plugin_vda5050.messages import (
     Velocity,
     Visualization,
     decode,
+    other_version,
 )
 from m2pem_plugin_vda5050.orders import OrderPlan, OrderProgress
 from m2pem_plugin_vda5050.reading import (
@@ -80,6 +84,8 @@ QUERY_WITHIN_S = 3.0
 """In real time: so long a query waits for the first state of the vehicle."""
 
 LOG_AGAIN_AFTER_S = 60.0
+OTHER_VERSION = "connection of another major version"
+"""What `receive` calls the topic on which a vehicle of another major version says that it is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +135,7 @@ class Vehicle:
         self._resolved = asyncio.Event()
         self._is_held = False
         self._logged: dict[str, int] = {}
-        self._invalid = self._broker_problem = ""
+        self._invalid = self._broker_problem = self._other_version = ""
 
     # --- messages of the vehicle ----------------------------------------------------------------
 
@@ -149,7 +155,11 @@ class Vehicle:
                     self._receive_connection(decode(payload, ConnectionMessage))
                 case "factsheet":
                     self._factsheet = decode(payload, Factsheet)
+                case _:
+                    self._note_other_version(other_version(payload))
         except MessageError as error:
+            if version := other_version(payload):
+                self._note_other_version(version)
             self._invalid = f"its last message on {topic} was invalid: {text_of(error)}"
             self._log(f"{topic}: {text_of(error)}")
         return None
@@ -158,6 +168,13 @@ class Vehicle:
         state = decode(payload, State)
         if not state.version.startswith("2."):
             raise MessageError(f"its version is {text_of(state.version, 20)}, not 2.x")
+        ours = self._headers.version
+        if self._state is None and state.version.split(".")[:2] != ours.split(".")[:2]:
+            version = text_of(state.version, 20)
+            self._logger.warning(
+                "%s: it speaks VDA 5050 %s, and the fleet's `version` is %s: write `version: %s`",
+                *(self.resource, version, ours, version),
+            )
         if state.serial_number != self.settings.serial_number:
             raise MessageError(f"it is of the vehicle {text_of(state.serial_number, 60)!r}")
         self._state, self._state_us = state, self._clock.now_us()
@@ -190,6 +207,14 @@ class Vehicle:
                 self._is_offline = True
             case _ if self._broken_us is None:
                 self._broken_us = self._clock.now_us()
+
+    def _note_other_version(self, version: str) -> None:
+        if version and self._state is None and not self._other_version:
+            self._other_version = (
+                f"it speaks VDA 5050 {text_of(version, 20)}: {SPOKEN}, such as its state, actions, "
+                "zones and responses. Let it speak 2.1"
+            )
+            self._logger.warning("%s: %s", self.resource, self._other_version)
 
     def _note_contact(self) -> None:
         self._contact_us = self._clock.now_us()
@@ -228,9 +253,11 @@ class Vehicle:
         if target is not None and not isinstance(target, Point):
             return "target: a VDA 5050 vehicle drives to places, not after vehicles"
         own = self._own.get(request.behavior)
-        if own is not None and (missing := self._not_in_factsheet(own)):
-            return missing
+        if own is not None and (reason := self._not_taken(own, request)):
+            return reason
         state = self._state
+        if state is None and self._other_version:
+            return self._other_version
         if state is None or not self._has_contact:
             return ""
         if state.operating_mode not in COMMANDED:
@@ -333,7 +360,7 @@ class Vehicle:
     @property
     def absence(self) -> str:
         """Where the vehicle is expected, and what was received from there, for people."""
-        what = self._invalid or "no state was received"
+        what = self._other_version or self._invalid or "no state was received"
         return f"{what}; it is expected at {self.settings.address}"
 
     # --- time -----------------------------------------------------------------------------------
@@ -500,7 +527,7 @@ class Vehicle:
         return OrderTask(setup, lambda state: self._plan(setup, own, state), self._progress_of)
 
     def _progress_of(self, plan: OrderPlan) -> OrderProgress:
-        factsheet = self._factsheet or self.settings.factsheet
+        factsheet = self._known_factsheet
         most = None if factsheet is None else factsheet.most_nodes
         return OrderProgress(plan, self.settings.released_nodes, most)
 
@@ -570,15 +597,25 @@ class Vehicle:
         )
         return (() if is_whole else None), False
 
-    def _not_in_factsheet(self, own: OwnBehavior) -> str:
-        if self._factsheet is None:
+    @property
+    def _known_factsheet(self) -> Factsheet | None:
+        return self._factsheet or self.settings.factsheet
+
+    def _not_taken(self, own: OwnBehavior, request: BehaviorRequest) -> str:
+        """Return why the vehicle would refuse an action, by its factsheet or by the version that
+        it speaks; "" if it would not."""
+        version = self.settings.version if self._state is None else self._state.version
+        factsheet = self._known_factsheet
+        if reason := why_unsupported(own, version, factsheet):
+            return reason
+        sent = _action_values(own, request.parameters)
+        lacking = [
+            key for key in required_parameters(own.action, factsheet) if sent.get(key) in (None, "")
+        ]
+        if not lacking:
             return ""
-        actions = {each.action_type: each for each in self._factsheet.protocol_features.agv_actions}
-        if own.action not in actions:
-            return f"the vehicle's factsheet has no action {own.action}"
-        if own.scope.value.upper() not in actions[own.action].action_scopes:
-            return f"the vehicle's factsheet has no {own.scope} action {own.action}"
-        return ""
+        source = f"VDA 5050 {version}" if factsheet is None else "the vehicle's factsheet"
+        return f"{source} requires {' and '.join(lacking)} of {own.action}"
 
     def _breach(self, request: BehaviorRequest) -> str:
         """Return where the request would leave the fence of the fleet; "" if it does not."""
@@ -621,6 +658,12 @@ class Vehicle:
 
 def _action(own: OwnBehavior, action_id: str, parameters: Mapping[str, ResolvedValue]) -> Action:
     """Return the action of a behavior."""
+    values = _action_values(own, parameters)
+    return action_of(own.action, action_id, own.blocking, values)
+
+
+def _action_values(own: OwnBehavior, parameters: Mapping[str, ResolvedValue]) -> dict[str, object]:
+    """Return the parameters of an action, by their keys."""
     values: dict[str, object] = {}
     for spec in own.spec.parameters:
         value = parameters.get(spec.name, spec.default)
@@ -628,4 +671,4 @@ def _action(own: OwnBehavior, action_id: str, parameters: Mapping[str, ResolvedV
             continue
         is_count = spec.kind is ParameterKind.COUNT and isinstance(value, int | float)
         values[spec.name] = int(value) if is_count and isinstance(value, int | float) else value
-    return action_of(own.action, action_id, own.blocking, values)
+    return values

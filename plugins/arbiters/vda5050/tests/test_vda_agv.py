@@ -132,7 +132,11 @@ def with_node(number: int, **changes: Any) -> dict[str, Any]:
     return made
 
 
-PICK = {"actionType": "pick", "actionId": "a1", "blockingType": "HARD"}
+LOAD = [{"key": "stationType", "value": "floor"}, {"key": "loadType", "value": "EPAL"}]
+PICK = {
+    **{"actionType": "pick", "actionId": "a1", "blockingType": "HARD"},
+    "actionParameters": LOAD,
+}
 
 
 @pytest.mark.parametrize(
@@ -150,6 +154,7 @@ PICK = {"actionType": "pick", "actionId": "a1", "blockingType": "HARD"}
         (with_node(1, nodeId="elsewhere"), "validationError"),
         (with_node(1, nodePosition={"x": 1, "y": 2, "mapId": "cellar"}), "orderError"),
         (with_node(1, actions=[{**PICK, "actionType": "fly"}]), "orderError"),
+        (with_node(1, actions=[{**PICK, "actionParameters": LOAD[:1]}]), "orderError"),
         (with_node(1, actions=[{**PICK, "blockingType": "MAYBE"}]), "validationError"),
         (order((9, 0), (5, 0)), "noRouteError"),
         ({}, "validationError"),
@@ -240,7 +245,7 @@ def test_a_pause_keeps_the_order() -> None:
 def test_an_action_of_a_node_is_done_there() -> None:
     vehicle = Vehicle()
     body = order((0, 0), (3, 0))
-    parameters = [{"key": "loadId", "value": "pallet7"}]
+    parameters = [*LOAD, {"key": "loadId", "value": "pallet7"}]
     body["nodes"][1]["actions"] = [{**PICK, "actionParameters": parameters}]
     vehicle.send("order", body)
     assert vehicle.status("a1") == "WAITING"
@@ -248,7 +253,7 @@ def test_an_action_of_a_node_is_done_there() -> None:
     vehicle.go_on(lambda _: vehicle.status("a1") == "RUNNING")
     assert vehicle.state["loads"] == []
     vehicle.go_on(lambda _: vehicle.status("a1") == "FINISHED")
-    assert vehicle.state["loads"] == [{"loadId": "pallet7"}]
+    assert vehicle.state["loads"] == [{"loadType": "EPAL", "loadId": "pallet7"}]
 
 
 def test_an_unknown_instant_action_fails_and_says_so() -> None:

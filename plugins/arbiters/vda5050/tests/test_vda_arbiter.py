@@ -7,6 +7,7 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
+import paho.mqtt.client as mqtt
 import pytest
 from m2pem_plugin_vda5050.arbiter import Vda5050Arbiter
 from m2pem_plugin_vda5050.checkpoint import order_id
@@ -28,6 +29,7 @@ SPEED = 6.0
 AGV1 = ResourceId("agv1")
 NEAR = Point((38.1076, -77.3192, None))
 FAR = Point((38.1100, -77.3192, None))
+LOAD = {"stationType": "floor", "loadType": "EPAL"}
 
 
 @asynccontextmanager
@@ -294,9 +296,10 @@ async def test_actions_of_the_standard_are_done_where_they_are_asked_for(world: 
     }
     settings = world.simulate(own_behaviors=own)
     async with commanding(settings) as harness:
-        await harness.start("r1.b1", "pick", AGV1, target=NEAR, loadId="pallet7")
+        loads = [{"loadType": "EPAL", "loadId": "pallet7"}]
+        await harness.start("r1.b1", "pick", AGV1, target=NEAR, loadId="pallet7", **LOAD)
         assert (await harness.ended("r1.b1", 90)).state is BehaviorState.SUCCEEDED
-        await world.heard("state", AGV1, lambda state: state["loads"] == [{"loadId": "pallet7"}])
+        await world.heard("state", AGV1, lambda state: state["loads"] == loads)
         await harness.start("r1.b2", "sweep", AGV1, passes=2)
         end = await harness.ended("r1.b2", 60)
         assert (end.state, end.outputs) == (
@@ -309,10 +312,63 @@ async def test_actions_of_the_standard_are_done_where_they_are_asked_for(world: 
         assert action["blockingType"] == "SOFT"
         assert action["actionParameters"] == [{"key": "passes", "value": 2}]
         world.sim.fault("agv1: fail actions")
-        await harness.start("r1.b3", "drop", AGV1)
+        await harness.start("r1.b3", "drop", AGV1, **LOAD)
         end = await harness.ended("r1.b3", 60)
         assert end.state is BehaviorState.FAILED
         assert "the station is not there" in end.reason
+
+
+async def test_an_action_that_lacks_what_its_vehicle_requires_is_not_sent(world: World) -> None:
+    """Its factsheet has changed since the fleet's copy was written."""
+    actions = [{"actionType": "drop", "actionScopes": ["NODE"]}]
+    file = world.folder / "before.json"
+    file.write_text(json.dumps({"protocolFeatures": {"agvActions": actions}}), encoding="utf-8")
+    settings = world.simulate(own_behaviors={"drop": None}, factsheet=str(file))
+    async with commanding(settings) as harness:
+        await world.heard("factsheet", AGV1, lambda _: True)
+        await harness.start("r1.b1", "drop", AGV1, stationType="floor", loadType="")
+        end = await harness.ended("r1.b1", 30)
+        assert (end.state, end.code) == (BehaviorState.REJECTED, "REJECTED")
+        assert end.reason == "the vehicle's factsheet requires loadType of drop"
+        assert world.judge.of("order", AGV1) == []
+
+
+@pytest.mark.parametrize("interface", ["vda5050", "uagv"])
+async def test_a_vehicle_of_version_3_is_named_as_such(
+    broker: Mosquitto, judge: Judge, caplog: pytest.LogCaptureFixture, interface: str
+) -> None:
+    """VDA 5050 3.0.0 has other topics, so that nothing arrives on those of version 2."""
+    header = {"headerId": 0, "timestamp": "2026-11-26T16:00:00.00Z", "version": "3.0.0"}
+    online = {**header, "manufacturer": "m2pem", "serialNumber": AGV1, "connectionState": "ONLINE"}
+    topic = f"{interface}/v3/m2pem/{AGV1}/connection"
+    judge.publish(topic, json.dumps(online), retain=True)
+    clock = SystemClock(SPEED)
+    connections = {AGV1: Connection(AGV1, "ground", connection(broker.url, AGV1), sitl=True)}
+    async with ArbiterHarness(Vda5050Arbiter(connections, context(clock)), clock) as harness:
+        await harness.start("r1.b1", "goto", AGV1, target=NEAR)
+        end = await harness.ended("r1.b1", 30)
+    assert end.state is BehaviorState.REJECTED
+    said = "it speaks VDA 5050 3.0.0: m2pem speaks VDA 5050 2.0 and 2.1, and nothing of version 3"
+    assert said in end.reason
+    assert f"agv1: {said}" in caplog.text
+    assert judge.of("order", AGV1) == []
+
+
+async def test_a_state_of_version_3_on_the_topic_of_version_2_is_named_as_such(
+    broker: Mosquitto, caplog: pytest.LogCaptureFixture
+) -> None:
+    clock = SystemClock(SPEED)
+    connections = {AGV1: Connection(AGV1, "ground", connection(broker.url, AGV1), sitl=True)}
+    async with ArbiterHarness(Vda5050Arbiter(connections, context(clock)), clock) as harness:
+        state = {"version": "3.0.0", "powerSupply": {"stateOfCharge": 80, "charging": False}}
+        sender = mqtt.Client(mqtt.CallbackAPIVersion.VERSION2)
+        sender.connect("127.0.0.1", broker.port)
+        sender.loop_start()
+        topic = f"uagv/v2/m2pem/{AGV1}/state"
+        await asyncio.to_thread(sender.publish(topic, json.dumps(state), 1).wait_for_publish, 30)
+        assert await harness.until(lambda: "it speaks VDA 5050 3.0.0" in caplog.text, 30)
+        sender.disconnect()
+        sender.loop_stop()
 
 
 async def test_a_route_is_released_piece_by_piece(world: World) -> None:

@@ -24,6 +24,7 @@ from tests.command_line import CommandLine, Program
 SPEED = 6.0
 NEAR, FAR = "[38.1077, -77.3192]", "[38.1090, -77.3192]"
 OWN: Mapping[str, Any] = {"pick": None, "drop": None}
+LOAD = {"stationType": "floor", "loadType": "EPAL"}
 
 
 class World:
@@ -63,9 +64,9 @@ def world(broker: Mosquitto, judge: Judge, tmp_path: Path) -> Iterator[World]:
 def test_a_mission_fetches_a_load_and_brings_it(world: World) -> None:
     mission = scenarios.one_after_another(
         "agv1",
-        ("pick", {"target": NEAR, "loadId": "pallet7"}),
+        ("pick", {"target": NEAR, "loadId": "pallet7", **LOAD}),
         ("goto", {"target": FAR, "heading": "90 deg"}),
-        ("drop", {}),
+        ("drop", LOAD),
     )
     fleet = scenarios.fleet("vda5050", {"agv1": world.settings})
     arbiters = {"vda5050": Vda5050Arbiter}

@@ -22,6 +22,7 @@ from vda_world import child_environment, write_fleet
 from m2pem import load_fleet
 from m2pem.api import Connection, ResourceId, SystemClock
 from m2pem.errors import PluginError
+from m2pem.testing import scenarios
 from m2pem.testing.contracts.arbiter_harness import context
 from tests.command_line import CommandLine
 
@@ -31,6 +32,10 @@ LEAST = {
     "serial_number": "0001",
     "map": {"id": "hall"},
 }
+
+
+LOAD = {"stationType": "text", "loadType": {"kind": "text", "default": "EPAL"}}
+FETCH = {"action": "pick", "parameters": LOAD}
 
 
 def read(domain: str = "ground", **settings: Any) -> Settings:
@@ -94,6 +99,22 @@ def test_all_that_a_connection_may_say() -> None:
         (
             {"own_behaviors": {"goto": None}},
             "agv1: connection.own_behaviors.goto: every vehicle of",
+        ),
+        (
+            {"own_behaviors": {"fetch": {"action": "pick", "parameters": {"loadType": "text"}}}},
+            "agv1: connection.own_behaviors.fetch.parameters: VDA 5050 2.1.0 requires stationType",
+        ),
+        (
+            {"own_behaviors": {"wait": {"action": "waitForTrigger"}}, "version": "2.0"},
+            "agv1: connection.own_behaviors.wait.parameters: VDA 5050 2.0.0 requires triggerType",
+        ),
+        (
+            {"own_behaviors": {"enableMap": None}, "version": "2.0"},
+            "agv1: connection.own_behaviors.enableMap: VDA 5050 2.0.0 has no action enableMap",
+        ),
+        (
+            {"own_behaviors": {"x": {**FETCH, "action": {"type": "pick", "scope": "instant"}}}},
+            "agv1: connection.own_behaviors.x: VDA 5050 has no instant action pick: write `scope:",
         ),
         (
             {"own_behaviors": {"x": {"action": {"scope": "edge"}}}},
@@ -201,7 +222,7 @@ def test_a_factsheet_offers_its_actions(tmp_path: Path) -> None:
         }
     )
     file.write_text(json.dumps(body), encoding="utf-8")
-    settings = read(factsheet=str(file), own_behaviors={"fetch": {"action": "pick"}})
+    settings = read(factsheet=str(file), own_behaviors={"fetch": FETCH})
     own = {each.spec.name: each for each in settings.own_behaviors}
     assert set(own) == {"fetch", "weld", "initPosition", "logReport", "paint"}
     assert [each.name for each in own["weld"].spec.parameters] == ["target", "speed"]
@@ -209,6 +230,85 @@ def test_a_factsheet_offers_its_actions(tmp_path: Path) -> None:
     assert [(each.name, each.required) for each in own["paint"].spec.parameters] == [
         ("colour", True)
     ]
+
+
+@pytest.mark.parametrize(
+    ("action", "required"),
+    [
+        ("pick", {"stationType", "loadType"}),
+        ("drop", {"stationType", "loadType"}),
+        ("startCharging", set()),
+        ("stopCharging", set()),
+        ("detectObject", set()),
+        ("finePositioning", set()),
+        ("waitForTrigger", {"triggerType"}),
+        ("initPosition", {"x", "y", "theta", "mapId", "lastNodeId"}),
+        ("enableMap", {"mapId", "mapVersion"}),
+        ("downloadMap", {"mapId", "mapVersion", "mapDownloadLink"}),
+        ("deleteMap", {"mapId", "mapVersion"}),
+        ("logReport", {"reason"}),
+    ],
+)
+def test_an_action_of_the_standard_requires_what_version_2_1_does(
+    action: str, required: set[str]
+) -> None:
+    """VDA 5050 2.1.0, section 6.8.1."""
+    (own,) = read(own_behaviors={action: None}).own_behaviors
+    assert {each.name for each in own.spec.parameters if each.required} == required
+
+
+def test_a_declared_action_of_the_standard_requires_what_has_no_default() -> None:
+    (own,) = read(own_behaviors={"fetch": FETCH}).own_behaviors
+    assert [(each.name, each.required) for each in own.spec.parameters] == [
+        ("stationType", True),
+        ("loadType", False),
+    ]
+
+
+def test_a_factsheet_says_which_parameters_its_vehicle_requires(tmp_path: Path) -> None:
+    spec = AgvSpec("agv1", "KIT", "0001", "2.1.0", "hall", actions={"pick": 1.0, "drop": 1.0})
+    body = json.loads(factsheet(spec, Headers("KIT", "0001").of("factsheet", 0)))
+    pick, drop, *_ = body["protocolFeatures"]["agvActions"]
+    pick["actionParameters"] = [
+        {"key": "stationType", "valueDataType": "STRING", "isOptional": True},
+        {"key": "loadType", "valueDataType": "STRING"},
+        {"key": "lhd", "valueDataType": "STRING", "isOptional": False},
+    ]
+    del drop["actionParameters"]
+    file = tmp_path / "factsheet.json"
+    file.write_text(json.dumps(body), encoding="utf-8")
+    settings = read(factsheet=str(file), own_behaviors={"pick": None, "drop": None})
+    required = {
+        own.spec.name: {each.name for each in own.spec.parameters if each.required}
+        for own in settings.own_behaviors
+    }
+    assert (required["pick"], required["drop"]) == ({"loadType", "lhd"}, set())
+    with pytest.raises(PluginError, match="the vehicle's factsheet has no action startCharging"):
+        read(factsheet=str(file), own_behaviors={"startCharging": None})
+
+
+def test_a_factsheet_of_version_3_is_refused_by_its_version(tmp_path: Path) -> None:
+    file = tmp_path / "factsheet.json"
+    features = {"protocolFeatures": {"mobileRobotActions": []}}
+    file.write_text(json.dumps({"version": "3.0.0", **features}), encoding="utf-8")
+    with pytest.raises(
+        PluginError, match=r"factsheet: .* is one of VDA 5050 3\.0\.0: m2pem speaks"
+    ):
+        read(factsheet=str(file))
+
+
+def test_a_check_names_the_task_that_lacks_what_the_version_requires(tmp_path: Path) -> None:
+    own = {"own_behaviors": {"pick": None, "drop": None}}
+    fleet = write_fleet(tmp_path / "fleet.yaml", {"agv1": {**LEAST, **own}})
+    mission = tmp_path / "mission.bpmn"
+    load = {"stationType": "floor", "loadType": "EPAL"}
+    tasks = (("pick", load), ("pick", {"loadType": "EPAL"}), ("drop", {}))
+    mission.write_bytes(scenarios.one_after_another("agv1", *tasks))
+    line = CommandLine(tmp_path, child_environment(tmp_path))
+    status, out, err = line.run("check", mission, "--fleet", fleet)
+    assert status == 1
+    lines = [each for each in (out + err).splitlines() if "stationType" in each]
+    assert [("Task2" in each, "Task3" in each) for each in lines] == [(True, False), (False, True)]
 
 
 def test_a_vehicle_cannot_make_an_update_long_by_a_wrong_number() -> None:

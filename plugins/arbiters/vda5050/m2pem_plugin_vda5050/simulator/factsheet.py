@@ -4,14 +4,10 @@ from typing import Any
 
 import msgspec
 
+from m2pem_plugin_vda5050.catalogue import DRIVING_PARAMETERS, PREDEFINED, required_parameters
 from m2pem_plugin_vda5050.simulator.agv import INSTANT_ACTIONS, AgvSpec
 
-_PARAMETERS = {
-    "pick": ("loadId", "loadType", "stationName", "lhd"),
-    "drop": ("loadId", "loadType", "stationName", "lhd"),
-    "detectObject": ("objectType",),
-    "finePositioning": ("stationName",),
-}
+_NUMBERS = ("x", "y", "theta", "height", "depth")
 
 
 def factsheet(spec: AgvSpec, header: dict[str, Any]) -> bytes:
@@ -67,8 +63,14 @@ def factsheet(spec: AgvSpec, header: dict[str, Any]) -> bytes:
 
 
 def _action(name: str, scopes: list[str]) -> dict[str, Any]:
+    required = required_parameters(name, None)
     parameters = [
-        {"key": key, "valueDataType": "STRING", "isOptional": True}
-        for key in _PARAMETERS.get(name, ())
+        {
+            "key": key,
+            "valueDataType": "NUMBER" if key in _NUMBERS else "STRING",
+            "isOptional": key not in required,
+        }
+        for key in PREDEFINED.get(name, {}).get("parameters", {})
+        if key not in DRIVING_PARAMETERS
     ]
     return {"actionType": name, "actionScopes": scopes, "actionParameters": parameters}

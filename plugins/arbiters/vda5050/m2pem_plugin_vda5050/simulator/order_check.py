@@ -5,6 +5,7 @@ from itertools import pairwise
 
 from msgspec import UNSET
 
+from m2pem_plugin_vda5050.catalogue import required_parameters
 from m2pem_plugin_vda5050.messages import Action, Order
 
 
@@ -65,6 +66,11 @@ def check_doable(order: Order, maps: Collection[str], known: Collection[str]) ->
     for action in actions_of(order):
         if action.action_type not in known:
             problem = f"there is no action {action.action_type!r}"
+            raise OrderError("orderError", problem, actionId=action.action_id)
+        given = () if action.action_parameters is UNSET else action.action_parameters
+        lacking = {*required_parameters(action.action_type, None)} - {each.key for each in given}
+        if lacking:
+            problem = f"{action.action_type} lacks {', '.join(sorted(lacking))}"
             raise OrderError("orderError", problem, actionId=action.action_id)
 
 
