@@ -1,4 +1,4 @@
-"""An exporter: writes runs of a journal into a file that other programs read (`m2pem export`)."""
+"""An exporter: writes runs of a journal for other programs (`m2pem export`)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -55,6 +55,9 @@ class ExportOptions:
 
 class Exporter(Protocol):
     """Constructed as `Exporter(output, options)`; the runs follow in the journal's order.
+
+    If what is registered has `writes_folder = True`, `output` is the path of a folder, which the
+    exporter makes.
 
     Methods raise `PluginError` for what cannot be exported, and `OSError`.
     """

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, BinaryIO
 
 import click
@@ -26,14 +27,14 @@ if TYPE_CHECKING:
     "format_",
     metavar="FORMAT",
     required=True,
-    help="csv, parquet, geojson, kml, xes, mcap, or a format of another plugin.",
+    help="csv, parquet, geojson, kml, xes, mcap, rosbag2, or a format of another plugin.",
 )
 @click.option(
     "-o",
     "--output",
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE",
-    help="The file to make  [default: standard output]",
+    help="The file to make, or of rosbag2 the folder  [default: standard output]",
 )
 @click.option("--all", "every", is_flag=True, help="Export all runs of the journal.")
 @click.option(
@@ -90,10 +91,14 @@ def export(
         raise click.UsageError(str(error)) from error
     options = ExportOptions(table, recordings)
 
-    def write(file: BinaryIO) -> Sequence[str]:
+    def write(file: BinaryIO | Path) -> Sequence[str]:
         return asyncio.run(_export(journal, run_ids, window, factory(file, options)))
 
-    if output is None:
+    if getattr(factory, "writes_folder", False):
+        if output is None:
+            raise click.UsageError(f"{format_} is a folder: name it with -o")
+        remarks = _to_folder(output, write)
+    elif output is None:
         if sys.stdout.isatty():
             raise click.UsageError("name a file with -o, or send the output to a program")
         remarks = write(sys.stdout.buffer)
@@ -115,6 +120,19 @@ def _to_file(path: Path, write: Callable[[BinaryIO], Sequence[str]]) -> Sequence
         finally:
             with suppress(OSError):
                 part.unlink()
+    except OSError as error:
+        raise UnusableError(f"{path} cannot be written: {error.strerror}") from error
+    return remarks
+
+
+def _to_folder(path: Path, write: Callable[[Path], Sequence[str]]) -> Sequence[str]:
+    """Make a folder, which appears when it is whole. Its files may be called as it is."""
+    try:
+        if path.exists():
+            raise UnusableError(f"{path} is there already: name a new folder with -o")
+        with TemporaryDirectory(prefix=f".{path.name}.", dir=path.parent) as part:
+            remarks = write(Path(part, path.name))
+            Path(part, path.name).rename(path)
     except OSError as error:
         raise UnusableError(f"{path} cannot be written: {error.strerror}") from error
     return remarks

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from importlib import import_module
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING, Any
 
 from m2pem import hookimpl
 
@@ -23,7 +23,7 @@ def m2pem_register_faces(register: "Callable[[str, Callable[..., Face]], None]")
 def m2pem_register_exporters(register: "Callable[[str, Callable[..., Exporter]], None]") -> None:
     """Register the formats of `m2pem export`."""
     for name, (module, exporter) in _EXPORTERS.items():
-        register(name, _imported_when_made(f"m2pem_plugin_recorder.export.{module}", exporter))
+        register(name, _ImportedWhenMade(module, exporter, writes_folder=name == "rosbag2"))
 
 
 _EXPORTERS = {
@@ -33,12 +33,17 @@ _EXPORTERS = {
     "kml": ("places", "KmlExporter"),
     "xes": ("xes", "XesExporter"),
     "mcap": ("mcap_file", "McapExporter"),
+    "rosbag2": ("rosbag2_folder", "Rosbag2Exporter"),
 }
 
 
-def _imported_when_made(module: str, exporter: str) -> "Callable[..., Exporter]":
-    def make(output: BinaryIO, options: "ExportOptions") -> "Exporter":
-        made: Exporter = getattr(import_module(module), exporter)(output, options)
-        return made
+class _ImportedWhenMade:
+    """Makes an exporter of a module of `export`. `writes_folder`: see `m2pem.api.Exporter`."""
 
-    return make
+    def __init__(self, module: str, exporter: str, *, writes_folder: bool) -> None:
+        self._module, self._exporter = f"m2pem_plugin_recorder.export.{module}", exporter
+        self.writes_folder = writes_folder
+
+    def __call__(self, output: Any, options: "ExportOptions") -> "Exporter":
+        made: Exporter = getattr(import_module(self._module), self._exporter)(output, options)
+        return made

@@ -15,9 +15,11 @@ from m2pem.api import US_PER_S, LocalFrame, VehicleState, ellipsoidal_m
 from m2pem_plugin_recorder.channels import Channel, ChannelMessage, Schema
 from m2pem_plugin_recorder.foxglove_messages import MAP, base_link, finite, rotation
 
-_STORE = get_typestore(Stores.ROS2_JAZZY)
+STORE = get_typestore(Stores.ROS2_JAZZY)
+"""The types of ROS 2 Jazzy."""
+
 _Header, _Time, _Fix, _FixStatus, _Odometry, _Battery = (
-    _STORE.types[name]
+    STORE.types[name]
     for name in (
         "std_msgs/msg/Header",
         "builtin_interfaces/msg/Time",
@@ -28,7 +30,7 @@ _Header, _Time, _Fix, _FixStatus, _Odometry, _Battery = (
     )
 )
 _Pose, _PoseCovariance, _Point, _Quaternion, _Twist, _TwistCovariance, _Vector = (
-    _STORE.types[f"geometry_msgs/msg/{name}"]
+    STORE.types[f"geometry_msgs/msg/{name}"]
     for name in (
         "Pose",
         "PoseWithCovariance",
@@ -47,7 +49,7 @@ _STATUS_FIX, _SERVICE_GPS = 0, 1
 
 @cache
 def _channel(topic: str, type_: str) -> Channel:
-    definition, _ = _STORE.generate_msgdef(type_, ros_version=2)
+    definition, _ = STORE.generate_msgdef(type_, ros_version=2)
     return Channel(topic, "cdr", Schema(type_, "ros2msg", definition.encode()))
 
 
@@ -120,7 +122,7 @@ def vehicle_messages(state: VehicleState, frame: LocalFrame) -> Iterator[Channel
 
 
 def _message(topic: str, type_: str, time_us: int, message: Any) -> ChannelMessage:
-    data = bytes(_STORE.serialize_cdr(message, type_))
+    data = bytes(STORE.serialize_cdr(message, type_))
     return ChannelMessage(_channel(topic, type_), time_us, data)
 
 

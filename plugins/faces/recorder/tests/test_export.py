@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,12 @@ import shapely
 import shapely.geometry
 from m2pem_plugin_recorder.export.xes import XesExporter
 from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
 from recording_world import DRIVE, GATE, HOME, ROAD, finished, write_fleet
+from rosbags.highlevel import AnyReader
+from rosbags.interfaces import Connection, MessageDefinitionFormat
+from rosbags.typesys import Stores, get_typestore
+from ruamel.yaml import YAML
 
 from m2pem import load_mission
 from m2pem.api import (
@@ -298,3 +304,82 @@ def test_a_time_window_chooses_runs(folder: Path) -> None:
 )
 def test_bad_arguments_are_named(folder: Path, arguments: tuple[str, ...], says: str) -> None:
     assert says in finished(folder, "export", *arguments, *JOURNAL, status=2)
+
+
+# --- a bag of ROS 2 ---------------------------------------------------------------------------
+
+
+def messages_of_bag(path: Path) -> list[tuple[Connection, int, Any]]:
+    """Return all messages of a bag, decoded by the definitions in the bag itself."""
+    with AnyReader([path]) as reader:
+        assert reader.connections
+        for each in reader.connections:
+            assert each.msgdef.format is MessageDefinitionFormat.MSG, each
+        return [
+            (connection, at_ns, reader.deserialize(data, connection.msgtype))
+            for connection, at_ns, data in reader.messages()
+        ]
+
+
+@pytest.fixture(scope="module")
+def bag(folder: Path) -> Path:
+    export(folder, "r1", "--to", "rosbag2", "-o", "bag")
+    return folder / "bag"
+
+
+def test_rosbags_reads_every_message_of_a_bag(folder: Path, bag: Path) -> None:
+    """rosbags 0.11.9 refuses a recording: "Profile is not ros2."."""
+    found = messages_of_bag(bag)
+    topics = {connection.topic: connection.msgtype for connection, _, _ in found}
+    assert topics == {
+        "/m2pem/records": "std_msgs/msg/String",
+        "/m2pem/telemetry": "std_msgs/msg/String",
+        **{f"/{name}/fix": "sensor_msgs/msg/NavSatFix" for name in ("ugv1", "ugv2")},
+        **{f"/{name}/odom": "nav_msgs/msg/Odometry" for name in ("ugv1", "ugv2")},
+        **{f"/{name}/battery_state": "sensor_msgs/msg/BatteryState" for name in ("ugv1", "ugv2")},
+    }
+    records = [json.loads(m.data) for each, _, m in found if each.topic == "/m2pem/records"]
+    assert records == journal(folder, "r1")
+    odometry = [(at_ns, m) for each, at_ns, m in found if each.topic == "/ugv1/odom"]
+    assert len(odometry) > 10
+    for at_ns, message in odometry:
+        stamp = message.header.stamp
+        assert stamp.sec * 10**9 + stamp.nanosec == at_ns
+        assert (message.header.frame_id, message.child_frame_id) == ("map", "ugv1/base_link")
+    assert [at_ns for _, at_ns, _ in found] == sorted(at_ns for _, at_ns, _ in found)
+
+
+def test_a_bag_is_as_rosbag2_of_jazzy_writes_it(bag: Path) -> None:
+    """Version 9, MCAP, CDR alone, and for each topic its QoS and the hash of its type."""
+    yaml = YAML(typ="safe").load((bag / "metadata.yaml").read_text(encoding="utf-8"))
+    information = yaml["rosbag2_bagfile_information"]
+    assert (information["version"], information["storage_identifier"]) == (9, "mcap")
+    assert information["relative_file_paths"] == ["bag.mcap"]
+    assert {each.name for each in bag.iterdir()} == {"metadata.yaml", "bag.mcap"}
+    store = get_typestore(Stores.ROS2_JAZZY)
+    counts = {}
+    for each in information["topics_with_message_count"]:
+        topic = each["topic_metadata"]
+        counts[topic["name"]] = each["message_count"]
+        assert topic["serialization_format"] == "cdr"
+        assert topic["type_description_hash"] == store.hash_rihs01(topic["type"])
+        (qos,) = topic["offered_qos_profiles"]
+        assert (qos["reliability"], qos["durability"]) == ("reliable", "volatile")
+    assert sum(counts.values()) == information["message_count"]
+    with (bag / "bag.mcap").open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        assert reader.get_header().profile == "ros2"
+        read = Counter(channel.topic for _, channel, _, _ in reader.iter_decoded_messages())
+    assert read == counts
+
+
+def test_a_bag_is_not_written_over_another_folder(folder: Path, bag: Path) -> None:
+    before = (bag / "metadata.yaml").read_bytes()
+    refused = ("--to", "rosbag2", *JOURNAL)
+    said = finished(folder, "export", "r2", *refused, "-o", "bag", status=2)
+    assert "bag" in said
+    assert (bag / "metadata.yaml").read_bytes() == before
+    assert "name it with -o" in finished(folder, "export", "r2", *refused, status=2)
+    said = finished(folder, "export", "r1", "r2", *refused, "-o", "both", status=1)
+    assert "a bag holds one run" in said
+    assert not [each for each in folder.iterdir() if "both" in each.name]
