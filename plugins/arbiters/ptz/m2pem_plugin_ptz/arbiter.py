@@ -270,7 +270,8 @@ class PtzArbiter:
             silent_us = now_us - (
                 began_us if camera.last_contact_us is None else camera.last_contact_us
             )
-            lost = silent_us >= bound_us and not late
+            is_awaited = camera.is_awaited and camera.last_contact_us is None
+            lost = silent_us >= bound_us and not (late or is_awaited)
             if lost and self._tracker.holder(resource) is not None:
                 camera.drop()
                 self._tracker.lose(resource, f"no message for {silent_us / 1e6:.1f} s")

@@ -17,10 +17,13 @@ from m2pem_plugin_ptz.behaviors.behavior import (
     BehaviorFailedError,
 )
 from m2pem_plugin_ptz.camera_model.model import CameraModel
-from m2pem_plugin_ptz.drivers.driver import CameraError
+from m2pem_plugin_ptz.drivers.driver import CameraError, Discovering
 
 STOP_SHARE = 0.8
 """A stop that takes more than this part of the cancel timeout has failed."""
+
+FOUND_WITHIN_S = 10.0
+"""A behavior waits so long for what is not discovered of its camera, in real time."""
 
 _POLL_S = 0.1
 
@@ -54,6 +57,8 @@ class CameraController:
         self._task: _Task | None = None
         self._replaced: list[Behavior] = []
         self._held = False
+        self.is_awaited = False
+        """Whether a behavior waits for the camera, which is not discovered yet."""
         self._work = LatestTask()
 
     @property
@@ -120,6 +125,7 @@ class CameraController:
     async def _run(self, task: _Task) -> None:
         try:
             await self._end_replaced()
+            await self._until_found(task)
             await self.wait_for_ptz()
             if not task.adopted:
                 await self._wait_while_held()
@@ -136,6 +142,23 @@ class CameraController:
             await self._fail(task, f"internal error of m2pem: {type(error).__name__}: {error}")
         else:
             self._end(task, BehaviorState.SUCCEEDED)
+
+    async def _until_found(self, task: _Task) -> None:
+        driver, name, loop = self.driver, task.behavior.name, asyncio.get_running_loop()
+        if not isinstance(driver, Discovering) or not (missing := driver.missing(name)):
+            return
+        self._logger.warning("%s: %s waits: %s", self.model.resource, task.id, missing)
+        end_s, self.is_awaited = loop.time() + FOUND_WITHIN_S, True
+        try:
+            while missing := driver.missing(name):
+                if loop.time() >= end_s:
+                    reason = f"not discovered within {FOUND_WITHIN_S:g} s: {missing}"
+                    raise CameraError(reason, "REJECTED")
+                await asyncio.sleep(_POLL_S)
+        finally:
+            self.is_awaited = False
+        if not task.adopted and (reason := task.behavior.refusal()):
+            raise CameraError(reason, "REJECTED")
 
     async def _steps(self, task: _Task) -> None:
         while True:

@@ -69,8 +69,8 @@ class World:
         self.confirmed.append(message.data)
 
     async def ready(self) -> None:
-        await until(lambda: self.driver.refusal("ptz_point_at") == "" and self.joints)
-        await until(lambda: self.driver.refusal("take_picture") == "")
+        await until(lambda: self.driver.missing("ptz_point_at") == "" and self.joints)
+        await until(lambda: self.driver.missing("take_picture") == "")
 
     async def stands(self, count: int = 10) -> None:
         """Wait until so many samples, heard from now on, say the same."""

@@ -1,10 +1,30 @@
 """Pointing over ROS: what the joints really do."""
 
 import asyncio
+import json
 import math
+from contextlib import asynccontextmanager
 
 import pytest
-from ptz_ros_world import AMPLE_S, make_driver, until, world
+from m2pem_plugin_ptz import controller
+from m2pem_plugin_ptz.arbiter import PtzArbiter
+from m2pem_plugin_ros.testing import Peer
+from ptz_ros_world import AMPLE_S, CAMERA, PEER, make_driver, until, world
+
+from m2pem.api import BehaviorState, Connection
+from m2pem.api.clock import SystemClock
+from m2pem.testing.contracts.arbiter_harness import ArbiterHarness, context
+
+
+@asynccontextmanager
+async def commanding(settings, folder):
+    """An arbiter of the camera, which may not be there."""
+    own = {"driver": "ros", "pictures": str(folder), **settings}
+    clock = SystemClock()
+    arbiter = PtzArbiter({CAMERA: Connection(CAMERA, "ground", own, sitl=True)}, context(clock))
+    async with ArbiterHarness(arbiter, clock) as harness:
+        yield harness
+
 
 COMMANDS = ["trajectory", pytest.param("positions", marks=pytest.mark.long)]
 
@@ -144,9 +164,9 @@ async def test_words_that_are_no_fault_leave_a_simulated_camera_as_it_is(
 
 async def test_a_camera_that_is_not_there_says_what_is_missing(ros_domain, tmp_path) -> None:
     async with world(ros_domain, tmp_path, camera=False) as it:
-        told = it.driver.refusal("ptz_point_at")
+        told = it.driver.missing("ptz_point_at")
         assert told == "/evsg2/joint_states has no pan_joint and tilt_joint"
-        told = it.driver.refusal("take_picture")
+        told = it.driver.missing("take_picture")
         assert told == "no publisher of images on /evsg2/camera/image_raw/compressed"
         assert it.driver.ptz is None
         it.point(10.0, 10.0)
@@ -163,7 +183,40 @@ async def test_joints_of_others_are_named(ros_domain, tmp_path) -> None:
         await other.open()
         try:
             known = "it has wheel, pan_joint, tilt_joint"
-            await until(lambda: known in other.refusal("ptz_track"))
+            await until(lambda: known in other.missing("ptz_track"))
             assert other.ptz is None
         finally:
             await other.close()
+
+
+@pytest.mark.parametrize(
+    ("behavior", "parameters"),
+    [("ptz_point_at", {"bearing": 0.5, "elevation": 0.1}), ("take_picture", {})],
+)
+async def test_a_behavior_waits_for_a_camera_that_comes_late(
+    ros_domain, tmp_path, monkeypatch, caplog, behavior, parameters
+) -> None:
+    monkeypatch.setattr(controller, "FOUND_WITHIN_S", AMPLE_S)
+    settings = {"namespace": "/evsg2", "domain_id": ros_domain}
+    async with commanding(settings, tmp_path) as harness:
+        await harness.start("r1.b1", behavior, CAMERA, **parameters)
+        await until(lambda: "evsg2/ptz: r1.b1 waits: " in caplog.text)
+        peer = Peer(PEER, ros_domain, [CAMERA, json.dumps(settings), "no"])
+        await asyncio.to_thread(peer.__enter__)
+        try:
+            end = await harness.ended("r1.b1", AMPLE_S)
+            assert end.state is BehaviorState.SUCCEEDED, end.reason
+        finally:
+            await asyncio.to_thread(peer.__exit__, None, None, None)
+
+
+async def test_a_behavior_of_a_camera_that_never_comes_is_rejected(
+    ros_domain, tmp_path, monkeypatch
+) -> None:
+    monkeypatch.setattr(controller, "FOUND_WITHIN_S", 0.5)
+    async with commanding({"namespace": "/evsg2", "domain_id": ros_domain}, tmp_path) as harness:
+        await harness.start("r1.b1", "ptz_point_at", CAMERA, bearing=0.0, elevation=0.0)
+        end = await harness.ended("r1.b1", AMPLE_S)
+        assert end.code == "REJECTED"
+        missing = "/evsg2/joint_states has no pan_joint and tilt_joint"
+        assert end.reason == f"not discovered within 0.5 s: {missing}"

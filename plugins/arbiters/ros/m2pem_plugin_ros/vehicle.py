@@ -3,7 +3,7 @@ link."""
 
 import asyncio
 import math
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Coroutine, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from uuid import UUID
@@ -31,13 +31,28 @@ from m2pem.api import (
 from m2pem.errors import PluginError
 from m2pem_plugin_ros.checkpoint import goal_id, run_id
 from m2pem_plugin_ros.connections import VehicleConnection, VehicleSensors
-from m2pem_plugin_ros.drivers.driver import Driver, DriverSetup, Health, Order, Outcome
+from m2pem_plugin_ros.drivers.driver import (
+    Discovering,
+    Driver,
+    DriverSetup,
+    Health,
+    Order,
+    Outcome,
+)
 from m2pem_plugin_ros.fence_check import FenceCheck
 from m2pem_plugin_ros.log_throttle import LogThrottle
 from m2pem_plugin_ros.settings import DriverName, Settings
 
 QUERY_WITHIN_S = 3.0
 """Timeout of a query to the vehicle, in real time."""
+
+FOUND_WITHIN_S = 10.0
+"""A behavior waits so long for what DDS has not discovered of its vehicle, in real time."""
+
+ASKED_WITHIN_S = 6.0
+"""The same for a query, in real time; with its own timeout, it is less than an executive waits."""
+
+LOOK_EVERY_S = 0.1
 
 CANCEL_SHARE = 0.8
 """A cancel that takes more than this part of the cancel timeout has failed."""
@@ -98,6 +113,8 @@ class Vehicle:
         self._left_us = 0
         self._adopted = False
         self._cancelled: BehaviorId = ""
+        self._waiting: BehaviorId = ""
+        self._is_held = False
         self._broken = ""
         self._checked_s = 0.0
         self._refusal = ""
@@ -135,6 +152,40 @@ class Vehicle:
         order = self._order_for(request)
         self._keep(order)
         self._publish_targets()
+        self._waiting, self._is_held = "", False
+        if self._is_to_be_found(request):
+            self._waiting = request.id
+            self._run(self._give_when_found(order.goal, query_first=query_first))
+        else:
+            await self._give(order, query_first=query_first)
+
+    async def _give_when_found(self, goal: UUID, *, query_first: bool) -> None:
+        """Begin an order when its vehicle is discovered; reject it if that takes too long."""
+
+        def order() -> Order | None:
+            own = self._order
+            return own if own is not None and own.goal == goal and self._waiting else None
+
+        awaited = order()
+        if awaited is None:
+            return
+        name, missing = awaited.request.id, self._missing(awaited.request)
+        self._context.logger.warning("%s: %s waits for %s", self.resource, name, missing)
+        missing = await self._until_found(awaited.request, FOUND_WITHIN_S)
+        if (awaited := order()) is None:
+            return  # it was cancelled or replaced, or the vehicle is lost
+        self._waiting = ""
+        late = f"not discovered within {FOUND_WITHIN_S:g} s: {missing}" if missing else ""
+        if reason := late or self.refusal(awaited.request):
+            self._order = None
+            self._tracker.end(name, BehaviorState.REJECTED, reason=reason)
+            return
+        await self._give(awaited, query_first=query_first)
+        if self._is_held:
+            self.hold()
+
+    async def _give(self, order: Order, *, query_first: bool) -> None:
+        request = order.request
         # A plain base does nothing without commands.
         if query_first and self.settings.driver is not DriverName.BASE:
             outcome = await self.query(order)
@@ -158,10 +209,12 @@ class Vehicle:
     def cancel(self, behavior: BehaviorId) -> None:
         """Cancel a behavior. It fails if the vehicle does not stop in time."""
         goal = goal_id(self._context.journal, behavior)
+        if self._waiting == behavior:
+            self._waiting, self._order = "", None
+            self._tracker.end(behavior, BehaviorState.CANCELLED, reason="it was not sent yet")
+            return
         self._cancelled = behavior
-        task = asyncio.get_running_loop().create_task(self._fail_cancel_after_limit(behavior))
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
+        self._run(self._fail_cancel_after_limit(behavior))
         if wrong := self._call_driver("end", lambda: self.driver.end(goal)):
             self._mark_unresolved(behavior)
             self._tracker.end(behavior, BehaviorState.FAILED, reason=wrong)
@@ -176,9 +229,11 @@ class Vehicle:
 
     def hold(self) -> None:
         """Stop the vehicle, and keep the behavior."""
+        self._is_held = True
         self._call_driver("hold", self.driver.hold)
 
     def resume(self) -> None:
+        self._is_held = False
         self._call_driver("resume", self.driver.resume)
 
     async def reclaim(self) -> str:
@@ -186,6 +241,9 @@ class Vehicle:
         Return "" when all are acknowledged; otherwise, after a timeout, what it may still do."""
         if (holder := self.doing) is not None:
             self._lose(holder, (self._context.clock.now_us() - self._last_contact_us) / 1e6)
+        left = list(self._unresolved.values())
+        if left:  # what is sent to a node that has just come back may be dropped
+            await self._until_found(self.order_for(left[0]).request, RECLAIM_WITHIN_S)
         for goal in list(self._unresolved):
             self._call_driver("end", partial(self.driver.end, goal))
         try:
@@ -195,10 +253,10 @@ class Vehicle:
                     await self._resolved.wait()
         except TimeoutError:
             self.hold()
-            left = ", ".join(self._unresolved.values())
+            behaviors = ", ".join(self._unresolved.values())
             return (
-                f"its link is up again, but it has not acknowledged the cancel of {left} and HOLD:"
-                " it may still do that"
+                f"its link is up again, but it has not acknowledged the cancel of"
+                f" {behaviors} and HOLD: it may still do that"
             )
         return ""
 
@@ -227,8 +285,10 @@ class Vehicle:
         if self._broken:
             return self._broken
         try:
-            if wrong := self.problem:
+            if wrong := self._ros_connection.sensors.refusal:
                 return wrong
+            if self._is_to_be_found(request):
+                return ""  # it waits
             return self.driver.refusal(request) or self._breach(request)
         except Exception as error:
             self._context.logger.exception("%s: refusal", self.resource)
@@ -236,6 +296,9 @@ class Vehicle:
 
     async def query(self, order: Order) -> Outcome:
         """Return the state of a goal on the vehicle; UNKNOWN also if it does not answer in time."""
+        if missing := await self._until_found(order.request, ASKED_WITHIN_S):
+            reason = f"{self.resource} cannot be asked: not discovered yet: {missing}"
+            return Outcome(BehaviorState.UNKNOWN, reason=reason)
         try:
             async with asyncio.timeout(QUERY_WITHIN_S):
                 return await self.driver.query(order)
@@ -375,7 +438,8 @@ class Vehicle:
             self.link = LinkState.LOST
         elif may_lose or not is_silent:
             self.link = link_state(silent_s, bound_s)
-        if is_silent and may_lose and holder is not None:
+        is_awaited = holder is not None and holder == self._waiting and not self._contacts
+        if is_silent and may_lose and holder is not None and not is_awaited:
             self._lose(holder, silent_s)
             holder = None
         self._publish_targets()
@@ -403,6 +467,32 @@ class Vehicle:
         return replace(state, ready=False, not_ready_reasons=tuple(reasons))
 
     # --- inside ---------------------------------------------------------------------------------
+
+    def _missing(self, request: BehaviorRequest) -> str:
+        """Return what of the vehicle is not discovered yet, and needed; "" if nothing is."""
+        if not (self._contacts or self.is_listed):
+            return self.absence
+        return self.driver.missing(request) if isinstance(self.driver, Discovering) else ""
+
+    def _is_to_be_found(self, request: BehaviorRequest) -> bool:
+        """Whether a request has to wait. One for a vehicle that was received, and is silent now,
+        does not: it will be lost."""
+        silent_s = (self._context.clock.now_us() - self._last_contact_us) / 1e6
+        is_gone = self._contacts and silent_s >= self._limits.lost_after_s
+        return not is_gone and self._missing(request) != ""
+
+    async def _until_found(self, request: BehaviorRequest, within_s: float) -> str:
+        """Wait, in real time. Return what is still missing then, or ""."""
+        loop = asyncio.get_running_loop()
+        end_s = loop.time() + within_s
+        while (missing := self._missing(request)) and loop.time() < end_s:  # noqa: ASYNC110  # of the graph
+            await asyncio.sleep(LOOK_EVERY_S)
+        return missing
+
+    def _run(self, work: Coroutine[None, None, None]) -> None:
+        task = asyncio.get_running_loop().create_task(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
 
     def _check_for_other_publishers(self) -> None:
         """Check the endpoints periodically, so that operators know of a conflict early."""

@@ -1,15 +1,18 @@
-"""Vehicles of plain rclpy nodes: one that returns, two in one namespace, and wrong frames."""
+"""Vehicles of plain rclpy nodes: one that comes late, one that returns, two in one namespace, and
+wrong frames."""
 
 import asyncio
 import itertools
 import logging
+import re
 from collections.abc import AsyncIterator, Callable, Mapping
-from contextlib import asynccontextmanager
+from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
 from typing import Any
 from uuid import UUID
 
 import pytest
+from m2pem_plugin_ros import vehicle
 from m2pem_plugin_ros.arbiter import RosArbiter
 from m2pem_plugin_ros.frames import to_geodetic
 from m2pem_plugin_ros.runtime import RosRuntime, qos
@@ -35,6 +38,7 @@ from m2pem.telemetry.bus import Bus
 from m2pem.testing.contracts.arbiter_harness import ArbiterHarness
 
 PEER = Path(__file__).with_name("ros_plain_peer.py")
+ACTION_PEER = Path(__file__).with_name("ros_onboard_peer.py")
 ORIGIN = (38.1075, -77.3192, 60.0)
 JOURNAL = UUID("0f5d1c7e-35b1-4b67-9f0d-6b3a2f7b1c55")
 UGV1 = ResourceId("ugv1")
@@ -119,6 +123,107 @@ def state(bench: ArbiterHarness) -> VehicleState | None:
 def reasons(bench: ArbiterHarness) -> str:
     latest = state(bench)
     return "" if latest is None else "; ".join(latest.not_ready_reasons)
+
+
+# --- one that comes late, or never ----------------------------------------------------------------
+
+
+@asynccontextmanager
+async def late(domain: int, kind: str) -> AsyncIterator[None]:
+    """The vehicle, from now on; the loop goes on while it starts and ends."""
+    action = kind == "action"
+    arguments = ["1", "ugv1"] if action else ["/ugv1", kind, "map"]
+    peer = Peer(ACTION_PEER if action else PEER, domain, arguments)
+    await asyncio.to_thread(peer.__enter__)
+    try:
+        yield
+    finally:
+        await asyncio.to_thread(peer.__exit__, None, None, None)
+
+
+@pytest.mark.parametrize(
+    ("kind", "settings"),
+    [
+        ("node", {}),
+        ("action", {"via": "action"}),
+        ("base", {"driver": "base"}),
+        ("nav2", {"driver": "nav2"}),
+    ],
+)
+async def test_a_behavior_waits_for_a_vehicle_that_comes_late(
+    ros_domain: int,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+    kind: str,
+    settings: Mapping[str, Any],
+) -> None:
+    monkeypatch.setattr(vehicle, "FOUND_WITHIN_S", AMPLE_S)
+    async with connected(ros_domain, **settings) as (bench, truth):
+        await bench.start("r1.b1", "goto", UGV1, target=ahead())
+        await until(lambda: "ugv1: r1.b1 waits for /ugv1/" in caplog.text)
+        async with late(ros_domain, kind):
+            await bench.running("r1.b1", AMPLE_S)
+            if kind != "action":
+                await until(lambda: truth.speed() > 0.3)
+                assert truth.begun() == 1
+
+
+@pytest.mark.parametrize(
+    ("there", "settings", "missing"),
+    [
+        ("", {}, "/ugv1/vehicle_status (m2pem_interfaces/msg/VehicleStatus) has no publisher"),
+        ("", {"driver": "base"}, "/ugv1/odom (nav_msgs/msg/Odometry) has no publisher"),
+        ("nav2", {"driver": "base"}, "a subscriber to /ugv1/cmd_vel"),
+        ("base", {"driver": "nav2"}, "an answer of the service /ugv1/bt_navigator/get_state"),
+        ("node", {"via": "action"}, "the service /ugv1/execute_behavior/_action/send_goal and "),
+    ],
+)
+async def test_a_behavior_is_rejected_with_what_of_its_vehicle_never_comes(
+    ros_domain: int,
+    monkeypatch: pytest.MonkeyPatch,
+    there: str,
+    settings: Mapping[str, Any],
+    missing: str,
+) -> None:
+    monkeypatch.setattr(vehicle, "FOUND_WITHIN_S", 0.5 if not there else 4.0)
+    async with AsyncExitStack() as stack:
+        if there:
+            await stack.enter_async_context(late(ros_domain, there))
+        bench, truth = await stack.enter_async_context(connected(ros_domain, **settings))
+        await bench.start("r1.b1", "goto", UGV1, target=ahead())
+        end = await bench.ended("r1.b1", AMPLE_S)
+        assert (end.state, end.code) == (BehaviorState.REJECTED, "REJECTED")
+        assert re.match(r"not discovered within [\d.]+ s: " + re.escape(missing), end.reason)
+        assert truth.begun() == 0
+
+
+async def test_a_behavior_that_waits_can_be_cancelled(
+    ros_domain: int, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(vehicle, "FOUND_WITHIN_S", AMPLE_S)
+    async with connected(ros_domain) as (bench, truth):
+        await bench.start("r1.b1", "goto", UGV1, target=ahead())
+        await until(lambda: "r1.b1 waits for" in caplog.text)
+        await bench.arbiter.cancel("r1.b1", 1)
+        assert (await bench.ended("r1.b1", AMPLE_S)).state is BehaviorState.CANCELLED
+        async with late(ros_domain, "node"):
+            await drives(bench, truth, "r1.b2")
+            assert truth.begun() == 1
+
+
+async def test_a_vehicle_that_is_held_before_it_comes_does_not_drive(
+    ros_domain: int, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(vehicle, "FOUND_WITHIN_S", AMPLE_S)
+    async with connected(ros_domain, driver="base") as (bench, truth):
+        await bench.start("r1.b1", "goto", UGV1, target=ahead())
+        await until(lambda: "r1.b1 waits for" in caplog.text)
+        await bench.arbiter.hold(UGV1)
+        async with late(ros_domain, "base"):
+            await bench.running("r1.b1", AMPLE_S)
+            assert truth.begun() == 0
+            await bench.arbiter.resume(UGV1)
+            await until(lambda: truth.speed() > 0.3)
 
 
 # --- one that returns -----------------------------------------------------------------------------

@@ -6,7 +6,7 @@ call counts: they are called repeatedly while a target or the vehicle moves.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from m2pem.api import ArbiterContext, Connection
 from m2pem_plugin_ptz.gimbal import CapturedImage, PanTiltZoom, Reach
@@ -96,4 +96,13 @@ class CameraDriver(Protocol):
 
     async def close(self) -> None:
         """Disconnect. The camera stays as it is."""
+        ...
+
+
+@runtime_checkable
+class Discovering(Protocol):
+    """A driver whose camera is discovered: what is sent before is dropped."""
+
+    def missing(self, behavior: str) -> str:
+        """Return what of the camera a behavior needs that is not there yet; "" if nothing is."""
         ...

@@ -8,7 +8,7 @@ again.
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
-from typing import TYPE_CHECKING, Protocol, cast
+from typing import TYPE_CHECKING, Protocol, cast, runtime_checkable
 from uuid import UUID
 
 from m2pem.api import (
@@ -160,6 +160,17 @@ class Driver(Protocol):
 
     async def close(self) -> None:
         """Disconnect. The vehicle goes on with what it does, if it can without a connection."""
+        ...
+
+
+@runtime_checkable
+class Discovering(Protocol):
+    """A driver whose vehicle is discovered: DDS drops what is published to a subscriber that it has
+    not matched yet."""
+
+    def missing(self, request: BehaviorRequest) -> str:
+        """Return what of the vehicle a request needs that is not discovered yet; "" if nothing
+        is."""
         ...
 
 

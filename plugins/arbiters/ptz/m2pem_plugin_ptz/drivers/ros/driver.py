@@ -167,11 +167,17 @@ class RosDriver:
     def refusal(self, behavior: str) -> str:
         if self._ros is None or self._images is None:
             return NOT_OPEN
+        if behavior == "zoom" and not self._settings.joints.zooms:
+            return "the fleet names no joint that zooms (connection.joints.zoom)"
+        return ""
+
+    def missing(self, behavior: str) -> str:
+        """Return which topic of the camera is not there yet."""
+        if self._ros is None or self._images is None:
+            return NOT_OPEN
         if behavior in ("take_picture", "record_video"):
             is_there = self._images.has_publisher
             return "" if is_there else f"no publisher of images on {self._images.topic}"
-        if behavior == "zoom" and not self._settings.joints.zooms:
-            return "the fleet names no joint that zooms (connection.joints.zoom)"
         if self.ptz is None:
             return self._missing_joints()
         if not self._ros.node.count_subscribers(self._settings.command_topic):

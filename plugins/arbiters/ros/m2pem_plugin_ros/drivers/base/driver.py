@@ -97,6 +97,14 @@ class BaseDriver:
 
     # --- orders ---------------------------------------------------------------------------------
 
+    def missing(self, request: BehaviorRequest) -> str:
+        """Return which topic of the base is not there yet."""
+        del request
+        where, settings = self._setup.localization, self._setup.settings
+        if where.pose is None and not where.wrong_frame:
+            return f"odometry on {settings.topic(settings.topics.odom)}"
+        return "" if self._commands.is_subscribed else f"a subscriber to {self._commands.name}"
+
     def refusal(self, request: BehaviorRequest) -> str:
         """Return why a plain base cannot do the request, or not from where it is; "" if it can."""
         if wrong := self._setup.localization.wrong_frame:

@@ -29,6 +29,11 @@ class CommandTopic:
     def name(self) -> str:
         return str(self._publisher.topic_name)
 
+    @property
+    def is_subscribed(self) -> bool:
+        """Whether a subscriber gets the commands."""
+        return bool(self._publisher.get_subscription_count())
+
     def send(self, twist: Twist) -> None:
         velocity = geometry_msgs.msg.Twist()
         velocity.linear.x = twist.forward_m_s

@@ -15,7 +15,13 @@ from m2pem_plugin_ros.drivers.driver import DriverSetup, Health, Order, Outcome
 from m2pem_plugin_ros.drivers.nav2.client import Nav2
 from m2pem_plugin_ros.drivers.nav2.errors import NavigationError, taken_over
 from m2pem_plugin_ros.drivers.nav2.goal_client import number_of
-from m2pem_plugin_ros.drivers.nav2.tasks import CANCELLED_THERE, TASKS, Nav2Task, TaskContext
+from m2pem_plugin_ros.drivers.nav2.tasks import (
+    CANCELLED_THERE,
+    TASKS,
+    Nav2GoalTask,
+    Nav2Task,
+    TaskContext,
+)
 from m2pem_plugin_ros.runtime import RosError
 from m2pem_plugin_ros.sensors.localization import stands
 
@@ -101,6 +107,20 @@ class Nav2Driver:
         except NavigationError as error:
             return error.reason
         return (self._nav2.problem if task.needs_nav2 else "") or task.refusal()
+
+    def missing(self, request: BehaviorRequest) -> str:
+        """Return which service or action of Nav2 is not there yet."""
+        nav2 = self._nav2
+        if nav2 is None or (request.behavior in TASKS and not TASKS[request.behavior].needs_nav2):
+            return ""
+        if not nav2.state:
+            return f"an answer of the service {nav2.state_service}"
+        try:
+            task = self._make_task(nav2, Order(request, UUID(int=0), UUID(int=0)))
+        except (KeyError, NavigationError):
+            return ""  # a query without its parameters, or a refusal
+        client = task.client if isinstance(task, Nav2GoalTask) else None
+        return "" if client is None or client.there else f"the action {client.name}"
 
     # --- orders ---------------------------------------------------------------------------------
 

@@ -75,6 +75,11 @@ class ActionLink:
     def order(self) -> Order | None:
         return self._current.order if self._current is not None else None
 
+    @property
+    def missing(self) -> str:
+        """The services of the action that are not discovered; "" if all are."""
+        return self._client.missing
+
     # --- orders ---------------------------------------------------------------------------------
 
     def begin(self, order: Order) -> None:
@@ -377,6 +382,12 @@ class GoalClient:
         ros.subscribe(
             parts.FeedbackMessage, f"{name}/_action/feedback", self._on_feedback, qos.COMMANDS
         )
+
+    @property
+    def missing(self) -> str:
+        services = (self._send, self._result, self._cancel)
+        names = [str(each.srv_name) for each in services if not each.service_is_ready()]
+        return f"the service {' and '.join(names)}" if names else ""
 
     async def send(self, goal: UUID, command: Any, timeout_s: float) -> bool:
         """Send a goal, and return whether it was accepted. A goal that the node has already is not

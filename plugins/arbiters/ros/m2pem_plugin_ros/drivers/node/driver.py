@@ -87,6 +87,18 @@ class NodeDriver:
             return str(error)
         return ""
 
+    def missing(self, request: BehaviorRequest) -> str:
+        """Return which topic, service or message of the node is not there yet."""
+        del request
+        if self._status is None:
+            return f"a message on {self._name('vehicle_status')}"
+        if isinstance(self._link, ActionLink):
+            return self._link.missing
+        node, answers = self._setup.ros.node, self._name("behavior_status")
+        if not self._publisher.get_subscription_count():
+            return f"a subscriber to {self._name('command')}"
+        return "" if node.count_publishers(answers) else f"a publisher of {answers}"
+
     # --- orders ---------------------------------------------------------------------------------
 
     def begin(self, order: Order) -> None:
