@@ -166,9 +166,7 @@ def why_unsupported(own: OwnBehavior, version: str, factsheet: Factsheet | None)
     action, scope = own.action, own.scope.value
     if factsheet is not None:
         listed = factsheet.action(action)
-        if listed is None:
-            return f"the vehicle's factsheet has no action {action}"
-        if scope.upper() not in listed.action_scopes:
+        if listed is None or scope.upper() not in listed.action_scopes:
             return f"the vehicle's factsheet has no {scope} action {action}"
         return ""
     if action not in PREDEFINED:

@@ -329,14 +329,9 @@ class Headers:
         self._next: dict[str, int] = {}
 
     @property
-    def version(self) -> str:
-        """The version that the headers say."""
-        return self._fixed["version"]
-
-    @property
     def is_2_0(self) -> bool:
         """Whether the version is 2.0, whose schemas spell two fields otherwise than its text."""
-        return self.version.startswith("2.0.")
+        return self._fixed["version"].startswith("2.0.")
 
     def of(self, topic: str, time_us: int) -> dict[str, Any]:
         """Return the fields of the next header on a topic."""

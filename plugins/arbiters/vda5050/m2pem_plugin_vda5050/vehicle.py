@@ -168,7 +168,7 @@ class Vehicle:
         state = decode(payload, State)
         if not state.version.startswith("2."):
             raise MessageError(f"its version is {text_of(state.version, 20)}, not 2.x")
-        ours = self._headers.version
+        ours = self.settings.version
         if self._state is None and state.version.split(".")[:2] != ours.split(".")[:2]:
             version = text_of(state.version, 20)
             self._logger.warning(
@@ -527,7 +527,7 @@ class Vehicle:
         return OrderTask(setup, lambda state: self._plan(setup, own, state), self._progress_of)
 
     def _progress_of(self, plan: OrderPlan) -> OrderProgress:
-        factsheet = self._known_factsheet
+        factsheet = self._factsheet or self.settings.factsheet
         most = None if factsheet is None else factsheet.most_nodes
         return OrderProgress(plan, self.settings.released_nodes, most)
 
@@ -597,15 +597,11 @@ class Vehicle:
         )
         return (() if is_whole else None), False
 
-    @property
-    def _known_factsheet(self) -> Factsheet | None:
-        return self._factsheet or self.settings.factsheet
-
     def _not_taken(self, own: OwnBehavior, request: BehaviorRequest) -> str:
         """Return why the vehicle would refuse an action, by its factsheet or by the version that
         it speaks; "" if it would not."""
         version = self.settings.version if self._state is None else self._state.version
-        factsheet = self._known_factsheet
+        factsheet = self._factsheet or self.settings.factsheet
         if reason := why_unsupported(own, version, factsheet):
             return reason
         sent = _action_values(own, request.parameters)

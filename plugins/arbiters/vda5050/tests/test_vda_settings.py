@@ -283,7 +283,9 @@ def test_a_factsheet_says_which_parameters_its_vehicle_requires(tmp_path: Path) 
         for own in settings.own_behaviors
     }
     assert (required["pick"], required["drop"]) == ({"loadType", "lhd"}, set())
-    with pytest.raises(PluginError, match="the vehicle's factsheet has no action startCharging"):
+    with pytest.raises(
+        PluginError, match="the vehicle's factsheet has no node action startCharging"
+    ):
         read(factsheet=str(file), own_behaviors={"startCharging": None})
 
 

@@ -1,1 +1,1 @@
-"""The formats of `m2pem export`: csv, parquet, geojson, kml, xes, mcap, rosbag2 (docs/recording.md)."""
+"""The formats of `m2pem export` (docs/recording.md)."""

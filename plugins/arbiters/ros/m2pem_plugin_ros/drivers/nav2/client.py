@@ -71,11 +71,6 @@ class Nav2:
     # --- state ---------------------------------------------------------------------------------
 
     @property
-    def state_service(self) -> str:
-        """The name of the service that says whether Nav2 is active."""
-        return str(self._get_state.srv_name)
-
-    @property
     def is_active(self) -> bool:
         """Whether Nav2 accepts goals."""
         return not self.problem

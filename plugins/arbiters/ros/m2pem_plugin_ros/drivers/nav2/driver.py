@@ -114,7 +114,8 @@ class Nav2Driver:
         if nav2 is None or (request.behavior in TASKS and not TASKS[request.behavior].needs_nav2):
             return ""
         if not nav2.state:
-            return f"an answer of the service {nav2.state_service}"
+            name = self._setup.settings.topic("bt_navigator/get_state")
+            return f"an answer of the service {name}"
         try:
             task = self._make_task(nav2, Order(request, UUID(int=0), UUID(int=0)))
         except (KeyError, NavigationError):
