@@ -26,7 +26,12 @@ from m2pem.api import (
 from m2pem_plugin_ptz.catalogue import offered
 from m2pem_plugin_ptz.checkpoint import Checkpoint, decode_checkpoint, encode_checkpoint
 from m2pem_plugin_ptz.drivers import make_driver as _make_driver
-from m2pem_plugin_ptz.drivers.driver import CameraDriver, DriverSetup
+from m2pem_plugin_ptz.drivers.driver import (
+    FOUND_WITHIN_S,
+    CameraDriver,
+    Discovering,
+    DriverSetup,
+)
 from m2pem_plugin_ptz.settings import read_settings
 
 if TYPE_CHECKING:
@@ -261,6 +266,8 @@ class PtzArbiter:
         camera, clock = self._cameras[resource], self._context.clock
         bound_us = self.limits(resource).lost_after_s * 1e6
         began_us = last_us = clock.now_us()
+        loop = asyncio.get_running_loop()
+        found_by_s = loop.time() + FIRST_CONTACT_WITHIN_S + FOUND_WITHIN_S
         was_late = False
         while True:
             now_us = clock.now_us()
@@ -270,7 +277,8 @@ class PtzArbiter:
             silent_us = now_us - (
                 began_us if camera.last_contact_us is None else camera.last_contact_us
             )
-            is_awaited = camera.is_awaited and camera.last_contact_us is None
+            is_young = isinstance(camera.driver, Discovering) and loop.time() < found_by_s
+            is_awaited = camera.last_contact_us is None and (camera.is_awaited or is_young)
             lost = silent_us >= bound_us and not (late or is_awaited)
             if lost and self._tracker.holder(resource) is not None:
                 camera.drop()

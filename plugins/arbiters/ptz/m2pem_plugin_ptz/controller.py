@@ -17,13 +17,10 @@ from m2pem_plugin_ptz.behaviors.behavior import (
     BehaviorFailedError,
 )
 from m2pem_plugin_ptz.camera_model.model import CameraModel
-from m2pem_plugin_ptz.drivers.driver import CameraError, Discovering
+from m2pem_plugin_ptz.drivers.driver import FOUND_WITHIN_S, CameraError, Discovering
 
 STOP_SHARE = 0.8
 """A stop that takes more than this part of the cancel timeout has failed."""
-
-FOUND_WITHIN_S = 10.0
-"""A behavior waits so long for what is not discovered of its camera, in real time."""
 
 _POLL_S = 0.1
 

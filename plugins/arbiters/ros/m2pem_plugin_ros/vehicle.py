@@ -114,6 +114,7 @@ class Vehicle:
         self._adopted = False
         self._cancelled: BehaviorId = ""
         self._waiting: BehaviorId = ""
+        self._found_by_s = 0.0
         self._is_held = False
         self._broken = ""
         self._checked_s = 0.0
@@ -172,9 +173,11 @@ class Vehicle:
         name, missing = awaited.request.id, self._missing(awaited.request)
         self._context.logger.warning("%s: %s waits for %s", self.resource, name, missing)
         missing = await self._until_found(awaited.request, FOUND_WITHIN_S)
-        if (awaited := order()) is None:
+        awaited = order()
+        if self._waiting == name:
+            self._waiting = ""
+        if awaited is None:
             return  # it was cancelled or replaced, or the vehicle is lost
-        self._waiting = ""
         late = f"not discovered within {FOUND_WITHIN_S:g} s: {missing}" if missing else ""
         if reason := late or self.refusal(awaited.request):
             self._order = None
@@ -419,8 +422,9 @@ class Vehicle:
     # --- time -----------------------------------------------------------------------------------
 
     def listen_from_now(self) -> None:
-        """Count the silence of the vehicle from now on."""
+        """Count the silence of the vehicle from now on; the time for its discovery, too."""
         self._last_contact_us = self._context.clock.now_us()
+        self._found_by_s = asyncio.get_running_loop().time() + FOUND_WITHIN_S
 
     def attend(self, *, may_lose: bool) -> VehicleState | PayloadState | None:
         """Check the vehicle, and return its new state; None if nothing has changed.
@@ -434,11 +438,13 @@ class Vehicle:
         holder = self.doing
         if holder is not None and not is_silent:
             self._report_left(holder)
+        # To the executive, LOST is the end of a behavior, also of one that waits.
+        is_young = asyncio.get_running_loop().time() < self._found_by_s
+        is_awaited = not self._contacts and (is_young or self._waiting != "")
         if not self._contacts:
-            self.link = LinkState.LOST
+            self.link = LinkState.DEGRADED if is_awaited else LinkState.LOST
         elif may_lose or not is_silent:
             self.link = link_state(silent_s, bound_s)
-        is_awaited = holder is not None and holder == self._waiting and not self._contacts
         if is_silent and may_lose and holder is not None and not is_awaited:
             self._lose(holder, silent_s)
             holder = None
@@ -453,7 +459,7 @@ class Vehicle:
         )
         unchanged = (self.link, self._refusal)
         still_lost = self.link is LinkState.LOST and self._reported[2::2] == unchanged
-        if still_lost or news == self._reported:
+        if still_lost or (news == self._reported and not is_awaited):
             return None
         self._reported = news
         behavior = self._order.request.behavior if self._order else ""

@@ -12,6 +12,9 @@ from m2pem.api import ArbiterContext, Connection
 from m2pem_plugin_ptz.gimbal import CapturedImage, PanTiltZoom, Reach
 from m2pem_plugin_ptz.settings import Settings
 
+FOUND_WITHIN_S = 10.0
+"""A behavior waits so long for what is not discovered of its camera, in real time."""
+
 
 class CameraError(Exception):
     """The camera refused, or did not answer; operators read the text. `code` is the error code for
