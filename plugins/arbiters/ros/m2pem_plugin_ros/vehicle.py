@@ -478,7 +478,14 @@ class Vehicle:
         """Return what of the vehicle is not discovered yet, and needed; "" if nothing is."""
         if not (self._contacts or self.is_listed):
             return self.absence
-        return self.driver.missing(request) if isinstance(self.driver, Discovering) else ""
+        if not isinstance(self.driver, Discovering):
+            return ""
+        for value in request.parameters.values():
+            if isinstance(value, VehiclePosition):
+                target = self._context.bus.latest(ResourceId(value.vehicle))
+                if not isinstance(target, VehicleState) or target.position is None:
+                    return f"a position of {value.vehicle}"
+        return self.driver.missing(request)
 
     def _is_to_be_found(self, request: BehaviorRequest) -> bool:
         """Whether a request has to wait. One for a vehicle that was received, and is silent now,

@@ -24,9 +24,11 @@ from m2pem.api import (
     ArbiterContext,
     BehaviorState,
     Connection,
+    GeoPosition,
     Point,
     ResourceId,
     RunStatus,
+    VehiclePosition,
     VehicleState,
 )
 from m2pem.api.clock import SystemClock
@@ -163,6 +165,8 @@ async def test_a_behavior_waits_for_a_vehicle_that_comes_late(
         await until(lambda: "ugv1: r1.b1 waits for /ugv1/" in caplog.text)
         async with late(ros_domain, kind):
             await bench.running("r1.b1", AMPLE_S)
+            # To the executive, a lost link would have been its end.
+            assert "lost" not in {state.link for state in bench.states}
             if kind != "action":
                 await until(lambda: truth.speed() > 0.3)
                 assert truth.begun() == 1
@@ -195,6 +199,22 @@ async def test_a_behavior_is_rejected_with_what_of_its_vehicle_never_comes(
         assert (end.state, end.code) == (BehaviorState.REJECTED, "REJECTED")
         assert re.match(r"not discovered within [\d.]+ s: " + re.escape(missing), end.reason)
         assert truth.begun() == 0
+
+
+async def test_a_behavior_waits_for_the_position_of_its_target(
+    ros_domain: int, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(vehicle, "FOUND_WITHIN_S", AMPLE_S)
+    bus, place = Bus(), GeoPosition(38.1085, -77.3192, 60.0)
+    async with late(ros_domain, "base"):
+        arbiter = arbiter_for(ros_domain, bus, driver="base")
+        async with ArbiterHarness(arbiter, SystemClock()) as bench:
+            target = VehiclePosition("ugv2")
+            await bench.start("r1.b1", "goto", UGV1, target=target)
+            await until(lambda: "r1.b1 waits for a position of ugv2" in caplog.text)
+            now_us = SystemClock().now_us()
+            bus.publish(VehicleState(ResourceId("ugv2"), now_us, place))
+            await bench.running("r1.b1", AMPLE_S)
 
 
 async def test_a_behavior_that_waits_can_be_cancelled(
