@@ -424,7 +424,8 @@ class Vehicle:
     def listen_from_now(self) -> None:
         """Count the silence of the vehicle from now on; the time for its discovery, too."""
         self._last_contact_us = self._context.clock.now_us()
-        self._found_by_s = asyncio.get_running_loop().time() + FOUND_WITHIN_S
+        if isinstance(self.driver, Discovering):
+            self._found_by_s = asyncio.get_running_loop().time() + FOUND_WITHIN_S
 
     def attend(self, *, may_lose: bool) -> VehicleState | PayloadState | None:
         """Check the vehicle, and return its new state; None if nothing has changed.
