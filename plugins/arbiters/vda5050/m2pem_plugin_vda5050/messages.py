@@ -13,7 +13,7 @@ import msgspec
 from msgspec import UNSET, Meta, Struct, UnsetType
 
 VERSION = "2.1.0"
-SPOKEN = "m2pem speaks VDA 5050 2.0 and 2.1, and nothing of version 3"
+SPOKEN = "m2pem speaks 2.0 and 2.1 alone"
 LARGEST_MESSAGE = 4 << 20
 """In bytes. Larger messages are not read."""
 

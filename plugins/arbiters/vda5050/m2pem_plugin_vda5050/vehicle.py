@@ -168,12 +168,12 @@ class Vehicle:
         state = decode(payload, State)
         if not state.version.startswith("2."):
             raise MessageError(f"its version is {text_of(state.version, 20)}, not 2.x")
-        ours = self.settings.version
-        if self._state is None and state.version.split(".")[:2] != ours.split(".")[:2]:
+        expected = self.settings.version
+        if self._state is None and state.version.split(".")[:2] != expected.split(".")[:2]:
             version = text_of(state.version, 20)
             self._logger.warning(
                 "%s: it speaks VDA 5050 %s, and the fleet's `version` is %s: write `version: %s`",
-                *(self.resource, version, ours, version),
+                *(self.resource, version, expected, version),
             )
         if state.serial_number != self.settings.serial_number:
             raise MessageError(f"it is of the vehicle {text_of(state.serial_number, 60)!r}")
@@ -211,8 +211,8 @@ class Vehicle:
     def _note_other_version(self, version: str) -> None:
         if version and self._state is None and not self._other_version:
             self._other_version = (
-                f"it speaks VDA 5050 {text_of(version, 20)}: {SPOKEN}, such as its state, actions, "
-                "zones and responses. Let it speak 2.1"
+                f"it speaks VDA 5050 {text_of(version, 20)}: {SPOKEN}, reads no state and sends no "
+                "order, action, zone or response of other versions; let it speak 2.1"
             )
             self._logger.warning("%s: %s", self.resource, self._other_version)
 
