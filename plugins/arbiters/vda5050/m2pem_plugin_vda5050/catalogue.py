@@ -107,16 +107,6 @@ PREDEFINED: Mapping[str, Mapping[str, Any]] = {
         "doc": "Tell the vehicle where it is on its map.",
     },
     "enableMap": {"parameters": _MAP, "action": {"scope": "instant"}, "doc": "Use a map."},
-    "downloadMap": {
-        "parameters": {**_MAP, "mapDownloadLink": _REQUIRED_TEXT, "mapHash": "text"},
-        "action": {"scope": "instant"},
-        "doc": "Load a map onto the vehicle.",
-    },
-    "deleteMap": {
-        "parameters": _MAP,
-        "action": {"scope": "instant"},
-        "doc": "Remove a map from the vehicle.",
-    },
     "logReport": {
         "parameters": {"reason": _REQUIRED_TEXT},
         "action": {"scope": "instant"},
@@ -129,7 +119,7 @@ The row of `drop` calls `stationType` and `loadType` optional and refers to `pic
 them; there are vehicles that refuse a `drop` without. In version 3.0 both are optional for both.
 """
 
-_NEW_IN_2_1 = ("enableMap", "downloadMap", "deleteMap")
+_NEW_IN_2_1 = ("enableMap",)
 _ANY_SCOPE = ("startCharging", "stopCharging", "finePositioning", "initPosition", "enableMap")
 
 _ENDLESS = (ParameterKind.AREA, ParameterKind.VEHICLE, ParameterKind.OFFSETS)

@@ -244,8 +244,6 @@ def test_a_factsheet_offers_its_actions(tmp_path: Path) -> None:
         ("waitForTrigger", {"triggerType"}),
         ("initPosition", {"x", "y", "theta", "mapId", "lastNodeId"}),
         ("enableMap", {"mapId", "mapVersion"}),
-        ("downloadMap", {"mapId", "mapVersion", "mapDownloadLink"}),
-        ("deleteMap", {"mapId", "mapVersion"}),
         ("logReport", {"reason"}),
     ],
 )
