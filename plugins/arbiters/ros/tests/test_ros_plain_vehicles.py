@@ -14,6 +14,7 @@ from uuid import UUID
 import pytest
 from m2pem_plugin_ros import vehicle
 from m2pem_plugin_ros.arbiter import RosArbiter
+from m2pem_plugin_ros.checkpoint import Checkpoint, encode_checkpoint
 from m2pem_plugin_ros.frames import to_geodetic
 from m2pem_plugin_ros.runtime import RosRuntime, qos
 from m2pem_plugin_ros.sensors.graph import NAMELESS
@@ -215,6 +216,19 @@ async def test_a_behavior_waits_for_the_position_of_its_target(
             now_us = SystemClock().now_us()
             bus.publish(VehicleState(ResourceId("ugv2"), now_us, place))
             await bench.running("r1.b1", AMPLE_S)
+
+
+async def test_a_query_after_a_restart_waits_for_a_vehicle_that_comes_late(
+    ros_domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(vehicle, "ASKED_WITHIN_S", AMPLE_S)
+    reference = encode_checkpoint(Checkpoint((UGV1,), "goto", 1, {"target": ahead()}))
+    async with connected(ros_domain) as (bench, _):
+        asked = asyncio.create_task(bench.arbiter.query("r1.b1", reference))
+        async with late(ros_domain, "node"):
+            found = await asyncio.wait_for(asked, AMPLE_S)
+        assert found.state is BehaviorState.UNKNOWN
+        assert found.reason == "the vehicle's node was restarted and does not have the behavior"
 
 
 async def test_a_behavior_that_waits_can_be_cancelled(

@@ -289,7 +289,7 @@ def test_a_factsheet_says_which_parameters_its_vehicle_requires(tmp_path: Path) 
 
 def test_a_factsheet_of_version_3_is_refused_by_its_version(tmp_path: Path) -> None:
     file = tmp_path / "factsheet.json"
-    features = {"protocolFeatures": {"mobileRobotActions": []}}
+    features: dict[str, Any] = {"protocolFeatures": {"mobileRobotActions": []}}
     file.write_text(json.dumps({"version": "3.0.0", **features}), encoding="utf-8")
     with pytest.raises(
         PluginError, match=r"factsheet: .* is one of VDA 5050 3\.0\.0: m2pem speaks"
@@ -302,7 +302,7 @@ def test_a_check_names_the_task_that_lacks_what_the_version_requires(tmp_path: P
     fleet = write_fleet(tmp_path / "fleet.yaml", {"agv1": {**LEAST, **own}})
     mission = tmp_path / "mission.bpmn"
     load = {"stationType": "floor", "loadType": "EPAL"}
-    tasks = (("pick", load), ("pick", {"loadType": "EPAL"}), ("drop", {}))
+    tasks: Any = (("pick", load), ("pick", {"loadType": "EPAL"}), ("drop", {}))
     mission.write_bytes(scenarios.one_after_another("agv1", *tasks))
     line = CommandLine(tmp_path, child_environment(tmp_path))
     status, out, err = line.run("check", mission, "--fleet", fleet)
