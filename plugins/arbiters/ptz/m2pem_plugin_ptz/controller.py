@@ -144,7 +144,9 @@ class CameraController:
         driver, name, loop = self.driver, task.behavior.name, asyncio.get_running_loop()
         if not isinstance(driver, Discovering) or not (missing := driver.missing(name)):
             return
-        self._logger.warning("%s: %s waits: %s", self.model.resource, task.id, missing)
+        self._logger.warning(
+            "%s: %s waits: not discovered yet: %s", self.model.resource, task.id, missing
+        )
         end_s, self.is_awaited = loop.time() + FOUND_WITHIN_S, True
         try:
             while missing := driver.missing(name):

@@ -171,7 +171,9 @@ class Vehicle:
         if awaited is None:
             return
         name, missing = awaited.request.id, self._missing(awaited.request)
-        self._context.logger.warning("%s: %s waits for %s", self.resource, name, missing)
+        self._context.logger.warning(
+            "%s: %s waits: not discovered yet: %s", self.resource, name, missing
+        )
         missing = await self._until_found(awaited.request, FOUND_WITHIN_S)
         awaited = order()
         if self._waiting == name:

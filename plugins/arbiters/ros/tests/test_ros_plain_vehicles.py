@@ -163,7 +163,7 @@ async def test_a_behavior_waits_for_a_vehicle_that_comes_late(
     monkeypatch.setattr(vehicle, "FOUND_WITHIN_S", AMPLE_S)
     async with connected(ros_domain, **settings) as (bench, truth):
         await bench.start("r1.b1", "goto", UGV1, target=ahead())
-        await until(lambda: "ugv1: r1.b1 waits for /ugv1/" in caplog.text)
+        await until(lambda: "ugv1: r1.b1 waits: not discovered yet: " in caplog.text)
         async with late(ros_domain, kind):
             await bench.running("r1.b1", AMPLE_S)
             # To the executive, a lost link would have been its end.
@@ -212,7 +212,9 @@ async def test_a_behavior_waits_for_the_position_of_its_target(
         async with ArbiterHarness(arbiter, SystemClock()) as bench:
             target = VehiclePosition("ugv2")
             await bench.start("r1.b1", "goto", UGV1, target=target)
-            await until(lambda: "r1.b1 waits for a position of ugv2" in caplog.text)
+            await until(
+                lambda: "r1.b1 waits: not discovered yet: a position of ugv2" in caplog.text
+            )
             now_us = SystemClock().now_us()
             bus.publish(VehicleState(ResourceId("ugv2"), now_us, place))
             await bench.running("r1.b1", AMPLE_S)
@@ -237,7 +239,7 @@ async def test_a_behavior_that_waits_can_be_cancelled(
     monkeypatch.setattr(vehicle, "FOUND_WITHIN_S", AMPLE_S)
     async with connected(ros_domain) as (bench, truth):
         await bench.start("r1.b1", "goto", UGV1, target=ahead())
-        await until(lambda: "r1.b1 waits for" in caplog.text)
+        await until(lambda: "r1.b1 waits: " in caplog.text)
         await bench.arbiter.cancel("r1.b1", 1)
         assert (await bench.ended("r1.b1", AMPLE_S)).state is BehaviorState.CANCELLED
         async with late(ros_domain, "node"):
@@ -251,7 +253,7 @@ async def test_a_vehicle_that_is_held_before_it_comes_does_not_drive(
     monkeypatch.setattr(vehicle, "FOUND_WITHIN_S", AMPLE_S)
     async with connected(ros_domain, driver="base") as (bench, truth):
         await bench.start("r1.b1", "goto", UGV1, target=ahead())
-        await until(lambda: "r1.b1 waits for" in caplog.text)
+        await until(lambda: "r1.b1 waits: " in caplog.text)
         await bench.arbiter.hold(UGV1)
         async with late(ros_domain, "base"):
             await bench.running("r1.b1", AMPLE_S)
