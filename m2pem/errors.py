@@ -59,7 +59,7 @@ class ExpressionSyntaxError(M2pemError):
         self.message = message
         self.text = text
         self.position = position
-        super().__init__(f"{message} at column {position + 1} of {text!r}")
+        super().__init__(f"{message} at column {position + 1} of {text!r}" if text else message)
 
 
 class ExpressionError(M2pemError):

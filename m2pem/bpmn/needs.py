@@ -6,7 +6,7 @@ from typing import Literal
 
 from m2pem.bpmn.context import ReadingContext
 from m2pem.bpmn.rules.behaviors import ROLE_NEED
-from m2pem.errors import ExpressionSyntaxError
+from m2pem.errors import ExpressionError, ExpressionSyntaxError
 from m2pem.mission.behavior import Need
 from m2pem.mission.expression import Expression
 from m2pem.mission.timers import duration_us
@@ -118,10 +118,9 @@ class NeedReader:
             return False
         limit = self._context.template(self._line, self._task, text)
         if limit is not None and limit.constant:
-            value = limit.evaluate(lambda _: None)
             try:
-                duration_us(value if isinstance(value, str) else str(value), 0)
-            except ExpressionSyntaxError as error:
+                duration_us(limit.evaluate(lambda _: None), 0)
+            except (ExpressionError, ExpressionSyntaxError) as error:
                 self._wrong(
                     f"wait='{text}': {error}",
                     f"write an ISO 8601 duration such as wait='PT10M', or wait='{UNLIMITED}'",

@@ -32,13 +32,9 @@ from m2pem.mission.events import (
     TimerKind,
 )
 from m2pem.mission.expression import Expression
-from m2pem.mission.expression.literals import describe
-from m2pem.mission.timers import cycle, date_us, duration_us, next_round
-
-
-class _NotATimeError(Exception):
-    """The expression of a timer gave a value that is not a time."""
-
+from m2pem.mission.expression.literals import shorten
+from m2pem.mission.timers import cycle, date_us, next_round, wait_us
+from m2pem.mission.values import Value
 
 # --- arming -------------------------------------------------------------------------------------
 
@@ -71,7 +67,7 @@ def arm(
         case TimerEventDefinition():
             try:
                 _arm_timer(x, holder, node, definition, since_us)
-            except (ExpressionError, ExpressionSyntaxError, _NotATimeError) as error:
+            except (ExpressionError, ExpressionSyntaxError) as error:
                 reason = f"timer of {node.id}: {error}"
                 if isinstance(holder, Token):
                     throw_error(x, holder, "EXPRESSION", reason, arming=not spent)
@@ -124,14 +120,17 @@ def due_after(
     Raises:
         ExpressionError, ExpressionSyntaxError: the value is no duration.
     """
-    text = expression.evaluate(reader(holder))
-    if not isinstance(text, str):
-        raise ExpressionError(
-            f"{expression.text!r} gives {describe(text)}, not an ISO 8601 duration"
-        )
+    length = _value(expression, holder)
     now_us = x.state.mission_time_us(x.now_us)
     begun_us = now_us if since_us is None else since_us
-    return begun_us + duration_us(text, x.now_us - (now_us - begun_us))
+    return begun_us + wait_us(length, x.now_us - (now_us - begun_us))
+
+
+def _value(expression: Expression, holder: TokenOrScope) -> Value:
+    value = expression.evaluate(reader(holder))
+    if value is None:
+        raise ExpressionError(f"{shorten(expression.text.strip())!r} gives null")
+    return value
 
 
 def _arm_timer(
@@ -147,19 +146,15 @@ def _arm_timer(
         due_us = due_after(x, holder, definition.expression, since_us)
         await_event(x, holder, node, Trigger.TIMER, due_us=due_us, armed_us=since_us)
         return
-    text = definition.expression.evaluate(reader(holder))
-    if not isinstance(text, str):
-        raise _NotATimeError(
-            f"{definition.expression.text!r} gives {describe(text)}, not an ISO 8601 time"
-        )
+    value = _value(definition.expression, holder)
     if definition.kind is TimerKind.DATE:
-        await_event(x, holder, node, Trigger.TIMER, due_us=date_us(text), calendar=True)
+        await_event(x, holder, node, Trigger.TIMER, due_us=date_us(value), calendar=True)
         return
-    rounds = cycle(text)
-    due_us, left = rounds.first(x.now_us)
+    rounds = cycle(value)
+    due_us, left, period = rounds.first(x.now_us)
     if not rounds.dated:
         due_us += x.state.mission_time_us(x.now_us) - x.now_us
-    await_event(x, holder, node, Trigger.TIMER, "", due_us, rounds.dated, left, rounds.period)
+    await_event(x, holder, node, Trigger.TIMER, "", due_us, rounds.dated, left, period)
 
 
 def arm_again(x: Execution, wait: Wait) -> None:
@@ -175,10 +170,9 @@ def arm_again(x: Execution, wait: Wait) -> None:
     due_us = wait.due_us + shift_us
     following = next_round(wait.cycle, due_us, now_us, wait.left, dated=wait.calendar)
     if following is not None:
-        next_us, left = following[0] - shift_us, following[1]
-        await_event(
-            x, holder, wait.node, Trigger.TIMER, "", next_us, wait.calendar, left, wait.cycle
-        )
+        due_us, left, period = following
+        next_us = due_us - shift_us
+        await_event(x, holder, wait.node, Trigger.TIMER, "", next_us, wait.calendar, left, period)
 
 
 # --- time ---------------------------------------------------------------------------------------

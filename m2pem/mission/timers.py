@@ -21,9 +21,9 @@ outage of the executive. The rounds of that time are caught up once, not one by 
 """
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta, tzinfo
-from typing import NoReturn
+from typing import NamedTuple, NoReturn
 
 import isodate
 from cronsim import CronSim, CronSimError
@@ -45,72 +45,126 @@ _DURATION = re.compile(
 _DATE = re.compile(r"([0-9]{4}-[0-9]{2}-[0-9]{2}|[0-9]{8})(T[0-9:.,]+(Z|[+-][0-9:]+)?)?")
 
 
-def duration_us(text: Value, at_us: int) -> int:
+def duration_us(value: Value, at_us: int) -> int:
     """The length of a duration (`PT30S`, `P1DT2H`, `PT0.5S`, `P2W`) that begins at `at_us`.
 
     Years and months are those of the calendar (UTC) from `at_us` on; where the month is too short
-    for the day, its last day counts. Rounded to a microsecond.
+    for the day, its last day counts. A number is seconds, as `duration()` gives them. Rounded to a
+    microsecond.
 
     Raises:
         ExpressionSyntaxError: no duration, a negative one, or one that ends after the year 9999.
     """
-    what = "a duration such as PT30S, PT0.5S or P1DT2H"
-    stripped = text_from(text, what)
-    if stripped.startswith("-"):
-        _refuse("a duration cannot be negative", stripped)
-    if not _DURATION.fullmatch(stripped):
-        _refuse(f"expected {what} (ISO 8601)", stripped)
     try:
         begin = _EPOCH + timedelta(microseconds=at_us)
-        end: datetime = begin + isodate.parse_duration(stripped)
+        if (seconds := _seconds(value)) is not None:
+            if seconds < 0:
+                _refuse("a duration cannot be negative", f"{seconds:g}")
+            return (begin + timedelta(seconds=seconds) - begin) // _MICROSECOND
+        return (_after(begin, _duration_text(value)) - begin) // _MICROSECOND
     except (ValueError, ArithmeticError):
-        _refuse("the duration ends after the year 9999", stripped)
-    return (end - begin) // _MICROSECOND
+        _refuse("the duration ends after the year 9999", str(value))
 
 
-def date_us(text: Value) -> int:
+def wait_us(value: Value, at_us: int) -> int:
+    """How long a timer waits, as `duration_us`; what is computed may be negative, and is over then:
+    it is due at once, as a date that has passed is.
+    """
+    if isinstance(value, str) and value.strip().startswith("-"):
+        duration_us(value.strip()[1:], at_us)
+        return 0
+    seconds = _seconds(value)
+    return 0 if seconds is not None and seconds < 0 else duration_us(value, at_us)
+
+
+def _seconds(value: Value) -> float | None:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return None
+    return float(value)
+
+
+def _duration_text(value: Value) -> str:
+    what = "a duration such as PT30S, PT0.5S or P1DT2H"
+    stripped = text_from(value, what, ", or a number of seconds")
+    if stripped.startswith("-"):
+        _refuse("a duration cannot be negative", stripped)
+    if not is_duration(stripped):
+        _refuse(f"expected {what} (ISO 8601)", stripped)
+    return stripped
+
+
+def is_duration(text: str) -> bool:
+    """Whether a text is an ISO 8601 duration without a sign."""
+    return _DURATION.fullmatch(text) is not None
+
+
+def _after(begin: datetime, period: str, rounds: int = 1) -> datetime:
+    """When so many periods from `begin` on are over. Months are counted from there, so that they
+    always end on its day, or where that is missing on the last one.
+    """
+    end: datetime = begin + rounds * isodate.parse_duration(period)
+    return end
+
+
+def date_us(value: Value) -> int:
     """The instant of a date and time (`2026-01-01T12:00:00Z`, `...+02:00`).
 
-    Without an offset it is UTC; without a time it is midnight.
+    Without an offset it is UTC; without a time it is midnight. A number is seconds since the Unix
+    epoch, as `date()` gives them.
 
     Raises:
         ExpressionSyntaxError: no date and time, or one that does not exist.
     """
-    what = "a date and time such as 2026-01-01T12:00:00Z"
-    stripped = text_from(text, what)
-    if not _DATE.fullmatch(stripped):
-        _refuse(f"expected {what} (ISO 8601)", stripped)
+    seconds = _seconds(value)
+    if seconds is None:
+        what = "a date and time such as 2026-01-01T12:00:00Z"
+        return (moment(text_from(value, what, ", or seconds since 1970")) - _EPOCH) // _MICROSECOND
     try:
-        if "T" in stripped:
-            instant: datetime = isodate.parse_datetime(stripped)
+        return (_EPOCH + timedelta(seconds=seconds) - _EPOCH) // _MICROSECOND
+    except (ValueError, ArithmeticError):
+        _refuse("the date is not in the years 1 to 9999", f"{seconds:g}")
+
+
+def moment(text: str) -> datetime:
+    """The date and time that a text says, with its offset (UTC where it has none).
+
+    Raises:
+        ExpressionSyntaxError: it says none, or one that does not exist.
+    """
+    what = "expected a date and time such as 2026-01-01T12:00:00Z (ISO 8601)"
+    if not _DATE.fullmatch(text):
+        _refuse(what, text)
+    try:
+        if "T" in text:
+            instant: datetime = isodate.parse_datetime(text)
         else:
-            instant = datetime.combine(isodate.parse_date(stripped), datetime.min.time())
-        if instant.tzinfo is None:
-            instant = instant.replace(tzinfo=UTC)
-        return (instant - _EPOCH) // _MICROSECOND
+            instant = datetime.combine(isodate.parse_date(text), datetime.min.time())
+        instant = instant if instant.tzinfo is not None else instant.replace(tzinfo=UTC)
+        instant - _EPOCH  # raises for an offset that no date has
     except (ValueError, ArithmeticError) as error:
-        _refuse(f"expected {what} (ISO 8601): {error}", stripped)
+        _refuse(f"{what}: {error}", text)
+    return instant
 
 
-def fixed_us(text: Value) -> int | None:
+def fixed_us(value: Value) -> int | None:
     """The length of a duration that is the same whenever it begins; None: it has months or years.
 
     Raises:
         ExpressionSyntaxError: as for `duration_us`.
     """
-    length_us = duration_us(text, 0)
-    days, _, _ = str(text).partition("T")
+    length_us = duration_us(value, 0)
+    days, _, _ = str(value).partition("T")
     return None if "Y" in days or "M" in days else length_us
 
 
-def text_from(value: Value, what: str) -> str:
+def text_from(value: Value, what: str, otherwise: str = "") -> str:
     """A value's text, without the space around it; `what` says what it should have been.
 
     Raises:
         ExpressionSyntaxError: it is none, or far too long.
     """
     if not isinstance(value, str):
-        _refuse(f"expected {what} (ISO 8601), not {describe(value)}", "")
+        _refuse(f"expected {what} (ISO 8601){otherwise}, not {describe(value)}", "")
     stripped = value.strip()
     if len(stripped) > _MAX_CHARACTERS:
         _refuse(f"expected {what} (ISO 8601)", stripped)
@@ -133,6 +187,7 @@ MACROS = {
     "@hourly": "0 * * * *",
 }
 _DAYS = ("SUN", "MON", "TUE", "WED", "THU", "FRI", "SAT")
+_DAY_NAMES = ("Sunday", "Monday", "Tuesday", "Wednesday", "Thursday", "Friday", "Saturday")
 _DAY = r"[0-9]+|SUN|MON|TUE|WED|THU|FRI|SAT"
 _DAY_TERM = re.compile(
     rf"(?P<first>{_DAY}|\*)(?:-(?P<last>{_DAY}))?(?:/(?P<step>[1-9][0-9]*))?"
@@ -215,6 +270,8 @@ def parse_cron(text: str) -> Cron:
             text, "give the day of the month or the day of the week, and '?' for the other"
         )
     words[-3] = day.replace("?", "*")
+    if len(words) == 5:
+        _five_fields(text, weekday)
     words[-1] = _weekdays(text, weekday, quartz) if len(words) == 6 else weekday.replace("?", "*")
     fields = " ".join(words)
     try:
@@ -226,6 +283,23 @@ def parse_cron(text: str) -> Cron:
 
 def _is_any(field: str) -> bool:
     return field == "?" or field.startswith("*")
+
+
+def _five_fields(text: str, field: str) -> None:
+    """Refuse days of the week that have another form in five fields, by what they mean."""
+    for term in field.split(","):
+        match = _DAY_TERM.fullmatch(term)
+        if match is None:
+            continue
+        if match["day"] in _DAYS and match["which"] == "L":
+            number = _DAYS.index(match["day"])
+            what = f"'{term}' is the last {_DAY_NAMES[number]} of the month"
+            raise _wrong(text, f"{what}: with five fields, write {number}L")
+        if match["first"] in _DAYS and match["last"] in _DAYS:
+            first, last = _DAYS.index(match["first"]), _DAYS.index(match["last"])
+            if first > last:
+                days = ",".join((*_DAYS, *_DAYS)[first : last + 8])
+                raise _wrong(text, f"'{term}' passes the end of the week: write {days}")
 
 
 def _weekdays(text: str, field: str, quartz: bool) -> str:
@@ -307,39 +381,62 @@ class Cycle:
     start_us: int | None
     period: str
     end_us: int | None = None
+    zone: tzinfo = field(default=UTC, compare=False)
+    """That of its start, in which months and years are counted."""
 
     @property
     def dated(self) -> bool:
         """Whether it is due at dates, not at mission times."""
         return self.start_us is not None or self.end_us is not None or is_cron(self.period)
 
-    def first(self, at_us: int) -> tuple[int, int]:
-        """When it is due first, if it is armed at `at_us`, and how often it fires after that (-1:
-        for ever). A date may have passed already: it is due at once then.
+    def first(self, at_us: int) -> "Round":
+        """When it is due first, if it is armed at `at_us`. A date may have passed already: it is
+        due at once then.
 
         Raises:
             ExpressionSyntaxError: that is after the year 9999, or no date of a cron text is left.
         """
         left = -1 if self.repetitions is None else self.repetitions - 1
         if self.start_us is not None:
-            return self.start_us, left
+            return Round(self.start_us, left, self._period(0, self.start_us))
         if self.end_us is not None:
             period_us = fixed_us(self.period)
             assert period_us is not None
             if left < 0:
                 left = max(0, self.end_us - at_us) // period_us
-            return self.end_us - left * period_us, left
+            return Round(self.end_us - left * period_us, left, self.period)
         if is_cron(self.period):
             due_us = parse_cron(self.period).after_us(at_us)
             if due_us is None:
                 _refuse("none of its dates is left", self.period)
-            return due_us, left
-        return at_us + duration_us(self.period, at_us), left
+            return Round(due_us, left, self.period)
+        return Round(at_us + duration_us(self.period, at_us), left, self._period(1, at_us))
+
+    def _period(self, number: int, start_us: int) -> str:
+        if fixed_us(self.period) is not None:
+            return self.period
+        start = (_EPOCH + timedelta(microseconds=start_us)).astimezone(self.zone)
+        return f"R{number}/{start.isoformat()}/{self.period}"
 
 
-def next_round(
-    period: str, due_us: int, at_us: int, left: int, *, dated: bool
-) -> tuple[int, int] | None:
+class Round(NamedTuple):
+    """A round of a cycle: when it is due, in microseconds since the Unix epoch, and how often the
+    cycle fires after it (-1: for ever).
+
+    `period`: by what the next one is found. It is the cycle's; one with months or years also has
+    the number of this round and the start, `R2/2026-01-31T12:00:00+00:00/P1M`: each round is that
+    many periods after the start, so that the 31st comes again after a shorter month.
+    """
+
+    due_us: int
+    left: int
+    period: str
+
+
+_COUNTED = re.compile(r"R([0-9]+)/([^/]+)/(P.+)")
+
+
+def next_round(period: str, due_us: int, at_us: int, left: int, *, dated: bool) -> Round | None:
     """The round after the one that was due at `due_us` and fires at `at_us`, as `Cycle.first`.
 
     It is the first one after `at_us`: those between have been missed, and the one that fires now
@@ -350,23 +447,30 @@ def next_round(
         return None
     if is_cron(period):
         found = parse_cron(period).after_us(max(due_us, at_us))
-        return None if found is None else (found, left)
-    length_us = fixed_us(period)
+        return None if found is None else Round(found, left, period)
     try:
-        if length_us is not None:
+        if counted := _COUNTED.fullmatch(period):
+            number, start, each = int(counted[1]), moment(counted[2]), counted[3]
+            begun, rounds, next_us = _after(start, each, number), 0, due_us
+            while next_us <= max(due_us, at_us):
+                rounds += 1
+                next_us = due_us + (_after(start, each, number + rounds) - begun) // _MICROSECOND
+            period = f"R{number + rounds}/{counted[2]}/{each}"
+        elif (length_us := fixed_us(period)) is not None:
             rounds = max(0, at_us - due_us) // length_us + 1
             next_us = due_us + rounds * length_us
-            duration_us("PT0S", next_us)
-        else:
+        else:  # of a journal that has no start yet
             rounds, next_us = 0, due_us
             while next_us <= max(due_us, at_us):
                 rounds, next_us = rounds + 1, next_us + duration_us(period, next_us)
-    except ExpressionSyntaxError:  # beyond the calendar: it never comes
-        return None
-    if left < 0:
-        return next_us, left
-    left -= rounds if dated else 1
-    return None if left < 0 else (next_us, left)
+        duration_us("PT0S", next_us)
+    except (ExpressionSyntaxError, ValueError, ArithmeticError):
+        return None  # beyond the calendar: it never comes
+    if left > 0:
+        left -= rounds if dated else 1
+        if left < 0:
+            return None
+    return Round(next_us, left, period)
 
 
 def cycle(text: Value) -> Cycle:
@@ -394,7 +498,8 @@ def cycle(text: Value) -> Cycle:
         if duration_us(first, 0) and fixed_us(first) is None:
             _refuse("counted back from an end, months and years have no one length", stripped)
     elif second.startswith("P"):
-        found = Cycle(repetitions, date_us(first), second)
+        start_us = date_us(first)
+        found = Cycle(repetitions, start_us, second, zone=moment(first.strip()).tzinfo or UTC)
     else:
         found = Cycle(repetitions, date_us(first), _between(date_us(first), date_us(second)))
     if duration_us(found.period, 0) == 0:

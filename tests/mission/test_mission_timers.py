@@ -1,8 +1,9 @@
 """Times of timers: durations, dates, cycles and cron texts."""
 
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 
 import pytest
+from dateutil.relativedelta import relativedelta
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -15,6 +16,7 @@ from m2pem.mission.timers import (
     fixed_us,
     next_round,
     parse_cron,
+    wait_us,
 )
 from tests.seeds import examples
 
@@ -81,7 +83,27 @@ def test_a_date_is_read(text, expected_us):
     assert date_us(text) == expected_us
 
 
-@pytest.mark.parametrize("value", [None, 30, 2.5, True, ["PT1S"]])
+@pytest.mark.parametrize(("seconds", "length_us"), [(30, 30_000_000), (2.5, 2_500_000), (0, 0)])
+def test_a_number_is_seconds(seconds, length_us):
+    assert duration_us(seconds, START_2026_US) == length_us
+    assert date_us(seconds) == length_us
+
+
+@pytest.mark.parametrize("number", [1e300, float("inf"), float("nan"), -1e18])
+@pytest.mark.parametrize("read", [lambda number: duration_us(number, 0), date_us])
+def test_a_number_that_is_no_time_is_refused(read, number):
+    with pytest.raises(ExpressionSyntaxError, match="9999|negative"):
+        read(number)
+
+
+def test_a_timer_whose_computed_duration_is_negative_waits_no_longer():
+    """As Camunda 8's timers: zero or negative fires at once."""
+    assert [wait_us(value, 0) for value in ("-PT5S", "-P1M", -0.5, 0, "PT1S")] == [0, 0, 0, 0, 10**6]
+    with pytest.raises(ExpressionSyntaxError, match="such as PT30S"):
+        wait_us("-5", 0)
+
+
+@pytest.mark.parametrize("value", [None, True, ["PT1S"]])
 @pytest.mark.parametrize("read", [lambda text: duration_us(text, 0), date_us])
 def test_a_duration_or_date_that_is_no_text_is_refused(read, value):
     with pytest.raises(ExpressionSyntaxError, match=r"expected a .*, not "):
@@ -333,15 +355,15 @@ def test_a_cycle_is_read(text, expected):
 
 
 def test_a_cycle_fires_after_one_period_and_then_every_period():
-    assert cycle("R3/PT10S").first(5) == (5 + 10 * SECOND_US, 2)
-    assert next_round("PT10S", 20, 20, 2, dated=False) == (20 + 10 * SECOND_US, 1)
+    assert cycle("R3/PT10S").first(5) == (5 + 10 * SECOND_US, 2, "PT10S")
+    assert next_round("PT10S", 20, 20, 2, dated=False) == (20 + 10 * SECOND_US, 1, "PT10S")
     assert next_round("PT10S", 20, 20, 0, dated=False) is None
 
 
 def test_a_cycle_with_a_start_fires_there_first_also_when_it_has_passed():
     every = cycle("R3/2026-01-01T00:00:00Z/PT10S")
     for armed_us in (START_2026_US - 1, START_2026_US + 7):
-        assert every.first(armed_us) == (START_2026_US, 2)
+        assert every.first(armed_us) == (START_2026_US, 2, "PT10S")
 
 
 @pytest.mark.parametrize(
@@ -356,25 +378,68 @@ def test_a_cycle_with_a_start_fires_there_first_also_when_it_has_passed():
     ],
 )
 def test_a_cycle_with_an_end_is_counted_back_from_it(text, armed, due, left):
-    assert cycle(text).first(at(armed)) == (at(due), left)
+    assert cycle(text).first(at(armed)) == (at(due), left, "PT1H")
 
 
-def test_a_monthly_cycle_follows_the_calendar():
-    first_us, left = cycle("R/P1M").first(date_us("2026-02-01"))
-    assert (first_us, left) == (date_us("2026-03-01"), -1)
-    assert next_round("P1M", first_us, first_us, -1, dated=False) == (date_us("2026-04-01"), -1)
+def rounds(text, count, armed="2026-01-01T00:00:00Z"):
+    """The dates of the first rounds of a cycle that is armed at a date."""
+    every = cycle(text)
+    found = [every.first(date_us(armed))]
+    while len(found) < count:
+        due_us, left, period = found[-1]
+        found.append(next_round(period, due_us, due_us, left, dated=every.dated))
+    epoch = datetime(1970, 1, 1, tzinfo=UTC)
+    return [(epoch + timedelta(microseconds=each.due_us)).isoformat() for each in found]
+
+
+@pytest.mark.parametrize(
+    ("text", "start", "months"),
+    [
+        ("R/2026-01-31T12:00:00Z/P1M", "2026-01-31T12:00:00+00:00", 1),
+        ("R/2024-02-29T12:00:00Z/P1Y", "2024-02-29T12:00:00+00:00", 12),
+        ("R/2025-08-31T12:00:00Z/P6M", "2025-08-31T12:00:00+00:00", 6),
+        # The offset of the start decides which day it is: in UTC these begin on the 30th.
+        ("R/2026-01-31T00:30:00+02:00/P1M", "2026-01-31T00:30:00+02:00", 1),
+        ("R/2026-03-31T23:30:00-08:00/P1M", "2026-03-31T23:30:00-08:00", 1),
+    ],
+)
+def test_a_round_of_months_is_so_many_periods_after_the_start(text, start, months):
+    """As dateutil counts; java.time's `start.plus(period.multipliedBy(n))` is the same."""
+    begin = datetime.fromisoformat(start)
+    expected = [
+        (begin + relativedelta(months=months * n)).astimezone(UTC).isoformat() for n in range(14)
+    ]
+    assert rounds(text, 14) == expected
+
+
+def test_a_cycle_of_months_without_a_date_counts_from_when_it_is_armed():
+    dates = rounds("R/P1M", 4, "2026-01-31T08:00:00Z")
+    assert [date[:10] for date in dates] == ["2026-02-28", "2026-03-31", "2026-04-30", "2026-05-31"]
+
+
+def test_a_cycle_of_months_that_waited_in_a_pause_keeps_its_days():
+    # Armed on January 31; a pause of five hours came before the first round.
+    due_us, left, period = cycle("R/P1M").first(date_us("2026-01-31T08:00:00Z"))
+    late_us = due_us + 5 * HOUR_US
+    following = next_round(period, late_us, late_us, left, dated=False)
+    assert following.due_us == date_us("2026-03-31T13:00:00Z")
+
+
+def test_a_cycle_of_months_of_an_older_journal_goes_on_from_its_last_round():
+    due_us = date_us("2026-03-01")
+    assert next_round("P1M", due_us, due_us, -1, dated=False) == (date_us("2026-04-01"), -1, "P1M")
 
 
 @pytest.mark.parametrize(
     ("left", "dated", "expected"),
     [
-        (-1, True, (at(5), -1)),
-        (9, True, (at(5), 5)),
-        (4, True, (at(5), 0)),
+        (-1, True, (at(5), -1, "PT1H")),
+        (9, True, (at(5), 5, "PT1H")),
+        (4, True, (at(5), 0, "PT1H")),
         (3, True, None),
-        (-1, False, (at(5), -1)),
-        (9, False, (at(5), 8)),
-        (1, False, (at(5), 0)),
+        (-1, False, (at(5), -1, "PT1H")),
+        (9, False, (at(5), 8, "PT1H")),
+        (1, False, (at(5), 0, "PT1H")),
     ],
 )
 def test_missed_rounds_come_once_and_only_those_of_dates_are_used_up(left, dated, expected):
@@ -382,12 +447,13 @@ def test_missed_rounds_come_once_and_only_those_of_dates_are_used_up(left, dated
 
 
 def test_missed_months_are_counted_too():
-    due_us, now_us = date_us("2026-01-31"), date_us("2026-05-01")
-    assert next_round("P1M", due_us, now_us, 6, dated=True) == (date_us("2026-05-28"), 2)
+    due_us, left, period = cycle("R7/2026-01-31/P1M").first(0)
+    following = next_round(period, due_us, date_us("2026-05-01"), left, dated=True)
+    assert following == (date_us("2026-05-31"), 2, "R4/2026-01-31T00:00:00+00:00/P1M")
 
 
 def test_a_round_that_comes_at_the_same_moment_is_missed_too():
-    assert next_round("PT1H", at(1), at(3), -1, dated=False) == (at(4), -1)
+    assert next_round("PT1H", at(1), at(3), -1, dated=False) == (at(4), -1, "PT1H")
 
 
 @pytest.mark.parametrize("period", ["P3000Y", "PT10000000H"])
@@ -396,9 +462,9 @@ def test_what_is_beyond_the_calendar_never_comes(period):
 
 
 def test_a_cron_text_goes_on_from_now():
-    assert cycle("@hourly").first(at(0.5)) == (at(1), -1)
-    assert next_round("@hourly", at(1), at(1), -1, dated=True) == (at(2), -1)
-    assert next_round("@hourly", at(1), at(7.5), -1, dated=True) == (at(8), -1)
+    assert cycle("@hourly").first(at(0.5)) == (at(1), -1, "@hourly")
+    assert next_round("@hourly", at(1), at(1), -1, dated=True) == (at(2), -1, "@hourly")
+    assert next_round("@hourly", at(1), at(7.5), -1, dated=True) == (at(8), -1, "@hourly")
 
 
 def test_a_cron_text_without_a_date_left_is_refused_when_it_is_armed():

@@ -31,7 +31,7 @@ from m2pem.mission.events import (
     TimerKind,
 )
 from m2pem.mission.mission import Mission
-from m2pem.mission.timers import duration_us
+from m2pem.mission.timers import wait_us
 from m2pem.units import US_PER_S
 
 
@@ -177,7 +177,7 @@ class AwaitedEvents:
         now_us = self._state.mission_time_us(self._now_us)
         try:
             text = definition.expression.evaluate(reader(holder))
-            length_us = duration_us(text, self._now_us - (now_us - since_us))
+            length_us = wait_us(text, self._now_us - (now_us - since_us))
         except (ExpressionError, ExpressionSyntaxError) as error:
             return f": its duration is wrong, and ends in an error: {error}"
         left_s = (since_us + length_us - now_us) / US_PER_S

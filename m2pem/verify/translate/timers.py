@@ -18,8 +18,7 @@ def due_us(expression: Expression) -> int | None:
     if not expression.constant:
         return None
     try:
-        value = expression.evaluate(lambda _: None)
-        return duration_us(value, _2026_US) if isinstance(value, str) else None
+        return duration_us(expression.evaluate(lambda _: None), _2026_US)
     except (ExpressionError, ExpressionSyntaxError):
         return None
 
