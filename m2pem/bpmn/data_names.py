@@ -27,6 +27,7 @@ from m2pem.mission.elements import (
 )
 from m2pem.mission.events import ConditionalEventDefinition, TimerEventDefinition
 from m2pem.mission.expression import Expression, parse
+from m2pem.mission.expression.temporal import NOW
 from m2pem.mission.loops import INSTANCE_COUNTS, LOOP_COUNTER, MultiInstance, StandardLoop
 from m2pem.mission.mission import Mission
 from m2pem.suggestions import suggest_or
@@ -119,7 +120,7 @@ def unwritten(
 def _findings(mission: Mission, process: Process, store: _Store) -> Iterator[Finding]:
     said: set[tuple[str, str]] = set()
     for read in store.reads:
-        names = read.names
+        names = read.names - {NOW}
         if names <= store.written:
             continue
         for name in sorted(name for name in names if not store.has(name)):

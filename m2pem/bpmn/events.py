@@ -4,7 +4,7 @@ A link joins throwing link events of one container to one catching event of thei
 sequence flow that is not drawn.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from typing import TypeVar
 
 from lxml import etree
@@ -32,8 +32,8 @@ from m2pem.bpmn.rules.events import (
 from m2pem.bpmn.rules.references import DANGLING_REFERENCE
 from m2pem.bpmn.rules.rule import Rule
 from m2pem.bpmn.schema import SHAPES
+from m2pem.bpmn.times import wrong_time
 from m2pem.bpmn.xml import BPMN, a, kind, local
-from m2pem.errors import ExpressionError, ExpressionSyntaxError
 from m2pem.mission.elements import (
     BoundaryEvent,
     Container,
@@ -65,8 +65,6 @@ from m2pem.mission.events import (
     TimerEventDefinition,
     TimerKind,
 )
-from m2pem.mission.timers import cycle, date_us, duration_us
-from m2pem.mission.values import Value
 from m2pem.suggestions import suggest_or
 
 Root = TypeVar("Root", bound=RootElement)
@@ -212,22 +210,11 @@ def _timer(
     if expression is None:
         return None
     kind = _TIMES[name]
-    if expression.constant:
-        try:
-            _CHECKS[kind](expression.evaluate(lambda _: None))
-        except (ExpressionSyntaxError, ExpressionError) as error:
-            context.findings.error(
-                times[0], identifier, TIMER_TIME, f"{name}: {error}", time_remedy(name, text)
-            )
-            return None
+    if wrong := wrong_time(expression, kind):
+        remedy = time_remedy(name, text)
+        context.findings.error(times[0], identifier, TIMER_TIME, f"{name}: {wrong}", remedy)
+        return None
     return TimerEventDefinition(context.findings.line(element), kind, expression)
-
-
-_CHECKS: dict[TimerKind, Callable[[Value], object]] = {
-    TimerKind.DATE: date_us,
-    TimerKind.DURATION: lambda text: duration_us(text, 0),
-    TimerKind.CYCLE: cycle,
-}
 
 
 _THROWN_IMPLICITLY = frozenset({"message", "signal", "escalation", "error", "compensate"})

@@ -98,8 +98,8 @@ def _statements(text: str) -> list[str] | None:
 
 
 _FORMS = {
-    "timeDate": "write it as ISO 8601: 2026-01-31T12:00:00Z",
-    "timeDuration": "write it as ISO 8601: PT30S",
+    "timeDate": "write it as ISO 8601, such as 2026-01-31T12:00:00Z",
+    "timeDuration": "write it as ISO 8601, such as PT30S",
     "timeCycle": "write it as ISO 8601 (R3/PT10S), or as cron does (0 0 8 * * MON-FRI)",
 }
 

@@ -6,10 +6,10 @@ from typing import Literal
 
 from m2pem.bpmn.context import ReadingContext
 from m2pem.bpmn.rules.behaviors import ROLE_NEED
-from m2pem.errors import ExpressionError, ExpressionSyntaxError
+from m2pem.bpmn.times import wrong_time
 from m2pem.mission.behavior import Need
+from m2pem.mission.events import TimerKind
 from m2pem.mission.expression import Expression
-from m2pem.mission.timers import duration_us
 
 NEED_ATTRIBUTES = ("requires", "same", "count", "prefer", "store", "wait", "priority")
 """The attributes of a role that make it one which is allocated when its task starts."""
@@ -117,15 +117,12 @@ class NeedReader:
         if text is None or text.strip() == UNLIMITED:
             return False
         limit = self._context.template(self._line, self._task, text)
-        if limit is not None and limit.constant:
-            try:
-                duration_us(limit.evaluate(lambda _: None), 0)
-            except (ExpressionError, ExpressionSyntaxError) as error:
-                self._wrong(
-                    f"wait='{text}': {error}",
-                    f"write an ISO 8601 duration such as wait='PT10M', or wait='{UNLIMITED}'",
-                )
-                return None
+        if limit is not None and (wrong := wrong_time(limit, TimerKind.DURATION)):
+            self._wrong(
+                f"wait='{text}': {wrong}",
+                f"write an ISO 8601 duration such as wait='PT10M', or wait='{UNLIMITED}'",
+            )
+            return None
         return limit
 
     def _wrong(self, message: str, remedy: str) -> None:

@@ -25,6 +25,7 @@ from m2pem.bpmn.rules.data import BAD_KEY
 from m2pem.bpmn.rules.events import TIMER_TIME
 from m2pem.bpmn.rules.extensions import UNKNOWN_EXTENSION
 from m2pem.bpmn.rules.rule import Rule
+from m2pem.bpmn.times import wrong_time
 from m2pem.bpmn.xml import (
     ACTIVITI,
     BPMN,
@@ -38,7 +39,6 @@ from m2pem.bpmn.xml import (
     local,
     parse_xml,
 )
-from m2pem.errors import ExpressionError, ExpressionSyntaxError
 from m2pem.mission.behavior import Behavior, Decision, Parameter, Prompt, Script, ServiceCall
 from m2pem.mission.elements import (
     BusinessRuleTask,
@@ -50,11 +50,10 @@ from m2pem.mission.elements import (
     Task,
     UserTask,
 )
-from m2pem.mission.events import Message
+from m2pem.mission.events import Message, TimerKind
 from m2pem.mission.expression import Expression
 from m2pem.mission.expression.literals import shorten
 from m2pem.mission.script import parse_script
-from m2pem.mission.timers import duration_us
 
 _SERVICE = frozenset({"behavior", "service", "property", "role"})
 _ENGINES = (CAMUNDA, FLOWABLE, ACTIVITI)
@@ -318,13 +317,9 @@ class _Asked:
 
     def _timeout(self, element: etree._Element, text: str) -> None:
         self.timeout = self.context.template(element, self.task, text)
-        if self.timeout is None or not self.timeout.constant:
-            return
-        try:
-            duration_us(self.timeout.evaluate(lambda _: None), 0)
-        except (ExpressionSyntaxError, ExpressionError) as error:
+        if self.timeout is not None and (wrong := wrong_time(self.timeout, TimerKind.DURATION)):
             remedy = time_remedy("timeDuration", text)
-            self._error(element, TIMER_TIME, f"timeout: {error}", remedy)
+            self._error(element, TIMER_TIME, f"timeout: {wrong}", remedy)
 
     def _decision(self, element: etree._Element) -> None:
         value = element.get("value", element.get(M2PEM + "value"))

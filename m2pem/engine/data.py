@@ -11,7 +11,9 @@ from typing import TypeAlias
 
 from m2pem.engine.state import DataStores, Loop, Scope, Token, TokenOrScope
 from m2pem.mission.elements import Activity, Process
+from m2pem.mission.expression.temporal import NOW
 from m2pem.mission.loops import INSTANCE_COUNTS, LOOP_COUNTER
+from m2pem.mission.timers import date_text
 from m2pem.mission.values import ReadValue, Value
 
 Store: TypeAlias = TokenOrScope | DataStores
@@ -108,9 +110,15 @@ def reader(context: TokenOrScope) -> ReadValue:
                 return _value(each, name)
             if _declares(each, name):
                 break
-        return _entry_of_map(context, name)
+        return _time(context) if name == NOW else _entry_of_map(context, name)
 
     return read
+
+
+def _time(context: TokenOrScope) -> str | None:
+    """When the input that is decided came. What is decided with it is in the records, once."""
+    now_us = (context.scope if isinstance(context, Token) else context).shared.now_us
+    return None if now_us is None else date_text(now_us)
 
 
 def _entry_of_map(context: TokenOrScope, name: str) -> Value:

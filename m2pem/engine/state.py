@@ -44,6 +44,9 @@ class DataStores:
 
     keys: frozenset[str]
     data: dict[str, Value] = field(default_factory=dict)
+    now_us: int | None = None
+    """When the input that is decided came, microseconds since the Unix epoch: `now()`. No record
+    has it; None while none is decided."""
 
 
 @dataclass(slots=True, eq=False)

@@ -37,7 +37,7 @@ class Steps(Execution):
 
     def begin(self, now_us: int) -> None:
         """Prepare for an input that came at `now_us`; steps left over come first."""
-        self.now_us = now_us
+        self.now_us = self.state.shared.now_us = now_us
         if self.mission is not self.state.mission:  # a replay has revised it
             self.read_mission()
         self.steps_left = self.batch
@@ -122,6 +122,7 @@ class Steps(Execution):
             self._yield()
         else:
             self._fail_if_stuck()
+        self.state.shared.now_us = None
         self.steps_done += self.batch - self.steps_left
         records, self.records = self.records, []
         return records

@@ -125,6 +125,11 @@ def date_us(value: Value) -> int:
         _refuse("the date is not in the years 1 to 9999", f"{seconds:g}")
 
 
+def date_text(at_us: int) -> str:
+    """The date and time of an instant, as `date_us` reads it."""
+    return (_EPOCH + timedelta(microseconds=at_us)).isoformat().replace("+00:00", "Z")
+
+
 def moment(text: str) -> datetime:
     """The date and time that a text says, with its offset (UTC where it has none).
 

@@ -79,10 +79,10 @@ def test_a_line_of_a_script_in_no_language_in_particular() -> None:
         (
             "timeDuration",
             "due.time",
-            "write it as ISO 8601: PT30S; a name of the data is written ${due.time}",
+            "write it as ISO 8601, such as PT30S; a name of the data is written ${due.time}",
         ),
-        ("timeDuration", "time is a concept", "write it as ISO 8601: PT30S"),
-        ("timeDuration", "9" * 10_000, "write it as ISO 8601: PT30S"),
+        ("timeDuration", "time is a concept", "write it as ISO 8601, such as PT30S"),
+        ("timeDuration", "9" * 10_000, "write it as ISO 8601, such as PT30S"),
         ("timeDate", "PT5M", "put it into a timeDuration"),
         ("timeCycle", "2s", "write R/PT2S, or R1/PT2S for once"),
         ("timeCycle", "500ms###1m", "write R/PT1M"),

@@ -86,7 +86,7 @@ def test_a_timeout_that_no_event_catches_fails_the_run() -> None:
     assert play.detail.startswith("error PROMPT_TIMEOUT from ask")
 
 
-@pytest.mark.parametrize("value", ["soon", 5, None, "-PT1S"])
+@pytest.mark.parametrize("value", ["soon", True, None, "-1"])
 def test_a_timeout_that_is_no_duration_throws_expression(value: object) -> None:
     play = Play(TIMED.format(timeout="${wait}", error="EXPRESSION"))
     assert play.start({"wait": value}).at == "after"  # type: ignore[dict-item]

@@ -210,3 +210,59 @@ def test_a_wrong_boundary_timer_is_an_error_of_its_activity() -> None:
     """).start()
     assert play.at == "after"
     assert play.orders() == ["open p1 done"]
+
+
+@pytest.mark.parametrize(
+    ("time", "seconds"),
+    [
+        ('timer = duration("PT" + string(x) + "S")', 7),
+        ('timer = duration("PT5S") + duration("PT5S")', 10),
+        ("timer = x", 7),
+        ("timer = text", 8),
+        ("timer = duration(text) * 2", 16),
+        ("timer = date and time(when) - now()", 60),
+        ("timer = now() - date and time(when)", 0),
+        ('date = now() + duration("PT1M")', 60),
+        ("date = when", 60),
+        ("date = date and time(when)", 60),
+        ("date ${date(when)}", 60),
+        ("date ${now() + 60}", 60),
+        ('cycle = cycle(3, duration("PT10S"))', 10),
+        ("cycle = cycle(duration(text))", 8),
+    ],
+)
+def test_a_timer_takes_what_is_computed(time: str, seconds: int) -> None:
+    """What Camunda 8 takes, and numbers of seconds, as `duration()` and `date()` of others give."""
+    play = Play(CATCH.format(time=time)).start({"x": 7, "text": "PT8S", "when": iso(60)})
+    assert play.run.next_due_us == START_US + seconds * 1_000_000
+    assert play.advance(seconds).at == "after"
+
+
+@pytest.mark.parametrize(
+    ("boundary", "nags"),
+    [("timer = duration(text)", 1), ('cycle = cycle(3, duration("PT10S"))', 3)],
+)
+def test_a_boundary_timer_takes_what_is_computed(boundary: str, nags: int) -> None:
+    play = (
+        cycle("R1/PT1S")
+        if not boundary
+        else Play(f"""
+        <startEvent id="start"/> <userTask id="u"/> <scriptTask id="count">n = n + 1</scriptTask>
+        <boundaryEvent id="tick" attachedToRef="u" cancelActivity="false">{boundary}</boundaryEvent>
+        start -> u
+        tick -> count
+    """).start({"n": 0, "text": "PT8S"})
+    )
+    assert play.advance(60).data["n"] == nags
+
+
+def test_now_is_the_time_of_the_input_and_its_value_is_in_a_record() -> None:
+    play = Play("""
+        <startEvent id="start"/> <userTask id="u"/> <scriptTask id="note">at = now()</scriptTask>
+        <userTask id="after"/>
+        start -> u -> note -> after
+    """).start()
+    play.advance(90).answer()
+    assert play.data["at"] == START_US / 1e6 + 90
+    play.advance(1000)
+    assert play.data["at"] == START_US / 1e6 + 90

@@ -42,7 +42,11 @@ def plan_revision(
     sequence flows; "": it ends there. `now_us`: microseconds since the Unix epoch. `adjustable`:
     behaviors whose speed can change while they go on.
     """
-    return _Planning(state, new, moves, now_us, adjustable).plan()
+    decided_us, state.shared.now_us = state.shared.now_us, now_us
+    try:
+        return _Planning(state, new, moves, now_us, adjustable).plan()
+    finally:
+        state.shared.now_us = decided_us
 
 
 class _Planning:

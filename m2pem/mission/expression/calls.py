@@ -7,7 +7,14 @@ JUEL: methods of texts and lists, Camunda's `execution.getVariable('x')`, and Fl
 from collections.abc import Callable
 
 from m2pem.mission.expression.dialect import Dialect
-from m2pem.mission.expression.functions import FEEL_NAMES, FUNCTIONS
+from m2pem.mission.expression.functions import (
+    FEEL,
+    FEEL_FUNCTIONS,
+    FEEL_NAMES,
+    FUNCTIONS,
+    Function,
+)
+from m2pem.mission.expression.temporal import NOW
 from m2pem.mission.expression.tree import (
     And,
     Call,
@@ -37,6 +44,9 @@ def meaning(name: str, arguments: Arguments, dialect: Dialect) -> Node:
     Raises:
         CallError: the dialect has no such function, or it takes other arguments.
     """
+    if name in _CLOCK and not arguments and (name == "now" or dialect is Dialect.FEEL):
+        made = _CLOCK[name] if dialect is Dialect.FEEL else "date"
+        return _function(made, (Name(NOW),), dialect)
     match dialect:
         case Dialect.JUEL if ":" in name:
             return _of_variable(name, arguments)
@@ -54,7 +64,7 @@ def meaning(name: str, arguments: Arguments, dialect: Dialect) -> Node:
             name = XPATH_NAMES.get(name, name)
         case Dialect.FEEL:
             name = FEEL_NAMES.get(name, name)
-    return _function(name, arguments)
+    return _function(name, arguments, dialect)
 
 
 def method_call(receiver: Node, method: str, arguments: Arguments) -> Node:
@@ -74,16 +84,21 @@ def method_call(receiver: Node, method: str, arguments: Arguments) -> Node:
     )
 
 
-def _function(name: str, arguments: Arguments) -> Node:
-    function = FUNCTIONS.get(name)
+def _function(name: str, arguments: Arguments, dialect: Dialect = Dialect.JUEL) -> Node:
+    functions: dict[str, Function] = FUNCTIONS
+    prefix = ""
+    if dialect is Dialect.FEEL:
+        functions = {**FUNCTIONS, **FEEL_FUNCTIONS}
+        prefix = FEEL if name in FEEL_FUNCTIONS else ""
+    function = functions.get(name)
     if function is None:
         if "." in name:
             raise CallError(f"{name[:40]!r} would run a method of an object, which m2pem does not")
-        hint = did_you_mean(name, FUNCTIONS) or "there are " + ", ".join(FUNCTIONS)
+        hint = did_you_mean(name, functions) or "there are " + ", ".join((*functions, *_CLOCK))
         raise CallError(f"there is no function {name[:40]!r}; {hint}")
     if not function.accepts(len(arguments)):
         raise CallError(f"expected {function.signature}, found {len(arguments)} arguments")
-    return Call(function.name, arguments)
+    return Call(prefix + name, arguments)
 
 
 def _built(name: str, build: Build, arguments: Arguments) -> Node:
@@ -132,6 +147,9 @@ def _empty(node: Node) -> Node:
 def _contains(container: Node, item: Node, *more: Node) -> tuple[Node, ...]:
     return tuple(Call("contains", (container, each)) for each in (item, *more))
 
+
+_CLOCK = {"now": "date and time", "today": "date"}
+"""Functions of the time of the input that is decided, by what they make of it."""
 
 METHODS = {
     "contains": "contains",

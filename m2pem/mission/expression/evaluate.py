@@ -8,19 +8,20 @@ from collections.abc import Callable
 from typing import Any
 
 from m2pem.errors import ExpressionError
-from m2pem.mission.expression.functions import FUNCTIONS
-from m2pem.mission.expression.literals import describe
+from m2pem.mission.expression.functions import LISTED
 from m2pem.mission.expression.operators import (
     ARITHMETIC,
     COMPARISONS,
     bounded_list,
     contains,
+    describe,
     index,
     join,
     look_at,
     negate,
     truth,
 )
+from m2pem.mission.expression.temporal import Computed
 from m2pem.mission.expression.tree import (
     And,
     Arithmetic,
@@ -61,7 +62,7 @@ def _part(value: Value, path: str) -> Value:
     return value
 
 
-def evaluate(node: Node, read: ReadValue) -> Value:
+def evaluate(node: Node, read: ReadValue) -> Computed:
     """The tree's value; it raises ExpressionError."""
     return _RULES[type(node)](node, read)
 
@@ -71,33 +72,33 @@ def _holds(node: Node, read: ReadValue, what: str) -> bool:
     return value if value is True or value is False else truth(value, what)
 
 
-def _literal(node: Literal, read: ReadValue) -> Value:
+def _literal(node: Literal, read: ReadValue) -> Computed:
     return node.value
 
 
-def _name(node: Name, read: ReadValue) -> Value:
+def _name(node: Name, read: ReadValue) -> Computed:
     return read(node.name)
 
 
-def _not(node: Not, read: ReadValue) -> Value:
+def _not(node: Not, read: ReadValue) -> Computed:
     return not _holds(node.operand, read, "'not'")
 
 
-def _and(node: And, read: ReadValue) -> Value:
+def _and(node: And, read: ReadValue) -> Computed:
     for operand in node.operands:  # noqa: SIM110  # a generator costs more than all of it
         if not _holds(operand, read, "'and'"):
             return False
     return True
 
 
-def _or(node: Or, read: ReadValue) -> Value:
+def _or(node: Or, read: ReadValue) -> Computed:
     for operand in node.operands:  # noqa: SIM110  # a generator costs more than all of it
         if _holds(operand, read, "'or'"):
             return True
     return False
 
 
-def _compare(node: Compare, read: ReadValue) -> Value:
+def _compare(node: Compare, read: ReadValue) -> Computed:
     operator, right = node.operator, node.right
     value = _RULES[type(node.left)](node.left, read)
     if type(right) is Literal:
@@ -112,31 +113,31 @@ def _compare(node: Compare, read: ReadValue) -> Value:
     return COMPARISONS[operator](value, _RULES[type(right)](right, read))
 
 
-def _in(node: In, read: ReadValue) -> Value:
+def _in(node: In, read: ReadValue) -> Computed:
     container = evaluate(node.container, read)
     return contains(container, evaluate(node.item, read))
 
 
-def _negate(node: Negate, read: ReadValue) -> Value:
+def _negate(node: Negate, read: ReadValue) -> Computed:
     return negate(evaluate(node.operand, read))
 
 
-def _arithmetic(node: Arithmetic, read: ReadValue) -> Value:
+def _arithmetic(node: Arithmetic, read: ReadValue) -> Computed:
     left = _RULES[type(node.left)](node.left, read)
     return ARITHMETIC[node.operator](left, _RULES[type(node.right)](node.right, read))
 
 
-def _index(node: Index, read: ReadValue) -> Value:
+def _index(node: Index, read: ReadValue) -> Computed:
     container = evaluate(node.container, read)
     return index(container, evaluate(node.key, read))
 
 
-def _if(node: If, read: ReadValue) -> Value:
+def _if(node: If, read: ReadValue) -> Computed:
     chosen = node.then if _holds(node.condition, read, "a condition") else node.otherwise
     return evaluate(chosen, read)
 
 
-def _some(node: Some, read: ReadValue) -> Value:
+def _some(node: Some, read: ReadValue) -> Computed:
     items = evaluate(node.collection, read)
     if items is None:
         return False
@@ -150,19 +151,19 @@ def _some(node: Some, read: ReadValue) -> Value:
     return False
 
 
-def _list(node: ListOf, read: ReadValue) -> Value:
-    return bounded_list([evaluate(item, read) for item in node.items])
+def _list(node: ListOf, read: ReadValue) -> Computed:
+    return bounded_list([evaluate(item, read) for item in node.items])  # type: ignore[return-value]
 
 
-def _call(node: Call, read: ReadValue) -> Value:
-    return FUNCTIONS[node.function].call([evaluate(each, read) for each in node.arguments])
+def _call(node: Call, read: ReadValue) -> Computed:
+    return LISTED[node.function].call([evaluate(each, read) for each in node.arguments])
 
 
-def _join(node: Join, read: ReadValue) -> Value:
+def _join(node: Join, read: ReadValue) -> Computed:
     return join([evaluate(part, read) for part in node.parts])
 
 
-_RULES: dict[type[Node], Callable[[Any, ReadValue], Value]] = {
+_RULES: dict[type[Node], Callable[[Any, ReadValue], Computed]] = {
     Literal: _literal,
     Name: _name,
     ListOf: _list,

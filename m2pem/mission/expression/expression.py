@@ -12,6 +12,7 @@ from m2pem.mission.expression.feel import FeelParser
 from m2pem.mission.expression.literals import shorten, show_scalar
 from m2pem.mission.expression.operators import begin_work, truth
 from m2pem.mission.expression.parser import Parser
+from m2pem.mission.expression.temporal import to_data
 from m2pem.mission.expression.tree import Join, Literal, Node, names
 from m2pem.mission.values import ReadValue, Value
 
@@ -40,8 +41,10 @@ class Expression:
         return not self.names
 
     def evaluate(self, read: ReadValue, *, new_limit: bool = True) -> Value:
-        """Its value over the data store. `new_limit`: what it looks at is counted from 0; else it
-        shares that with what was evaluated before.
+        """Its value over the data store; dates and durations of FEEL are ISO 8601 texts.
+
+        `new_limit`: what it looks at is counted from 0; else it shares that with what was evaluated
+        before.
 
         Raises:
             ExpressionError: a wrong type, a division by zero, or something beyond the limits.
@@ -49,7 +52,8 @@ class Expression:
         if new_limit:
             begin_work()
         try:
-            return evaluate(self.tree, read)
+            value = evaluate(self.tree, read)
+            return to_data(value) if self.dialect is Dialect.FEEL else value  # type: ignore[return-value]
         except ExpressionError as error:
             self._explain(error)
 

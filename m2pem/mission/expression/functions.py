@@ -8,17 +8,28 @@ from typing import Any
 
 import m2pem.mission.timers as times  # imports this package too: only its name is bound yet
 from m2pem.errors import ExpressionError, ExpressionSyntaxError
-from m2pem.mission.expression.literals import NUMBER, describe, read_number
+from m2pem.mission.expression.literals import NUMBER, read_number
 from m2pem.mission.expression.operators import (
     TEXT_AS_VALUE,
     bounded,
     bounded_text,
+    describe,
     equal,
     kind,
     look_at,
     text_of,
 )
-from m2pem.mission.values import Value
+from m2pem.mission.expression.temporal import (
+    DATE,
+    DAYS,
+    MOMENT,
+    MONTHS,
+    Computed,
+    read_cycle,
+    read_date,
+    read_duration,
+    read_moment,
+)
 
 EARTH_RADIUS_M = 6_371_008.8
 """Mean radius of the WGS-84 ellipsoid (2a + b) / 3.
@@ -34,14 +45,17 @@ _ANY = ("null", "boolean", "number", "text", "list", "map")
 class Function:
     """A function: what it takes, and what computes it.
 
-    `takes` holds the kinds of each parameter; with `rest` the last one may be repeated. Unless a
-    parameter takes null, a null argument makes the result null.
+    `takes` holds the kinds of each parameter; with `rest` the last one may be repeated, and
+    `optional` of the last may be left out. Unless a parameter takes null, a null argument makes the
+    result null. `gives`: the kinds of its values, besides null.
     """
 
     signature: str
     takes: tuple[tuple[str, ...], ...]
-    compute: Callable[..., Value]
+    compute: Callable[..., Computed]
     rest: bool = False
+    gives: tuple[str, ...] = ("number",)
+    optional: int = 0
 
     @property
     def name(self) -> str:
@@ -50,9 +64,10 @@ class Function:
 
     def accepts(self, count: int) -> bool:
         """Whether it may be called with so many arguments."""
-        return count >= len(self.takes) if self.rest else count == len(self.takes)
+        least = len(self.takes) - self.optional
+        return count >= least if self.rest else least <= count <= len(self.takes)
 
-    def call(self, arguments: list[Value]) -> Value:
+    def call(self, arguments: list[Computed]) -> Computed:
         """Return the function's value; raises ExpressionError."""
         null = False
         for index, argument in enumerate(arguments):
@@ -73,31 +88,31 @@ def _finite(name: str, value: int | float) -> int | float:
     return bounded(value, f"{name}()", value)
 
 
-def _abs(x: int | float) -> Value:
+def _abs(x: int | float) -> Computed:
     return bounded(abs(x), "abs()", x)
 
 
-def _floor(x: int | float) -> Value:
+def _floor(x: int | float) -> Computed:
     return bounded(math.floor(_finite("floor", x)), "floor()", x)
 
 
-def _ceil(x: int | float) -> Value:
+def _ceil(x: int | float) -> Computed:
     return bounded(math.ceil(_finite("ceil", x)), "ceil()", x)
 
 
-def _round(x: int | float) -> Value:
+def _round(x: int | float) -> Computed:
     # Python's round() takes halves to the even number, which surprises people.
     whole = int(Decimal(_finite("round", x)).to_integral_value(ROUND_HALF_UP))
     return bounded(whole, "round()", x)
 
 
-def _sqrt(x: int | float) -> Value:
+def _sqrt(x: int | float) -> Computed:
     if x < 0:
         raise ExpressionError(f"sqrt() takes a number from 0 on, not {describe(x)}")
     return math.sqrt(_finite("sqrt", x))
 
 
-def _mod(x: int | float, y: int | float) -> Value:
+def _mod(x: int | float, y: int | float) -> Computed:
     if y == 0:
         raise ExpressionError(f"mod() divides {describe(x)} by zero")
     try:
@@ -107,13 +122,13 @@ def _mod(x: int | float, y: int | float) -> Value:
     return bounded(result, "mod()", x, y)
 
 
-def _extreme(name: str, pick: Callable[[Any], Any]) -> Callable[..., Value]:
-    def compute(*arguments: Value) -> Value:
-        values: list[Value] = list(arguments)
+def _extreme(name: str, pick: Callable[[Any], Any]) -> Callable[..., Computed]:
+    def compute(*arguments: Computed) -> Computed:
+        values: list[Computed] = list(arguments)
         if isinstance(arguments[0], list):
             if len(arguments) > 1:
                 raise ExpressionError(f"{name}() takes numbers, or one list of numbers")
-            values = arguments[0]
+            values = list(arguments[0])
         if not values or any(value is None for value in values):
             return None
         for value in values:
@@ -124,7 +139,7 @@ def _extreme(name: str, pick: Callable[[Any], Any]) -> Callable[..., Value]:
     return compute
 
 
-def _contains(container: list[Value] | str, item: Value) -> Value:
+def _contains(container: list[Computed] | str, item: Computed) -> Computed:
     if isinstance(container, list):
         return any(equal(each, item) for each in container)
     if item is None:
@@ -134,15 +149,15 @@ def _contains(container: list[Value] | str, item: Value) -> Value:
     return item in container
 
 
-def _upper(text: str) -> Value:
+def _upper(text: str) -> Computed:
     return bounded_text(text.upper(), "upper()")
 
 
-def _lower(text: str) -> Value:
+def _lower(text: str) -> Computed:
     return bounded_text(text.lower(), "lower()")
 
 
-def _number(value: int | float | str) -> Value:
+def _number(value: int | float | str) -> Computed:
     if not isinstance(value, str):
         return value
     digits = value.strip()
@@ -154,7 +169,7 @@ def _number(value: int | float | str) -> Value:
         raise ExpressionError(f"number() cannot read {describe(value)}: {error}") from None
 
 
-def _sum(values: list[Value]) -> Value:
+def _sum(values: list[Computed]) -> Computed:
     total: int | float = 0
     for value in values:
         if value is None:
@@ -165,24 +180,24 @@ def _sum(values: list[Value]) -> Value:
     return total
 
 
-def _date(text: str) -> Value:
+def _date(text: str) -> Computed:
     return _seconds("date", lambda: times.date_us(text))
 
 
-def _duration(text: str) -> Value:
+def _duration(text: str) -> Computed:
     if any(sign in text.partition("T")[0] for sign in "YM"):
         raise ExpressionError("duration() has no years and months: how long they are is not known")
     return _seconds("duration", lambda: times.duration_us(text, 0))
 
 
-def _seconds(name: str, read_us: Callable[[], int]) -> Value:
+def _seconds(name: str, read_us: Callable[[], int]) -> Computed:
     try:
         return read_us() / 1_000_000
     except ExpressionSyntaxError as error:
         raise ExpressionError(f"{name}(): {error}") from None
 
 
-def _degrees(position: list[Value]) -> tuple[float, float]:
+def _degrees(position: list[Computed]) -> tuple[float, float]:
     if len(position) in (2, 3) and all(kind(each) == "number" for each in position[:2]):
         latitude, longitude = position[:2]
         assert isinstance(latitude, (int, float))
@@ -195,7 +210,7 @@ def _degrees(position: list[Value]) -> tuple[float, float]:
     )
 
 
-def _distance(a: list[Value], b: list[Value]) -> Value:
+def _distance(a: list[Computed], b: list[Computed]) -> Computed:
     (lat_a, lon_a), (lat_b, lon_b) = _degrees(a), _degrees(b)
     half_north = math.sin(math.radians(lat_b - lat_a) / 2)
     half_east = math.sin(math.radians(lon_b - lon_a) / 2)
@@ -205,6 +220,8 @@ def _distance(a: list[Value], b: list[Value]) -> Value:
 
 _NUMBER = ("number",)
 _TEXT = ("text",)
+_BOOLEAN = ("boolean",)
+_DURATIONS = (DAYS, MONTHS)
 
 FUNCTIONS: dict[str, Function] = {
     function.name: function
@@ -218,15 +235,15 @@ FUNCTIONS: dict[str, Function] = {
         Function("sqrt(x)", (_NUMBER,), _sqrt),
         Function("mod(x, y)", (_NUMBER, _NUMBER), _mod),
         Function("number(x)", (("number", "text"),), _number),
-        Function("text(x)", (("boolean", "number", "text"),), text_of),
+        Function("text(x)", (("boolean", "number", "text"),), text_of, gives=_TEXT),
         Function("length(x)", (("text", "list", "map"),), len),
-        Function("contains(x, y)", (("text", "list"), _ANY), _contains),
-        Function("starts_with(x, y)", (_TEXT, _TEXT), str.startswith),
-        Function("ends_with(x, y)", (_TEXT, _TEXT), str.endswith),
-        Function("upper(x)", (_TEXT,), _upper),
-        Function("lower(x)", (_TEXT,), _lower),
-        Function("exists(x)", (_ANY,), lambda x: x is not None),
-        Function("is_empty(x)", (_ANY,), lambda x: x is None or x in ("", [], {})),
+        Function("contains(x, y)", (("text", "list"), _ANY), _contains, gives=_BOOLEAN),
+        Function("starts_with(x, y)", (_TEXT, _TEXT), str.startswith, gives=_BOOLEAN),
+        Function("ends_with(x, y)", (_TEXT, _TEXT), str.endswith, gives=_BOOLEAN),
+        Function("upper(x)", (_TEXT,), _upper, gives=_TEXT),
+        Function("lower(x)", (_TEXT,), _lower, gives=_TEXT),
+        Function("exists(x)", (_ANY,), lambda x: x is not None, gives=_BOOLEAN),
+        Function("is_empty(x)", (_ANY,), lambda x: x is None or x in ("", [], {}), gives=_BOOLEAN),
         Function("sum(x)", (("list",),), _sum),
         Function("date(x)", (_TEXT,), _date),
         Function("duration(x)", (_TEXT,), _duration),
@@ -234,17 +251,36 @@ FUNCTIONS: dict[str, Function] = {
     )
 }
 
+FEEL_FUNCTIONS: dict[str, Function] = {
+    function.name: function
+    for function in (
+        Function("date(x)", (("text", "number", DATE, MOMENT), _NUMBER, _NUMBER), read_date,
+                 gives=(DATE,), optional=2),
+        Function("date and time(x)", (("text", DATE, MOMENT),), read_moment, gives=(MOMENT,)),
+        Function("duration(x)", (("text", *_DURATIONS),), read_duration, gives=_DURATIONS),
+        Function("cycle(x, y)", (("number", *_DURATIONS), _DURATIONS), read_cycle, gives=_TEXT,
+                 optional=1),
+        Function("string(x)", (("boolean", "number", "text", DATE, MOMENT, *_DURATIONS),), text_of,
+                 gives=_TEXT),
+    )
+}  # fmt: skip
+"""What FEEL alone has, or has otherwise: dates and durations are values of their kinds."""
+
+FEEL = "FEEL "
+"""How the name of one of those begins in a tree."""
+
+LISTED = {**FUNCTIONS, **{FEEL + name: each for name, each in FEEL_FUNCTIONS.items()}}
+"""All functions, by their names in a tree."""
+
 FEEL_NAMES = {
     "ceiling": "ceil",
     "count": "length",
-    "date and time": "date",
     "ends with": "ends_with",
     "is defined": "exists",
     "list contains": "contains",
     "lower case": "lower",
     "modulo": "mod",
     "starts with": "starts_with",
-    "string": "text",
     "string length": "length",
     "upper case": "upper",
 }

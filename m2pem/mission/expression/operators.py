@@ -7,14 +7,19 @@ from contextvars import ContextVar
 from typing import Any
 
 from m2pem.errors import ExpressionError
-from m2pem.mission.expression.literals import (
-    MAX_INTEGER,
-    MIN_INTEGER,
-    describe,
-    show_scalar,
+from m2pem.mission.expression import literals
+from m2pem.mission.expression.literals import MAX_INTEGER, MIN_INTEGER, show_scalar
+from m2pem.mission.expression.temporal import (
+    DAYS,
+    KINDS,
+    MONTHS,
+    Computed,
+    Temporal,
+    calculate,
+    iso,
+    result_kind,
 )
 from m2pem.mission.expression.tree import Comparison, Operation
-from m2pem.mission.values import Value
 
 MAX_SIZE = 100_000
 """How large a computed text or list may be: its characters and values, nested ones included."""
@@ -46,13 +51,13 @@ def look_at(values: int) -> None:
         raise ExpressionError(f"it looks at more than {MAX_WORK:,} values")
 
 
-Binary = Callable[[Value, Value], Value]
-Test = Callable[[Value, Value], bool]
+Binary = Callable[[Computed, Computed], Computed]
+Test = Callable[[Computed, Computed], bool]
 
 _NUMBERS = frozenset({int, float})
 
 
-def kind(value: Value) -> str:
+def kind(value: Computed) -> str:
     """The type of a value as messages and the docs call it."""
     match value:
         case None:
@@ -67,10 +72,17 @@ def kind(value: Value) -> str:
             return "list"
         case dict():
             return "map"
-    return type(value).__name__
+    return KINDS[type(value)]
 
 
-def truth(value: Value, what: str) -> bool:
+def describe(value: Computed) -> str:
+    """The value with its kind, shortened, for a message."""
+    if type(value) in KINDS:
+        return f"the {kind(value)} {iso(value)}"  # type: ignore[arg-type]
+    return literals.describe(value)  # type: ignore[arg-type]
+
+
+def truth(value: Computed, what: str) -> bool:
     """The boolean, null being false. `what` names the value in the message."""
     if value is True or value is False:
         return value
@@ -79,12 +91,12 @@ def truth(value: Value, what: str) -> bool:
     raise ExpressionError(f"{what} takes true or false, not {describe(value)}")
 
 
-def equal(left: Value, right: Value) -> bool:
+def equal(left: Computed, right: Computed) -> bool:
     """Same kind and same value; integers and doubles compare by exact value."""
     return _equal(left, right, MAX_VALUE_DEPTH)
 
 
-def _equal(left: Value, right: Value, depth: int) -> bool:
+def _equal(left: Computed, right: Computed, depth: int) -> bool:
     if isinstance(left, list) and isinstance(right, list):
         if depth == 0:
             raise ExpressionError(f"'==' compares lists nested deeper than {MAX_VALUE_DEPTH}")
@@ -104,7 +116,7 @@ def _equal(left: Value, right: Value, depth: int) -> bool:
     return kind(left) == kind(right) and left == right
 
 
-def contains(container: Value, item: Value) -> bool:
+def contains(container: Computed, item: Computed) -> bool:
     """`item in container`; nothing is in null."""
     if isinstance(container, list):
         look_at(len(container))
@@ -115,7 +127,7 @@ def contains(container: Value, item: Value) -> bool:
     raise ExpressionError(f"'in' takes a list on its right, not {describe(container)}{hint}")
 
 
-def index(container: Value, key: Value) -> Value:
+def index(container: Computed, key: Computed) -> Computed:
     """`container[key]`; null for what is not there."""
     if container is None or key is None:
         return None
@@ -127,13 +139,20 @@ def index(container: Value, key: Value) -> Value:
 
 
 def _ordering(symbol: Comparison, compare: Callable[[Any, Any], bool]) -> Test:
-    def test(left: Value, right: Value) -> bool:
+    def test(left: Computed, right: Computed) -> bool:
         if type(left) in _NUMBERS and type(right) in _NUMBERS:
             return compare(left, right)
         kinds = {kind(left), kind(right)}
-        if kinds in ({"number"}, {"text"}):
+        if kinds in ({"number"}, {"text"}) or (len(kinds) == 1 and type(left) in KINDS):
             return compare(left, right)
-        if "null" in kinds or len(kinds) > 1:
+        if "null" in kinds:
+            return False
+        if type(left) in KINDS or type(right) in KINDS:
+            raise ExpressionError(
+                f"'{symbol}' compares {describe(left)} with {describe(right)}; FEEL's duration(x), "
+                "date(x) and date and time(x) make the one of the other's kind"
+            )
+        if len(kinds) > 1:
             return False
         raise ExpressionError(f"'{symbol}' cannot order {describe(left)} and {describe(right)}")
 
@@ -150,7 +169,7 @@ COMPARISONS: dict[Comparison, Test] = {
 }
 
 
-def bounded(value: int | float, what: str, *operands: Value) -> int | float:
+def bounded(value: int | float, what: str, *operands: Computed) -> int | float:
     """The result of `what` on the operands, when it is a 64-bit integer or a finite double."""
     if MIN_INTEGER <= value <= MAX_INTEGER if isinstance(value, int) else math.isfinite(value):
         return value
@@ -167,10 +186,10 @@ def bounded_text(value: str, what: str) -> str:
     return value
 
 
-def bounded_list(items: list[Value]) -> list[Value]:
+def bounded_list(items: list[Computed]) -> list[Computed]:
     """A new list, when it is not too large: lists of lists could double with every step."""
     size = 0
-    waiting: list[tuple[Value, int]] = [(items, 0)]
+    waiting: list[tuple[Computed, int]] = [(items, 0)]  # type: ignore[list-item]
     while waiting:
         value, depth = waiting.pop()
         size += 1
@@ -194,7 +213,7 @@ def _arithmetic(
 ) -> Binary:
     takes = "two numbers or two texts" if symbol is Operation.ADD else "two numbers"
 
-    def apply(left: Value, right: Value) -> Value:
+    def apply(left: Computed, right: Computed) -> Computed:
         if left is None or right is None:
             return None
         if (
@@ -212,6 +231,9 @@ def _arithmetic(
             return bounded(result, f"'{symbol}'", left, right)
         if symbol is Operation.ADD and isinstance(left, str) and isinstance(right, str):
             return bounded_text(left + right, "'+'")
+        kinds = kind(left), kind(right)
+        if result_kind(kinds[0], symbol, kinds[1]) is not None:
+            return calculate(left, symbol, right, kinds)
         hint = "; text(x) turns a value into a text" if "text" in (kind(left), kind(right)) else ""
         raise ExpressionError(
             f"'{symbol}' takes {takes}, not {describe(left)} and {describe(right)}"
@@ -229,23 +251,27 @@ ARITHMETIC: dict[Operation, Binary] = {
 }
 
 
-def negate(value: Value) -> Value:
+def negate(value: Computed) -> Computed:
     """`-value`."""
     if value is None:
         return None
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         return bounded(-value, "'-'", value)
+    if kind(value) in (DAYS, MONTHS):
+        return calculate(value, Operation.MULTIPLY, -1, (kind(value), "number"))
     raise ExpressionError(f"'-' takes a number, not {describe(value)}")
 
 
-def text_of(value: bool | int | float | str) -> str:
+def text_of(value: bool | int | float | str | Temporal) -> str:
     """The value as a text."""
+    if type(value) in KINDS:
+        return iso(value)  # type: ignore[arg-type]
     if isinstance(value, (int, float)):
         bounded(value, "text()", value)
-    return show_scalar(value)
+    return show_scalar(value)  # type: ignore[arg-type]
 
 
-def join(values: list[Value]) -> str:
+def join(values: list[Computed]) -> str:
     """The values written one after the other: the value of a text with `${...}` parts."""
     texts = []
     for value in values:

@@ -114,7 +114,7 @@ class Arithmetic:
 
 @dataclass(frozen=True, slots=True)
 class Call:
-    """A listed function; `function` is its name in `functions.FUNCTIONS`, whatever the dialect."""
+    """A listed function; `function` is its name in `functions.LISTED`, whatever the dialect."""
 
     function: str
     arguments: "tuple[Node, ...]"

@@ -1,0 +1,55 @@
+"""Which kinds of values an expression can have, whatever is in the data."""
+
+from itertools import product
+
+from m2pem.mission.expression.functions import LISTED
+from m2pem.mission.expression.operators import kind
+from m2pem.mission.expression.temporal import DAYS, MONTHS, result_kind
+from m2pem.mission.expression.tree import (
+    Arithmetic,
+    Call,
+    If,
+    Index,
+    Join,
+    ListOf,
+    Literal,
+    Name,
+    Negate,
+    Node,
+    Operation,
+)
+
+_DATA = frozenset({"boolean", "number", "text", "list", "map"})
+_NEGATED = frozenset({"number", DAYS, MONTHS})
+
+
+def kinds(node: Node) -> frozenset[str]:
+    """The kinds of its values besides null, as `operators.kind` calls them; none: it has no value
+    but null, or an error.
+    """
+    match node:
+        case Literal(value):
+            return frozenset() if value is None else frozenset({kind(value)})
+        case Name() | Index():
+            return _DATA
+        case Call(function):
+            return frozenset(LISTED[function].gives)
+        case If(_, then, otherwise):
+            return kinds(then) | kinds(otherwise)
+        case Negate(operand):
+            return kinds(operand) & _NEGATED
+        case Arithmetic(sign, left, right):
+            pairs = product(kinds(left), kinds(right))
+            found = (_result(one, sign, other) for one, other in pairs)
+            return frozenset(each for each in found if each is not None)
+        case Join():
+            return frozenset({"text"})
+        case ListOf():
+            return frozenset({"list"})
+    return frozenset({"boolean"})
+
+
+def _result(left: str, sign: Operation, right: str) -> str | None:
+    if left == right and (left == "number" or (left == "text" and sign is Operation.ADD)):
+        return left
+    return result_kind(left, sign, right)

@@ -1,0 +1,97 @@
+"""Dates and durations of FEEL, against DMN 1.3 and feelin 8.2.0 (bpmn.io's FEEL, npm)."""
+
+import pytest
+
+from m2pem.errors import ExpressionError, ExpressionSyntaxError
+from m2pem.mission.expression import parse
+from m2pem.mission.expression.temporal import NOW
+
+DATA = {NOW: "2026-11-29T12:00:00Z", "x": 7, "due": "2030-01-01T00:00:00Z"}
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        # feelin 8.2.0 gives the same.
+        ('duration("PT" + string(x) + "S")', "PT7S"),
+        ('duration("PT5S") + duration("PT5S")', "PT10S"),
+        ('date and time("2026-11-29T12:00:00Z") + duration("PT1M")', "2026-11-29T12:01:00Z"),
+        ('date and time(due) - date and time("2026-11-29T12:00:00Z")', "P1128DT12H"),
+        ('date("2026-01-31") + duration("P1M")', "2026-02-28"),
+        ('duration("P1M") + date("2026-01-31")', "2026-02-28"),
+        ('date("2026-03-31") - duration("P1M")', "2026-02-28"),
+        ('date("2026-01-31") + duration("P1D")', "2026-02-01"),
+        ('date("2026-01-01") - date("2025-01-01")', "P365D"),
+        ('date("2026-01-01") - date and time("2026-01-01T12:00:00Z")', "-PT12H"),
+        ('date and time("2026-01-31T10:00:00+02:00") + duration("P1M")',
+         "2026-02-28T10:00:00+02:00"),
+        ('duration("P1Y2M") - duration("P1M")', "P1Y1M"),
+        ('duration("P14M")', "P1Y2M"),
+        ('string(duration("PT90S"))', "PT1M30S"),
+        ('string(duration("-PT90S"))', "-PT1M30S"),
+        ('duration("PT1M") = duration("PT60S")', True),
+        ('duration("PT90S") > duration("PT1M")', True),
+        ('date("2026-01-01") < date("2026-01-02")', True),
+        ("date(2026, 2, 28)", "2026-02-28"),
+        # DMN 1.3, tables 55 to 57, which feelin 8.2.0 does not have.
+        ('duration("PT10S") * 3', "PT30S"),
+        ('2 * duration("P1M")', "P2M"),
+        ('duration("P1Y") / 2', "P6M"),
+        ('duration("PT10S") / duration("PT5S")', 2.0),
+        ('-duration("PT10S")', "-PT10S"),
+        ('-duration("P1Y2M")', "-P1Y2M"),
+        ('duration("PT1M") in [duration("PT60S")]', True),
+        ('[date("2026-01-01"), duration("PT0S")]', ["2026-01-01", "PT0S"]),
+        # Camunda 8's own function for timers.
+        ('cycle(3, duration("PT10S"))', "R3/PT10S"),
+        ('cycle(duration("P1M"))', "R/P1M"),
+        ("now()", "2026-11-29T12:00:00Z"),
+        ("today()", "2026-11-29"),
+        ('now() + duration("PT1M")', "2026-11-29T12:01:00Z"),
+        ("now() < date and time(due)", True),
+        ("duration(nothing)", None),
+    ],
+)  # fmt: skip
+def test_feel_computes_with_dates_and_durations(text, expected):
+    assert parse(f"= {text}").evaluate(DATA.get) == expected
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('duration("P1M2D")', "has months and days"),
+        ('duration("30 s")', "such as PT30S"),
+        ('date("tomorrow")', "such as 2026-01-01"),
+        ("date(2026, 2, 30)", "day is out of range"),
+        ("date(2026)", "a year, a month and a day"),
+        ('duration("PT1S") + 5', "duration PT1S and the number 5"),
+        ("now() + now()", "takes two numbers or two texts"),
+        ('duration("P1Y") / 0', "by zero"),
+        ('duration("PT1S") * 1e300', "beyond the years 1 to 9999"),
+        ('date("9999-12-31") + duration("P1D")', "beyond the years 1 to 9999"),
+        ('cycle(1.5, duration("PT1S"))', "a whole number and a duration"),
+        # In FEEL these are null, so that a wrong branch would be taken.
+        ('duration("PT1M") > 30', "compares the days and time duration PT1M with the number 30"),
+        ("now() > due", "compares the date and time .* with the text"),
+        ('duration("P1M") < duration("P31D")', "compares the years and months duration P1M with"),
+    ],
+)
+def test_what_feel_cannot_compute_is_an_error(text, message):
+    with pytest.raises(ExpressionError, match=message):
+        parse(f"= {text}").evaluate(DATA.get)
+
+
+@pytest.mark.parametrize("text", ["now()", "${now()}"])
+def test_now_is_seconds_in_the_other_dialects_as_their_dates_are(text):
+    assert parse(text).evaluate(DATA.get) == 1_795_953_600.0
+    assert parse("duration('PT1M')").evaluate(DATA.get) == 60.0
+
+
+def test_an_expression_that_reads_the_time_is_not_constant():
+    assert not parse("= now()").constant
+    assert parse('= duration("PT1S") * 2').constant
+
+
+def test_a_function_that_is_not_there_is_refused_with_those_that_are():
+    with pytest.raises(ExpressionSyntaxError, match="cycle, string, now, today"):
+        parse("= tomorrowish()")
