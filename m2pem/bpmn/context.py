@@ -14,6 +14,7 @@ from m2pem.bpmn.rules.extensions import MISPLACED_EXTENSION, UNKNOWN_EXTENSION, 
 from m2pem.bpmn.schema import Shape
 from m2pem.bpmn.xml import M2PEM, a, attribute_names, kind, local
 from m2pem.errors import ExpressionSyntaxError
+from m2pem.mission.behavior import Mappings
 from m2pem.mission.elements import (
     Activity,
     BoundaryEvent,
@@ -104,6 +105,8 @@ class PendingDataFlow:
     """Keys of its own data inputs, data outputs and properties, by id."""
     inputs: list[Association]
     outputs: list[Association]
+    foreign: Mappings | None = None
+    """What other engines' elements pass."""
 
 
 @dataclass(slots=True)

@@ -1,6 +1,7 @@
 """Data objects, stores, properties and associations (BPMN 2.0.2, clauses 10.4.1 and 10.4.2)."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 from lxml import etree
 
@@ -15,6 +16,7 @@ from m2pem.bpmn.context import (
     reference,
     text_of,
 )
+from m2pem.bpmn.foreign_data import read_foreign_mappings
 from m2pem.bpmn.rules.data import BAD_ASSIGNMENT, EMPTY_ASSIGNMENT
 from m2pem.bpmn.rules.references import DANGLING_REFERENCE
 from m2pem.bpmn.xml import BPMN, local
@@ -82,16 +84,17 @@ _PLACEHOLDER = "__targetRef_placeholder"
 
 def read_data_flow(context: ReadingContext, found: Children, node: Activity | Event) -> None:
     """Keep its data associations until all data objects are known."""
-    if _TAGS.isdisjoint(found.children):
+    foreign = read_foreign_mappings(context, found, node)
+    if foreign is None and _TAGS.isdisjoint(found.children):
         return
     outputs = context.note_outputs(found.of("dataOutputAssociation"))
     parameters = _parameters(found)
-    if not parameters:
+    if foreign is None and not parameters:
         return
     if isinstance(node, Activity):
-        object.__setattr__(node, "own_data", frozenset(parameters.values()))
+        object.__setattr__(node, "own_data", node.own_data | frozenset(parameters.values()))
     inputs = [association(each) for each in found.of("dataInputAssociation")]
-    context.data_flows.append(PendingDataFlow(node, parameters, inputs, outputs))
+    context.data_flows.append(PendingDataFlow(node, parameters, inputs, outputs, foreign))
 
 
 def _parameters(found: Children) -> dict[str, str]:
@@ -117,8 +120,9 @@ def resolve_data_flows(context: ReadingContext) -> None:
         outputs = [
             mapping for each in pending.outputs for mapping in _out_of(context, pending, each)
         ]
-        if inputs or outputs:
-            mappings = Mappings(tuple(inputs), tuple(outputs))
+        own = pending.foreign or Mappings()
+        if inputs or outputs or pending.foreign:
+            mappings = replace(own, inputs=(*own.inputs, *inputs), outputs=(*own.outputs, *outputs))
             object.__setattr__(pending.node, "data_flow", mappings)
 
 

@@ -25,7 +25,7 @@ from m2pem.mission.elements import (
     SubProcess,
     UserTask,
 )
-from m2pem.mission.events import ConditionalEventDefinition, TimerEventDefinition
+from m2pem.mission.events import ConditionalEventDefinition, TimerEventDefinition, caught_data
 from m2pem.mission.expression import Expression, parse
 from m2pem.mission.expression.temporal import NOW
 from m2pem.mission.loops import INSTANCE_COUNTS, LOOP_COUNTER, MultiInstance, StandardLoop
@@ -216,6 +216,8 @@ def _needs(node: FlowNode, roles: Iterable[Role]) -> Iterator[Read]:
 def written_by(node: FlowNode) -> set[str]:
     """The names that a node itself writes, without those of its service or behavior."""
     written = {mapping.target for mapping in _data_mappings(node)}
+    if isinstance(node, Event):
+        written |= set(caught_data(node.definitions, ""))
     if isinstance(node, Activity) and node.loop is not None:
         written.add(LOOP_COUNTER)
         if isinstance(node.loop, MultiInstance):

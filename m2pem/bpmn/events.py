@@ -4,15 +4,17 @@ A link joins throwing link events of one container to one catching event of thei
 sequence flow that is not drawn.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import TypeVar
 
 from lxml import etree
 
 from m2pem.bpmn.children import Children, read_children
-from m2pem.bpmn.context import MessageUse, ReadingContext, reference, text_of
+from m2pem.bpmn.context import KEY, MessageUse, ReadingContext, reference, text_of
 from m2pem.bpmn.data import read_data_flow
+from m2pem.bpmn.foreign_elements import ENGINES
 from m2pem.bpmn.foreign_syntax import time_remedy
+from m2pem.bpmn.rules.data import BAD_KEY
 from m2pem.bpmn.rules.events import (
     DANGLING_LINK,
     DUPLICATE_LINK,
@@ -104,12 +106,30 @@ def read_definition(
         error = look_up(context, element, context.errors, own)
         if error is None and not catches:
             error = _own(context, event, context.errors, own)
-        return ErrorEventDefinition(line, error)
+        names = ("errorCodeVariable", "errorMessageVariable")
+        return ErrorEventDefinition(line, error, *_variables(context, element, event.id, names))
     notice = Escalation(event.id, label, line, event.id)
     escalation = look_up(context, element, context.escalations, notice)
     if escalation is None and not catches:
         escalation = _own(context, event, context.escalations, notice)
-    return EscalationEventDefinition(line, escalation)
+    variables = _variables(context, element, event.id, ("escalationCodeVariable",))
+    return EscalationEventDefinition(line, escalation, *variables)
+
+
+def _variables(
+    context: ReadingContext, element: etree._Element, identifier: str, names: tuple[str, ...]
+) -> Iterator[str]:
+    """The names of data that get what is caught, as Camunda 7 and its forks write them."""
+    for name in names:
+        written = (element.get(engine + name, "").strip() for engine in ENGINES)
+        key = next((each for each in written if each), "")
+        if key and not KEY.fullmatch(key):
+            what = f"{name}='{key}' is no name of the data"
+            context.findings.error(
+                element, identifier, BAD_KEY, what, f'write for example {name}="error.code"'
+            )
+            key = ""
+        yield key
 
 
 def look_up(

@@ -146,6 +146,9 @@ def _descend(value: Value, path: str) -> Value:
 
 def store_for(context: TokenOrScope, key: str) -> Store:
     """Return where a key is written: the nearest store that declares it, else the process."""
+    node = context.node if isinstance(context, Token) else None
+    if isinstance(node, Activity) and node.data_flow.keeps_result:
+        return context
     process: Store = context
     for each in _outwards(context):
         if _declares(each, key):

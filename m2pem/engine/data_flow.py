@@ -12,13 +12,28 @@ from m2pem.mission.values import ReadValue, Value
 
 
 def evaluate(
-    x: Execution, token: Token, mappings: tuple[Mapping, ...], read: ReadValue
+    x: Execution,
+    token: Token,
+    mappings: tuple[Mapping, ...],
+    read: ReadValue,
+    *,
+    ordered: bool = False,
 ) -> list[tuple[Mapping, Value]] | None:
-    """Evaluate mappings; None: error EXPRESSION was thrown."""
-    values = []
+    """Evaluate mappings; None: error EXPRESSION was thrown. `ordered`: each reads what those before
+    it have set."""
+    values: list[tuple[Mapping, Value]] = []
+    done: dict[str, Value] = {}
+    if ordered:
+        around = read
+
+        def read(name: str) -> Value:
+            return done[name] if name in done else around(name)
+
     for mapping in mappings:
         try:
-            values.append((mapping, mapping.source.evaluate(read)))
+            value = mapping.source.evaluate(read)
+            values.append((mapping, value))
+            done.update({mapping.target: value, **dict(flatten(mapping.target, value))})
         except ExpressionError as error:
             throw_error(x, token, "EXPRESSION", f"mapping to {mapping.target}: {error}")
             return None
@@ -41,7 +56,8 @@ def fill_data_inputs(x: Execution, token: Token) -> bool:
     """
     node = token.node
     assert isinstance(node, Activity)
-    values = evaluate(x, token, node.data_flow.inputs, _around(token))
+    flow = node.data_flow
+    values = evaluate(x, token, flow.inputs, _around(token), ordered=flow.ordered)
     if values is None:
         return False
     for mapping, value in values:
@@ -69,7 +85,8 @@ def pass_data_outputs(x: Execution, token: Token) -> bool:
     """Write the data outputs of a completed activity. False: error EXPRESSION was thrown."""
     node = token.node
     assert isinstance(node, Activity)
-    values = evaluate(x, token, node.data_flow.outputs, reader(token))
+    flow = node.data_flow
+    values = evaluate(x, token, flow.outputs, reader(token), ordered=flow.ordered)
     if values is None:
         return False
     gives = node.loop.output_item if isinstance(node.loop, MultiInstance) else ""
@@ -92,7 +109,8 @@ def payload(x: Execution, token: Token) -> dict[str, Value] | None:
     if isinstance(node, Activity):
         own = token.own or {}
         return {m.target: own[m.target] for m in node.data_flow.inputs if m.target in own}
-    values = evaluate(x, token, node.data_flow.inputs, reader(token))
+    flow = node.data_flow
+    values = evaluate(x, token, flow.inputs, reader(token), ordered=flow.ordered)
     return None if values is None else {mapping.target: value for mapping, value in values}
 
 
@@ -113,17 +131,29 @@ def receive_payload(x: Execution, token: Token, data: dict[str, Value]) -> bool:
     return True
 
 
+def pass_event_outputs(x: Execution, token: Token) -> bool:
+    """Pass the outputs of an event that receives nothing, which other engines have; they read its
+    inputs. False: error EXPRESSION was thrown."""
+    node = token.node
+    assert isinstance(node, Event)
+    if not (node.data_flow.ordered and node.data_flow.outputs):
+        return True
+    data = payload(x, token)
+    return data is not None and _out_of_event(x, token, node, data)
+
+
 def _out_of_event(x: Execution, token: Token, node: Event, data: dict[str, Value]) -> bool:
     around = reader(token)
     only = next(iter(data.values())) if len(data) == 1 else None
-    alone = len(node.data_flow.outputs) == 1
+    flow = node.data_flow
+    alone = len(flow.outputs) == 1 and not flow.ordered
 
     def read(name: str) -> Value:
         if name in data:
             return data[name]
         return only if alone and only is not None else around(name)
 
-    values = evaluate(x, token, node.data_flow.outputs, read)
+    values = evaluate(x, token, flow.outputs, read, ordered=flow.ordered)
     if values is None:
         return False
     write_values(x, token, token, values)

@@ -20,6 +20,7 @@ from m2pem.mission.elements import Activity, BoundaryEvent, Event, StartEvent
 from m2pem.mission.events import (
     Escalation,
     EventDefinition,
+    caught_data,
     error_code,
     escalation_code,
 )
@@ -68,7 +69,7 @@ def throw_error(
     if caught is None:
         fail_run(x, token, code, reason, failed)
     else:
-        _catch(x, caught, failed)
+        _catch(x, caught, code, reason, failed)
 
 
 def fail_run(x: Execution, token: Token, code: str, reason: str, failed: ErrorPath) -> None:
@@ -110,7 +111,8 @@ def throw_error_in_process(x: Execution, code: str, reason: str) -> None:
         detail = f"error {code}, which no event catches: {reason}"
         end_run(x, RunOutcome.FAILED, detail, {scope})
     else:
-        start_event_subprocess(x, scope, caught, {scope})
+        begun = start_event_subprocess(x, scope, caught, {scope})
+        x.write_all(begun, dict(caught_data(caught.definitions, code, reason)))
 
 
 # --- escalations --------------------------------------------------------------------------------
@@ -142,12 +144,13 @@ def throw_escalation(
     if caught is None:
         return True
     if not caught.event.interrupting:
-        if isinstance(caught.event, BoundaryEvent):
-            x.spawn(caught.event, caught.place.scope)
+        if isinstance(caught, _AtBoundary):
+            begun = x.spawn(caught.event, caught.place.scope)
         else:
-            start_event_subprocess(x, caught.place, caught.event)
+            begun = start_event_subprocess(x, caught.place, caught.event)
+        x.write_all(begun, dict(caught_data(caught.event.definitions, escalation.code)))
         return True
-    _catch(x, caught)
+    _catch(x, caught, escalation.code)
     return False
 
 
@@ -166,11 +169,18 @@ class _InScope:
     event: StartEvent
 
 
-def _catch(x: Execution, caught: _AtBoundary | _InScope, failed: ErrorPath = ()) -> None:
+def _catch(
+    x: Execution,
+    caught: _AtBoundary | _InScope,
+    code: str,
+    reason: str = "",
+    failed: ErrorPath = (),
+) -> None:
     if isinstance(caught, _AtBoundary):
-        move_to_boundary(x, caught.place, caught.event, failed)
+        begun = move_to_boundary(x, caught.place, caught.event, failed)
     else:
-        start_event_subprocess(x, caught.place, caught.event, failed)
+        begun = start_event_subprocess(x, caught.place, caught.event, failed)
+    x.write_all(begun, dict(caught_data(caught.event.definitions, code, reason)))
 
 
 def _find_catcher(

@@ -186,7 +186,14 @@ class Mapping:
 
 @dataclass(frozen=True, slots=True)
 class Mappings:
-    """The values that pass into and out of a call activity; no other value does."""
+    """The values that pass into and out of a call activity; no other value does. Of other
+    activities and events: what their data associations pass, or other engines' mappings.
+
+    `ordered`: each reads what those before it have set. `keeps_result`: what the activity's own
+    work gives stays inside, where its outputs read it.
+    """
 
     inputs: tuple[Mapping, ...] = field(default=())
     outputs: tuple[Mapping, ...] = field(default=())
+    ordered: bool = False
+    keeps_result: bool = False

@@ -1,6 +1,6 @@
 """Event definitions and the root elements they refer to (BPMN 2.0.2, clauses 8.4 and 10.5.5)."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -83,16 +83,24 @@ class MessageEventDefinition(EventDefinition):
 
 @dataclass(frozen=True, slots=True)
 class ErrorEventDefinition(EventDefinition):
-    """`error` None catches every error; a throw always names one."""
+    """`error` None catches every error; a throw always names one.
+
+    `code_variable`, `message_variable`: the names of data that get the code and the reason of what
+    is caught, "" for none.
+    """
 
     error: Error | None
+    code_variable: str = ""
+    message_variable: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class EscalationEventDefinition(EventDefinition):
-    """`escalation` None catches every escalation; a throw always names one."""
+    """`escalation` None catches every escalation; a throw always names one. `code_variable` as for
+    errors."""
 
     escalation: Escalation | None
+    code_variable: str = ""
 
 
 def error_code(definition: EventDefinition) -> str | None:
@@ -107,6 +115,17 @@ def escalation_code(definition: EventDefinition) -> str | None:
     if not isinstance(definition, EscalationEventDefinition):
         return None
     return definition.escalation.code if definition.escalation is not None else ""
+
+
+def caught_data(event: Sequence[EventDefinition], code: str, reason: str = "") -> dict[str, str]:
+    """What an event that catches an error or escalation writes, by name: its code, its reason."""
+    found = {}
+    for each in event:
+        if isinstance(each, ErrorEventDefinition | EscalationEventDefinition):
+            found[each.code_variable] = code
+        if isinstance(each, ErrorEventDefinition):
+            found[each.message_variable] = reason
+    return {name: value for name, value in found.items() if name}
 
 
 class TimerKind(StrEnum):

@@ -3,9 +3,19 @@
 from lxml import etree
 
 from m2pem.bpmn.extensions import ELEMENTS, PLACES, looks_like_own, unknown_content
+from m2pem.bpmn.foreign_elements import (
+    CARRIED_OUT,
+    CHANGING,
+    CHANGING_ATTRIBUTES,
+    ENGINES,
+    EXPRESSIONS,
+    HARMLESS,
+    PROPAGATES,
+    PROPAGATES_REMEDY,
+)
 from m2pem.bpmn.rules.rule import E, Rule, W
 from m2pem.bpmn.rules.tree import Checks, Tree, parent
-from m2pem.bpmn.xml import BPMN, CAMUNDA, M2PEM, ZEEBE, a, kind, local
+from m2pem.bpmn.xml import ACTIVITI, BPMN, FLOWABLE, M2PEM, a, attribute_names, kind, local
 from m2pem.suggestions import suggest_or
 
 WRONG_NAMESPACE = Rule(
@@ -41,28 +51,18 @@ FOREIGN_EXTENSION = Rule(
     "see extensions.md",
 )
 
+FOREIGN_EFFECT = Rule(
+    317,
+    "foreign-effect",
+    "missions.md",
+    W,
+    "another engine's element or attribute changes what is executed there, and has no effect here",
+    "see missions.md",
+)
+
 _OWN = M2PEM[1:-1]
 _EXTENSIONS = BPMN + "extensionElements"
-
-_READ = frozenset(
-    [CAMUNDA + name for name in ("properties", "in", "out")]
-    + [
-        ZEEBE + name
-        for name in (
-            "adHoc",
-            "calledElement",
-            "formDefinition",
-            "ioMapping",
-            "loopCharacteristics",
-            "subscription",
-            "taskDefinition",
-            "userTask",
-            "userTaskForm",
-        )
-    ]
-)
-"""Other engines' elements that m2pem reads (docs/missions.md), that say what it does anyway, or
-that have a finding of their own."""
+_CALL = BPMN + "callActivity"
 
 _EDITORS = (
     "http://www.omg.org/",
@@ -102,7 +102,10 @@ def _extensions(tree: Tree) -> None:
             elif namespace and looks_like_own(element.prefix or "", namespace):
                 if namespace not in tree.root.nsmap.values():
                     _say_wrong(tree, element, element.prefix or "", namespace)
-            elif _is_ignored(tag, namespace, parent(outer)):
+            elif tag.startswith(ENGINES):
+                if not _say_effect(tree, element, parent(outer)):
+                    foreign.setdefault(namespace, []).append(element)
+            elif parent(outer).tag in PLACES and not namespace.startswith(_EDITORS):
                 foreign.setdefault(namespace, []).append(element)
     for namespace, elements in foreign.items():
         _say_foreign(tree, namespace, elements)
@@ -143,8 +146,49 @@ def _namespace(tag: str) -> str:
     return tag[1:].partition("}")[0] if tag.startswith("{") else ""
 
 
-def _is_ignored(tag: str, namespace: str, owner: etree._Element) -> bool:
-    return owner.tag in PLACES and tag not in _READ and not namespace.startswith(_EDITORS)
+def _say_effect(tree: Tree, element: etree._Element, owner: etree._Element) -> bool:
+    """Say what becomes of an engine's element, if it matters. False: the element is not known."""
+    name = local(element.tag)
+    if name in ("in", "out") and owner.tag == _CALL:
+        return True
+    if name == "properties" and element.tag.startswith((FLOWABLE, ACTIVITI)):
+        return False
+    if name in CHANGING:
+        effect, right = CHANGING[name]
+        if name in ("in", "out") and (source := element.get("source")):
+            right += f": {element.get('target')} = {source}"
+        _say_changing(tree, element, f"{element.prefix}:{name}", (effect, right))
+        return True
+    if name == "calledElement":
+        left_out = [each for each in PROPAGATES if element.get(each) is None]
+        if left_out:
+            what = "every value passes there, and here what is listed"
+            named = f"{element.prefix}:calledElement without {' and '.join(left_out)}"
+            _say_changing(tree, element, named, (what, PROPAGATES_REMEDY))
+    return name in CARRIED_OUT or name in HARMLESS or owner.tag not in PLACES
+
+
+def _say_changing(tree: Tree, element: etree._Element, named: str, effect: tuple[str, str]) -> None:
+    tree.report(FOREIGN_EFFECT, element, f"{named}: {effect[0]}", effect[1])
+
+
+def _attributes(tree: Tree) -> None:
+    if not any(tree.mentions(engine[1:-1]) for engine in ENGINES):
+        return
+    for element in tree.root.iter(etree.Element):
+        for key in attribute_names(element):
+            name = local(key)
+            if not key.startswith(ENGINES) or name not in CHANGING_ATTRIBUTES:
+                continue
+            if element.get(key) == "false" or _is_carried_out(element, name):
+                continue
+            _say_changing(tree, element, f"{name}='{element.get(key)}'", CHANGING_ATTRIBUTES[name])
+
+
+def _is_carried_out(element: etree._Element, name: str) -> bool:
+    """Whether a script task in FEEL or JUEL stores its value in a result variable."""
+    language = element.get("scriptFormat", "").strip().lower()
+    return name == "resultVariable" and language in EXPRESSIONS
 
 
 def _say_foreign(tree: Tree, namespace: str, elements: list[etree._Element]) -> None:
@@ -155,4 +199,4 @@ def _say_foreign(tree: Tree, namespace: str, elements: list[etree._Element]) -> 
     tree.report(FOREIGN_EXTENSION, elements[0], f"{count} {whose} from here on: {listed}")
 
 
-CHECKS = Checks({}, (_extensions,))
+CHECKS = Checks({}, (_extensions, _attributes))

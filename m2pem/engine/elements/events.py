@@ -3,7 +3,7 @@
 from m2pem.engine import records as r
 from m2pem.engine.arming import arm, arm_entered
 from m2pem.engine.compensation import throw_compensation
-from m2pem.engine.data_flow import payload
+from m2pem.engine.data_flow import pass_event_outputs, payload
 from m2pem.engine.elements.sequence_flows import true_flows
 from m2pem.engine.elements.subprocesses import cancel, finish
 from m2pem.engine.execution import Execution
@@ -46,7 +46,10 @@ def start(x: Execution, token: Token) -> None:
     assert isinstance(node, StartEvent)
     if node.definitions and not x.has_been_triggered(token):
         catch(x, token)
-    elif not token.waits:  # else others of its triggers must still occur
+    elif node.definitions:
+        if not token.waits:  # else others of its triggers must still occur
+            complete(x, token)
+    elif pass_event_outputs(x, token):
         complete(x, token)
 
 
@@ -72,6 +75,8 @@ def throw(x: Execution, token: Token) -> None:
         _throw(x, token, definition)
         if not x.is_active(token):
             return
+    if not pass_event_outputs(x, token):
+        return
     if isinstance(node, IntermediateThrowEvent) and node.links_to is not None:
         x.leave(token, TokenOutcome.COMPLETED)
         x.enter(token.id, node.links_to, token.scope)
@@ -132,7 +137,7 @@ def end(x: Execution, token: Token) -> None:
                 _throw(x, token, definition)
                 if not x.is_active(token):
                     return
-    if not token.compensations:
+    if not token.compensations and pass_event_outputs(x, token):
         x.consume(token)
 
 

@@ -8,7 +8,7 @@ from m2pem.errors import ExpressionError
 from m2pem.fleet.behaviors import SHARED
 from m2pem.mission import elements as e
 from m2pem.mission.behavior import Assignment, Behavior
-from m2pem.mission.events import ConditionalEventDefinition
+from m2pem.mission.events import ConditionalEventDefinition, caught_data
 from m2pem.mission.expression import Dialect, Expression, parse
 from m2pem.mission.expression.expression import literal
 from m2pem.mission.expression.tree import ListOf, Literal
@@ -47,7 +47,9 @@ class Data:
         self._hidden: dict[e.FlowNode, frozenset[str]] = {}
         self._initial = dict(_flat(options.data))
         self._payloads = Payloads(mission, open_world=options.open_world)
-        self.domains = Domains(self._conditions(), self._writes(), self._initial)
+        self.domains = Domains(
+            self._conditions(), self._writes(), self._initial, _not_followed(mission)
+        )
         self.variables: list[Variable] = []
         self._known: dict[tuple[str, tuple[str, ...]], int] = {}
 
@@ -415,3 +417,14 @@ def boxes(
             (*rest[:place], frozenset(numbers), *rest[place:]) for rest, numbers in grouped.items()
         ]
     yield from current
+
+
+def _not_followed(mission: Mission) -> frozenset[str]:
+    """Names that events write with what they catch, or by mappings of other engines."""
+    found: set[str] = set()
+    for node in mission.nodes:
+        if isinstance(node, e.Event):
+            found |= set(caught_data(node.definitions, ""))
+            if node.data_flow.ordered:
+                found |= {mapping.target for mapping in node.data_flow.outputs}
+    return frozenset(found)

@@ -7,7 +7,7 @@ true and may be false.
 """
 
 import itertools
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 from m2pem.errors import ExpressionError
@@ -163,8 +163,10 @@ class Domains:
         conditions: Iterable[tuple[Expression, frozenset[str]]],
         writes: Iterable[Write],
         initial: Mapping[str, Value],
+        not_followed: Collection[str] = (),
     ) -> None:
-        """`conditions`: with the names that are hidden where each is evaluated."""
+        """`conditions`: with the names that are hidden where each is evaluated. `not_followed`:
+        names that may have any value at any time."""
         self.of: dict[str, Domain] = {}
         self.unknown: set[str] = set()
         conditions = list(conditions)
@@ -187,7 +189,7 @@ class Domains:
                 if write.source is not None:
                     wanted += [n for n in write.source.names if n not in write.hidden]
         for name in sorted(relevant):
-            if name in by_key or name in initial:
+            if name not in not_followed and (name in by_key or name in initial):
                 self.of[name] = Domain()
                 self.of[name].add(initial.get(name))
                 self.of[name].add(None)  # what a called process begins with

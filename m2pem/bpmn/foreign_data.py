@@ -1,0 +1,168 @@
+"""Data mappings and scripts of Camunda that mean what m2pem has: they are carried out.
+
+`zeebe:ioMapping` and `camunda:inputOutput` give an activity values of its own, and pass some on
+when it has completed. Each mapping reads what those before it have set.
+"""
+
+from collections.abc import Iterator
+
+from lxml import etree
+
+from m2pem.bpmn.children import Children
+from m2pem.bpmn.context import KEY, ReadingContext, text_of
+from m2pem.bpmn.foreign_elements import EXPRESSIONS
+from m2pem.bpmn.foreign_syntax import expression_remedy
+from m2pem.bpmn.rules.data import BAD_KEY
+from m2pem.bpmn.rules.extensions import FOREIGN_EFFECT
+from m2pem.bpmn.xml import ACTIVITI, CAMUNDA, FLOWABLE, ZEEBE, local
+from m2pem.errors import ExpressionSyntaxError
+from m2pem.mission.behavior import Assignment, Mapping, Mappings, Script
+from m2pem.mission.elements import Activity, Event, ReceiveTask, ScriptTask, ServiceTask
+from m2pem.mission.expression import Expression, literal, template
+
+_WRAPPERS = (ZEEBE + "ioMapping", CAMUNDA + "inputOutput")
+_INPUTS = (ZEEBE + "input", CAMUNDA + "inputParameter")
+_OUTPUTS = (ZEEBE + "output", CAMUNDA + "outputParameter")
+_SCRIPT = ZEEBE + "script"
+_ENGINES = (CAMUNDA, FLOWABLE, ACTIVITI)
+
+
+def read_foreign_mappings(
+    context: ReadingContext, found: Children, node: Activity | Event
+) -> Mappings | None:
+    """The mappings of an activity or event that other engines' elements say; None: none does.
+
+    The targets of inputs become data of the activity's own. Where Camunda 8 has outputs, the result
+    of a service, message or script passes on by these alone.
+    """
+    wrappers = [each for each in found.extensions() if each.tag in _WRAPPERS]
+    if not wrappers:
+        return None
+    inputs = tuple(_mappings(context, found, node, wrappers, _INPUTS))
+    outputs = tuple(_mappings(context, found, node, wrappers, _OUTPUTS))
+    local_result = bool(outputs) and any(each.tag.startswith(ZEEBE) for each in wrappers)
+    if isinstance(node, Activity):
+        own = {mapping.target.partition(".")[0] for mapping in inputs}
+        script = foreign_script(found)
+        if local_result and isinstance(node, ScriptTask) and script is not None:
+            own.add(script.get("resultVariable", "").strip())
+        object.__setattr__(node, "own_data", node.own_data | own)
+    keeps = local_result and isinstance(node, ReceiveTask | ServiceTask)
+    return Mappings(inputs, outputs, ordered=True, keeps_result=keeps)
+
+
+def _mappings(
+    context: ReadingContext,
+    found: Children,
+    node: Activity | Event,
+    wrappers: list[etree._Element],
+    tags: tuple[str, ...],
+) -> Iterator[Mapping]:
+    for element in (each for wrapper in wrappers for each in wrapper if each.tag in tags):
+        target = (element.get("target") or element.get("name") or "").strip()
+        source = element.get("source") if element.tag.startswith(ZEEBE) else text_of(element)
+        if not KEY.fullmatch(target):
+            what = f"its target, '{target}', is no name of the data"
+            context.findings.error(
+                element, node.id, BAD_KEY, what, 'write for example target="mission.speed"'
+            )
+        elif len(element):
+            _not_carried_out(
+                context, element, node, target, f"a {local(element[0].tag)} is not read"
+            )
+        else:
+            try:
+                expression = template(source) if source else literal(None)
+            except ExpressionSyntaxError as error:
+                _not_carried_out(context, element, node, target, str(error), source or "")
+                continue
+            if element.tag in _OUTPUTS and isinstance(node, Activity):
+                _warn_of_collection(context, found, element, expression)
+            yield Mapping(expression, target, context.findings.line(element))
+
+
+def _not_carried_out(
+    context: ReadingContext,
+    element: etree._Element,
+    node: Activity | Event,
+    target: str,
+    because: str,
+    source: str = "",
+) -> None:
+    context.findings.warning(
+        element,
+        node.id,
+        FOREIGN_EFFECT,
+        f"'{target}' gets no value from {local(element.tag)}: {because}",
+        expression_remedy(source) if source else "write an expression, or a script task before it",
+    )
+
+
+def _warn_of_collection(
+    context: ReadingContext, found: Children, element: etree._Element, source: Expression
+) -> None:
+    """An instance passes its outputs on before the others have given theirs."""
+    marks = found.of("multiInstanceLoopCharacteristics")
+    for each in (inner for mark in marks for inner in mark.iter(ZEEBE + "loopCharacteristics")):
+        name = each.get("outputCollection", "").strip()
+        if name and name in source.names:
+            context.findings.warning(
+                element,
+                found.id,
+                FOREIGN_EFFECT,
+                f"each instance passes this output on, and '{name}' is written after them all",
+                f"read {name} in a task after the activity",
+            )
+
+
+# --- scripts --------------------------------------------------------------------------------------
+
+
+def foreign_script(found: Children) -> etree._Element | None:
+    """The `zeebe:script` of a script task; None: it has none."""
+    return next((each for each in found.extensions() if each.tag == _SCRIPT), None)
+
+
+def has_foreign_script(found: Children) -> bool:
+    """Whether a script task has an expression whose value another engine stores."""
+    written = found.element.get("scriptFormat", "").strip().lower() in EXPRESSIONS
+    return foreign_script(found) is not None or (written and bool(_result_variable(found)))
+
+
+def read_foreign_script(context: ReadingContext, found: Children) -> Script | None:
+    """The assignment that such a script task is."""
+    element = foreign_script(found)
+    if element is not None:
+        text, key = element.get("expression", ""), element.get("resultVariable", "")
+        return _assignment(context, found, element, text, key, "FEEL")
+    script = found.of("script")[0]
+    language = found.element.get("scriptFormat")
+    return _assignment(context, found, script, text_of(script), _result_variable(found), language)
+
+
+def _result_variable(found: Children) -> str:
+    names = (found.element.get(engine + "resultVariable") for engine in _ENGINES)
+    return next((name for name in names if name), "") if found.of("script") else ""
+
+
+def _assignment(
+    context: ReadingContext,
+    found: Children,
+    where: etree._Element,
+    text: str,
+    key: str,
+    language: str | None,
+) -> Script | None:
+    if not KEY.fullmatch(key.strip()):
+        context.findings.error(
+            where,
+            found.id,
+            BAD_KEY,
+            f"the script's result variable, '{key}', is no name of the data",
+            'write for example resultVariable="mission.speed"',
+        )
+        return None
+    expression = context.expression(where, found.id, text, language)
+    if expression is None:
+        return None
+    return Script((Assignment(key.strip(), expression, context.findings.line(where)),))
