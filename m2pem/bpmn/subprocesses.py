@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from lxml import etree
 
 from m2pem.bpmn.activities import TASKS, read_activity_attributes
-from m2pem.bpmn.children import ChildOrder, Children, read_children
+from m2pem.bpmn.children import EXTENSIONS, ChildOrder, Children, read_children
 from m2pem.bpmn.collaboration import read_lanes, read_subscription
 from m2pem.bpmn.compensation import ASSOCIATION, read_association
 from m2pem.bpmn.context import ReadingContext, text_of
@@ -132,7 +132,7 @@ _LANES = BPMN + "laneSet"
 _SUBSCRIPTION = BPMN + "correlationSubscription"
 _COMPLETION = BPMN + "completionCondition"
 _DATA_FLOW = ("ioSpecification", "dataInputAssociation", "dataOutputAssociation")
-_MARKS = frozenset((*LOOPS, *(BPMN + name for name in _DATA_FLOW)))
+_MARKS = frozenset((*LOOPS, EXTENSIONS, *(BPMN + name for name in _DATA_FLOW)))
 
 
 @dataclass(slots=True)

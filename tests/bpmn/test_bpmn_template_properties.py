@@ -172,10 +172,12 @@ def test_a_property_given_twice_is_refused() -> None:
     assert summary(data) == [("duplicate-property", 11, "T")]
 
 
-def test_a_feel_duration_of_a_timeout_has_its_replacement() -> None:
+def test_a_timeout_may_be_a_duration_of_feel_and_no_date() -> None:
     feel = {**QUESTION, "m2pem:timeout": "=duration(&quot;PT5M&quot;)"}
-    (found,) = findings(task("userTask", "zeebe", feel))
-    assert (found.rule, found.remedy) == ("timer-time", "write PT5M alone")
+    assert findings(task("userTask", "zeebe", feel)) == ()
+    (found,) = findings(task("userTask", "zeebe", {**QUESTION, "m2pem:timeout": "=today()"}))
+    assert found.rule == "timer-time"
+    assert "gives a date, not a duration" in found.message
 
 
 def test_properties_without_the_prefix_stay_what_they_were() -> None:

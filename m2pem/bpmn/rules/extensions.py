@@ -15,7 +15,7 @@ from m2pem.bpmn.foreign_elements import (
 )
 from m2pem.bpmn.rules.rule import E, Rule, W
 from m2pem.bpmn.rules.tree import Checks, Tree, parent
-from m2pem.bpmn.xml import ACTIVITI, BPMN, FLOWABLE, M2PEM, a, attribute_names, kind, local
+from m2pem.bpmn.xml import BPMN, CAMUNDA, M2PEM, a, attribute_names, kind, local
 from m2pem.suggestions import suggest_or
 
 WRONG_NAMESPACE = Rule(
@@ -151,7 +151,7 @@ def _say_effect(tree: Tree, element: etree._Element, owner: etree._Element) -> b
     name = local(element.tag)
     if name in ("in", "out") and owner.tag == _CALL:
         return True
-    if name == "properties" and element.tag.startswith((FLOWABLE, ACTIVITI)):
+    if name == "properties" and not element.tag.startswith(CAMUNDA):
         return False
     if name in CHANGING:
         effect, right = CHANGING[name]
@@ -161,7 +161,7 @@ def _say_effect(tree: Tree, element: etree._Element, owner: etree._Element) -> b
         return True
     if name == "calledElement":
         left_out = [each for each in PROPAGATES if element.get(each) is None]
-        if left_out:
+        if left_out and "true" not in map(element.get, PROPAGATES):  # that is refused
             what = "every value passes there, and here what is listed"
             named = f"{element.prefix}:calledElement without {' and '.join(left_out)}"
             _say_changing(tree, element, named, (what, PROPAGATES_REMEDY))

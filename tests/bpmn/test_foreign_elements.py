@@ -1,0 +1,95 @@
+"""Elements and attributes of other engines: harmless, carried out, or warned of each time."""
+
+import pytest
+from bpmn_text import around, findings, process
+
+from m2pem.bpmn.foreign_elements import CARRIED_OUT, CHANGING, CHANGING_ATTRIBUTES, HARMLESS
+
+RULE = "foreign-effect"
+
+
+def warned(data: bytes) -> list[tuple[str, str, str]]:
+    return [(f.element, f.message, f.remedy) for f in findings(data) if f.rule == RULE]
+
+
+def with_element(name: str, place: str = "userTask") -> bytes:
+    prefix = (
+        "zeebe" if name in ("calledDecision", "conditionalFilter", "taskHeaders") else "camunda"
+    )
+    return around(
+        f'<{place} id="T"><extensionElements><{prefix}:{name} source="a" target="b"/>'
+        f"</extensionElements></{place}>"
+    )
+
+
+@pytest.mark.parametrize("name", sorted(CHANGING))
+def test_what_changes_the_execution_is_a_warning(name):
+    [(element, message, remedy)] = warned(with_element(name))
+    effect, right = CHANGING[name]
+    assert element == "T"
+    assert message.endswith(f"{name}: {effect}")
+    assert remedy.startswith(right)
+
+
+@pytest.mark.parametrize("name", sorted({*HARMLESS, *CARRIED_OUT} - {"calledElement"}))
+def test_what_does_not_is_none(name):
+    assert warned(with_element(name)) == []
+
+
+def test_no_element_is_in_two_places_of_the_table():
+    assert not CARRIED_OUT & HARMLESS
+    assert not set(CHANGING) & (CARRIED_OUT | HARMLESS)
+
+
+def test_each_one_is_a_warning_also_where_m2pem_has_no_elements_of_its_own():
+    listener = "<extensionElements><camunda:executionListener event='end'/></extensionElements>"
+    body = (
+        f'<startEvent id="S">{listener}</startEvent><exclusiveGateway id="g">{listener}'
+        f'</exclusiveGateway><sequenceFlow id="f" sourceRef="S" targetRef="g">{listener}'
+        '</sequenceFlow><endEvent id="E"/><sequenceFlow id="h" sourceRef="g" targetRef="E"/>'
+    )
+    assert [each[0] for each in warned(process(body))] == ["S", "g", "f"]
+
+
+@pytest.mark.parametrize("name", sorted(CHANGING_ATTRIBUTES))
+@pytest.mark.parametrize("engine", ["camunda", "flowable", "activiti"])
+def test_an_attribute_that_changes_the_execution_is_a_warning(engine, name):
+    spaces = 'xmlns:flowable="http://flowable.org/bpmn" xmlns:activiti="http://activiti.org/bpmn"'
+    [(element, message, _)] = warned(around(f'<userTask id="T" {spaces} {engine}:{name}="x"/>'))
+    assert element == "T"
+    assert message.endswith(f"{name}='x': {CHANGING_ATTRIBUTES[name][0]}")
+
+
+@pytest.mark.parametrize(
+    "attributes",
+    [
+        'camunda:asyncBefore="true"',
+        'camunda:assignee="anna"',
+        'camunda:inheritVariables="false"',
+        'camunda:priority="5"',
+    ],
+)
+def test_an_attribute_that_does_not_is_none(attributes):
+    assert warned(around(f'<userTask id="T" {attributes}/>')) == []
+
+
+def test_mappings_out_of_a_call_activity_are_warned_of_with_the_statement_to_write():
+    [(_, _, remedy)] = warned(with_element("in"))
+    assert remedy == "write it in a script task before it: b = a"
+
+
+@pytest.mark.parametrize(
+    ("attributes", "count"),
+    [
+        ("", 1),
+        ('propagateAllParentVariables="false"', 1),
+        ('propagateAllParentVariables="false" propagateAllChildVariables="false"', 0),
+    ],
+)
+def test_a_call_that_passes_everything_by_default_is_a_warning(attributes, count):
+    call = (
+        '<callActivity id="T"><extensionElements>'
+        f'<zeebe:calledElement processId="Q" {attributes}/></extensionElements></callActivity>'
+    )
+    other = '<process id="Q"><startEvent id="q"/></process>'
+    assert len(warned(around(call, other))) == count
