@@ -65,7 +65,7 @@ def test_each_token_at_the_gateway_waits_for_itself() -> None:
 
 
 def test_a_wrong_timer_behind_the_gateway_is_an_error_there() -> None:
-    play = Play(RACE.replace("PT10S", "${when}")).start({"when": 3})
+    play = Play(RACE.replace("PT10S", "${when}")).start({"when": True})
     assert play.ended == "failed"
     assert "EXPRESSION" in play.detail
 

@@ -526,3 +526,32 @@ def test_reading_a_cycle_raises_nothing_but_syntax_errors(text, at_us):
         return
     following = next_round(every.period, due_us, at_us, left, dated=every.dated)
     assert following is None or following[0] > max(due_us, at_us)
+
+
+@pytest.mark.parametrize(
+    ("text", "days"),
+    [
+        # January 2026 begins on a Thursday: its Fridays are the 2nd, 9th, 16th, 23rd and 30th.
+        ("0 8 1-7 * FRI", [1, 2, 3, 4, 5, 6, 7, 9, 16, 23, 30]),
+        ("0 8 */2 * FRI", [9, 23]),
+        ("0 8 * * FRI", [2, 9, 16, 23, 30]),
+        ("0 8 * * 5L", [30]),
+    ],
+)
+def test_both_days_of_five_fields_are_as_the_docs_say(text, days):
+    """As cronsim 2.8 and Debian's cron: one of the two, but both where one begins with `*`."""
+    found = [int(each[8:10]) for each in dates(text, 12) if each.startswith("2026-01")]
+    assert found == days
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("0 8 * * FRIL", "'FRIL' is the last Friday of the month: with five fields, write 5L"),
+        ("0 8 * * mon,sunl", "'SUNL' is the last Sunday of the month: with five fields, write 0L"),
+        ("0 8 * * FRI-MON", "passes the end of the week: write FRI,SAT,SUN,MON"),
+    ],
+)
+def test_days_with_another_form_in_five_fields_are_named_by_what_they_are(text, message):
+    with pytest.raises(ExpressionSyntaxError, match=message):
+        parse_cron(text)

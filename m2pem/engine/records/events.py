@@ -32,8 +32,8 @@ class EventAwaited(BaseRecord, frozen=True):
 
     A duration or cycle is due at a mission time (microseconds from the start, which stops during
     a pause); a date (`calendar`) at a time since the Unix epoch. `left`: how often a cycle still
-    fires after this one (-1: for ever); `cycle`: its period or cron text. `armed_us`: the mission
-    time from which a duration counts.
+    fires after this one (-1: for ever); `cycle`: its period or cron text, as
+    `m2pem.mission.timers.Round` has it. `armed_us`: the mission time from which a duration counts.
     """
 
     token: int
