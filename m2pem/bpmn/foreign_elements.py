@@ -58,6 +58,9 @@ CHANGING = {
 }
 """Elements that change what is executed: what becomes of them, and what to write instead."""
 
+NOT_OF_A_CALL = ("nothing is passed by it into or out of the called process", _CALLS)
+"""What becomes of `camunda:inputOutput` on a call activity."""
+
 _RESULT_ATTRIBUTES = ("resultVariable", "resultVariableName")
 
 CHANGING_ATTRIBUTES = {

@@ -88,14 +88,9 @@ def _duration_text(value: Value) -> str:
     stripped = text_from(value, what, ", or a number of seconds")
     if stripped.startswith("-"):
         _refuse("a duration cannot be negative", stripped)
-    if not is_duration(stripped):
+    if not _DURATION.fullmatch(stripped):
         _refuse(f"expected {what} (ISO 8601)", stripped)
     return stripped
-
-
-def is_duration(text: str) -> bool:
-    """Whether a text is an ISO 8601 duration without a sign."""
-    return _DURATION.fullmatch(text) is not None
 
 
 def _after(begin: datetime, period: str, rounds: int = 1) -> datetime:
@@ -137,7 +132,7 @@ def moment(text: str) -> datetime:
         ExpressionSyntaxError: it says none, or one that does not exist.
     """
     what = "expected a date and time such as 2026-01-01T12:00:00Z (ISO 8601)"
-    if not _DATE.fullmatch(text):
+    if len(text) > _MAX_CHARACTERS or not _DATE.fullmatch(text):
         _refuse(what, text)
     try:
         if "T" in text:

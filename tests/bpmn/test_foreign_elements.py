@@ -93,3 +93,13 @@ def test_a_call_that_passes_everything_by_default_is_a_warning(attributes, count
     )
     other = '<process id="Q"><startEvent id="q"/></process>'
     assert len(warned(around(call, other))) == count
+
+
+def test_mappings_of_camunda_7_on_a_call_activity_are_warned_of():
+    call = (
+        '<callActivity id="T" calledElement="Q"><extensionElements><camunda:inputOutput>'
+        '<camunda:inputParameter name="a">1</camunda:inputParameter></camunda:inputOutput>'
+        "</extensionElements></callActivity>"
+    )
+    [(element, message, _)] = warned(around(call, '<process id="Q"><startEvent id="q"/></process>'))
+    assert (element, "nothing is passed by it" in message) == ("T", True)

@@ -193,6 +193,7 @@ def test_a_script_of_one_expression_stores_its_value(language: str, text: str) -
     assert play(script).start({"x": 2}).data == {"x": 2, "n": 6}
 
 
+OUTPUT_OF_CODE = '<z:output source="= code + &quot;!&quot;" target="n"/>'
 ERROR = '<error id="X" errorCode="LOW"/><escalation id="Y" escalationCode="HIGH"/>'
 VARIABLES = 'c:errorCodeVariable="code" c:errorMessageVariable="why"'
 
@@ -223,3 +224,18 @@ def test_the_code_of_an_escalation_is_stored_also_where_nothing_is_interrupted()
     )
     thrown = '<escalationEventDefinition escalationRef="Y"/>'
     assert play(failing(thrown, "", outside), ERROR).start().data == {"code": "HIGH"}
+
+
+@pytest.mark.parametrize("where", ["boundary", "event subprocess"])
+def test_an_event_that_catches_an_error_passes_its_outputs_on(where: str) -> None:
+    mapped = (
+        f"<extensionElements><z:ioMapping>{OUTPUT_OF_CODE}</z:ioMapping></extensionElements>"
+        '<errorEventDefinition c:errorCodeVariable="code"/>'
+    )
+    boundary = f'<boundaryEvent id="b" attachedToRef="T">{mapped}</boundaryEvent>'
+    handler = f"""<subProcess id="h" triggeredByEvent="true"><startEvent id="hs">{mapped}
+        </startEvent></subProcess>"""
+    inside, outside = ("", boundary) if where == "boundary" else (handler, "")
+    ran = play(failing('<errorEventDefinition errorRef="X"/>', inside, outside), ERROR).start()
+    written = [each for each in ran.records() if isinstance(each, r.DataWritten)]
+    assert {each.key: each.value for each in written} == {"code": "LOW", "n": "LOW!"}

@@ -54,3 +54,31 @@ def test_a_script_that_cannot_be_evaluated_throws(before: str, script: str) -> N
     assert found["errors-caught"] == ("Count",)
     assert "no-deadlock" not in found
     assert "E" in {v.elements[0] for r in report.results for v in r.violations if v.elements}
+
+
+def test_what_a_condition_reads_of_the_time_is_either_way() -> None:
+    report = counting("a = now()", "= now() &gt; date and time(&quot;2026-01-01T00:00:00Z&quot;)")
+    assert report.judged(strict=True) is not Verdict.VIOLATED
+
+
+@pytest.mark.parametrize("variable", ["code", "other"])
+def test_the_code_of_a_caught_error_may_be_any(variable: str) -> None:
+    """Also where a script writes the same name before: both ends are reached."""
+    report = check(
+        mission(
+            '<startEvent id="S"/><endEvent id="Low"/><endEvent id="E"/><endEvent id="Done"/>',
+            '<scriptTask id="T" scriptFormat="m2pem"><script>code = "none"\nthrow error LOW</script>'
+            '</scriptTask><boundaryEvent id="B" attachedToRef="T"><errorEventDefinition '
+            'xmlns:c="http://camunda.org/schema/1.0/bpmn" '
+            f'c:errorCodeVariable="{variable}"/></boundaryEvent>',
+            '<exclusiveGateway id="G" default="G-E"/>',
+            flow("S", "T"),
+            flow("T", "Done"),
+            flow("B", "G"),
+            flow("G", "E"),
+            '<sequenceFlow id="G-Low" sourceRef="G" targetRef="Low">'
+            "<conditionExpression>code == 'LOW'</conditionExpression></sequenceFlow>",
+        )
+    )
+    dead = {v.elements[0] for r in report.results for v in r.violations if v.elements}
+    assert ("Low" in dead) is (variable == "other")

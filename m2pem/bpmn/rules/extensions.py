@@ -10,6 +10,7 @@ from m2pem.bpmn.foreign_elements import (
     ENGINES,
     EXPRESSIONS,
     HARMLESS,
+    NOT_OF_A_CALL,
     PROPAGATES,
     PROPAGATES_REMEDY,
 )
@@ -153,6 +154,9 @@ def _say_effect(tree: Tree, element: etree._Element, owner: etree._Element) -> b
         return True
     if name == "properties" and not element.tag.startswith(CAMUNDA):
         return False
+    if name == "inputOutput" and owner.tag == _CALL:
+        _say_changing(tree, element, f"{element.prefix}:{name}", NOT_OF_A_CALL)
+        return True
     if name in CHANGING:
         effect, right = CHANGING[name]
         if name in ("in", "out") and (source := element.get("source")):

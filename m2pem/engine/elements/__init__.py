@@ -58,6 +58,6 @@ HANDLERS: dict[type[FlowNode], ElementHandler] = {
         complete=events.complete,
     ),
     e.IntermediateThrowEvent: ElementHandler(activate=events.throw, complete=events.complete),
-    e.BoundaryEvent: ElementHandler(activate=events.complete, complete=events.complete),
+    e.BoundaryEvent: ElementHandler(activate=events.leave_caught, complete=events.complete),
     e.EndEvent: ElementHandler(activate=events.end, complete=Execution.consume),
 }

@@ -46,11 +46,26 @@ def start(x: Execution, token: Token) -> None:
     assert isinstance(node, StartEvent)
     if node.definitions and not x.has_been_triggered(token):
         catch(x, token)
-    elif node.definitions:
-        if not token.waits:  # else others of its triggers must still occur
-            complete(x, token)
-    elif pass_event_outputs(x, token):
+    elif not token.waits:  # else others of its triggers must still occur
+        leave_caught(x, token)
+
+
+def leave_caught(x: Execution, token: Token) -> None:
+    """Leave an event that has occurred. What a trigger brought has been received with it; where
+    none brings anything, the event's outputs are passed now."""
+    node = token.node
+    assert isinstance(node, Event)
+    received = any(not isinstance(each, _THROWN_AT_IT) for each in node.definitions)
+    if received or pass_event_outputs(x, token):
         complete(x, token)
+
+
+_THROWN_AT_IT = (
+    CancelEventDefinition,
+    CompensateEventDefinition,
+    ErrorEventDefinition,
+    EscalationEventDefinition,
+)
 
 
 def catch(x: Execution, token: Token) -> None:
