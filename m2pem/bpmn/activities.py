@@ -18,6 +18,7 @@ from m2pem.bpmn.rules.activities import (
     START_QUANTITY,
 )
 from m2pem.bpmn.rules.data import ASSOCIATION_IGNORED, BAD_KEY
+from m2pem.bpmn.rules.extensions import FOREIGN_EFFECT
 from m2pem.bpmn.rules.rule import Rule
 from m2pem.bpmn.tasks import (
     read_business_rule_task,
@@ -106,7 +107,9 @@ def read_call_activity(context: ReadingContext, found: Children) -> CallActivity
     for element, direction in _mapping_elements(found):
         mapping = _mapping(context, found, element)
         if mapping is not None:
-            (inputs if direction == "in" else outputs).append(mapping)
+            before = inputs if direction == "in" else outputs
+            _warn_of_order(context, found, element, mapping, before)
+            before.append(mapping)
     for each in found.extensions():
         if each.tag == ZEEBE + "calledElement":
             called = called or each.get("processId", "")
@@ -171,6 +174,25 @@ def _mapping(context: ReadingContext, found: Children, element: etree._Element) 
         )
         return None
     return None if source is None else Mapping(source, target, line)
+
+
+def _warn_of_order(
+    context: ReadingContext,
+    found: Children,
+    element: etree._Element,
+    mapping: Mapping,
+    before: list[Mapping],
+) -> None:
+    """Camunda 8's mappings read what those before them have set; those of a call here do not."""
+    for each in before if element.tag.startswith(ZEEBE) else ():
+        if each.target in mapping.source.names:
+            context.findings.warning(
+                element,
+                found.id,
+                FOREIGN_EFFECT,
+                f"'{mapping.target}' does not read what the mapping before it sets, '{each.target}'",
+                f"write {each.source.text.strip()} in place of {each.target}",
+            )
 
 
 def _source(context: ReadingContext, found: Children, element: etree._Element) -> Expression | None:

@@ -4,6 +4,7 @@
 when it has completed. Each mapping reads what those before it have set.
 """
 
+import re
 from collections.abc import Iterator
 
 from lxml import etree
@@ -23,6 +24,9 @@ from m2pem.mission.expression import Expression, literal, template
 _WRAPPERS = (ZEEBE + "ioMapping", CAMUNDA + "inputOutput")
 _INPUTS = (ZEEBE + "input", CAMUNDA + "inputParameter")
 _OUTPUTS = (ZEEBE + "output", CAMUNDA + "outputParameter")
+_TARGET = re.compile(r"[^\W\d]\w*(?:[. ]\w+)*")
+"""A name of the data; one with spaces FEEL can read."""
+
 _SCRIPT = ZEEBE + "script"
 _ENGINES = (CAMUNDA, FLOWABLE, ACTIVITI)
 
@@ -61,11 +65,8 @@ def _mappings(
     for element in (each for wrapper in wrappers for each in wrapper if each.tag in tags):
         target = (element.get("target") or element.get("name") or "").strip()
         source = element.get("source") if element.tag.startswith(ZEEBE) else text_of(element)
-        if not KEY.fullmatch(target):
-            what = f"its target, '{target}', is no name of the data"
-            context.findings.error(
-                element, node.id, BAD_KEY, what, 'write for example target="mission.speed"'
-            )
+        if not _TARGET.fullmatch(target):
+            _not_carried_out(context, element, node, target, "that is no name of the data")
         elif len(element):
             _not_carried_out(
                 context, element, node, target, f"a {local(element[0].tag)} is not read"

@@ -15,15 +15,16 @@ def mapped(mapping: str, wrapper: str = "zeebe:ioMapping", inside: str = "") -> 
     )
 
 
-def test_a_mapping_that_is_carried_out_is_no_finding() -> None:
-    assert said(mapped('<zeebe:output source="= 7" target="n"/>')) == []
+@pytest.mark.parametrize("target", ["n", "mission.speed", "Vacation Approval"])
+def test_a_mapping_that_is_carried_out_is_no_finding(target: str) -> None:
+    assert said(mapped(f'<zeebe:output source="= 7" target="{target}"/>')) == []
 
 
 @pytest.mark.parametrize(
     ("mapping", "wrapper", "rule", "message"),
     [
-        ('<zeebe:input source="= 1" target="a b"/>', "zeebe:ioMapping", "bad-key", "'a b'"),
-        ('<zeebe:input source="= 1"/>', "zeebe:ioMapping", "bad-key", "no name"),
+        ('<zeebe:input source="= 1" target="a-b"/>', "zeebe:ioMapping", "foreign-effect", "'a-b'"),
+        ('<zeebe:input source="= 1"/>', "zeebe:ioMapping", "foreign-effect", "no name"),
         (
             '<zeebe:input source="= {a: 1}" target="a"/>',
             "zeebe:ioMapping",
@@ -74,3 +75,15 @@ def test_a_name_of_an_error_variable_is_checked():
         'camunda:errorCodeVariable="a b"/></boundaryEvent>'
     )
     assert "bad-key" in [rule for rule, _ in said(task)]
+
+
+def test_a_mapping_of_a_call_that_reads_the_one_before_it_is_a_finding():
+    call = (
+        '<callActivity id="T"><extensionElements><zeebe:calledElement processId="Q" '
+        'propagateAllParentVariables="false" propagateAllChildVariables="false"/><zeebe:ioMapping>'
+        '<zeebe:input source="= x" target="a"/><zeebe:input source="= a + 1" target="b"/>'
+        "</zeebe:ioMapping></extensionElements></callActivity>"
+    )
+    found = findings(around(call, '<process id="Q"><startEvent id="q"/></process>'))
+    [finding] = [each for each in found if each.rule == "foreign-effect"]
+    assert "'b' does not read what the mapping before it sets, 'a'" in finding.message

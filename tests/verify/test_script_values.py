@@ -67,7 +67,7 @@ def test_the_code_of_a_caught_error_may_be_any(variable: str) -> None:
     report = check(
         mission(
             '<startEvent id="S"/><endEvent id="Low"/><endEvent id="E"/><endEvent id="Done"/>',
-            '<scriptTask id="T" scriptFormat="m2pem"><script>code = "none"\nthrow error LOW</script>'
+            '<scriptTask id="T" scriptFormat="m2pem"><script>code = 0\nthrow error LOW</script>'
             '</scriptTask><boundaryEvent id="B" attachedToRef="T"><errorEventDefinition '
             'xmlns:c="http://camunda.org/schema/1.0/bpmn" '
             f'c:errorCodeVariable="{variable}"/></boundaryEvent>',
