@@ -190,7 +190,7 @@ def _warn_of_order(
                 element,
                 found.id,
                 FOREIGN_EFFECT,
-                f"'{mapping.target}' does not read what the mapping before it sets, '{each.target}'",
+                f"'{mapping.target}' does not read the '{each.target}' of the mapping before it",
                 f"write {each.source.text.strip()} in place of {each.target}",
             )
 

@@ -42,7 +42,10 @@ _DURATION = re.compile(
     rf"P(?=[0-9T])(?:[0-9]+Y)?(?:[0-9]+M)?(?:{_NUMBER}W)?(?:{_NUMBER}D)?"
     rf"(?:T(?=[0-9])(?:{_NUMBER}H)?(?:{_NUMBER}M)?(?:{_NUMBER}S)?)?"
 )
-_DATE = re.compile(r"([0-9]{4}-[0-9]{2}-[0-9]{2}|[0-9]{8})(T[0-9:.,]+(Z|[+-][0-9:]+)?)?")
+# isodate 0.7 reads the month 00 as January.
+_DATE = re.compile(
+    r"(?![0-9]{4}-?00)([0-9]{4}-[0-9]{2}-[0-9]{2}|[0-9]{8})(T[0-9:.,]+(Z|[+-][0-9:]+)?)?"
+)
 
 
 def duration_us(value: Value, at_us: int) -> int:

@@ -86,4 +86,4 @@ def test_a_mapping_of_a_call_that_reads_the_one_before_it_is_a_finding():
     )
     found = findings(around(call, '<process id="Q"><startEvent id="q"/></process>'))
     [finding] = [each for each in found if each.rule == "foreign-effect"]
-    assert "'b' does not read what the mapping before it sets, 'a'" in finding.message
+    assert "'b' does not read the 'a' of the mapping before it" in finding.message

@@ -68,7 +68,7 @@ ROLES = [
     ('count="2"', "has one vehicle in each role, not 2", "or delete count="),
     ('wait="ten minutes"', "wait='ten minutes': expected a duration", "wait='PT10M'"),
     ('wait="-PT5M"', "a duration cannot be negative", "or wait='unlimited'"),
-    ('wait="${3}"', "wait='${3}': expected a duration", "wait='PT10M'"),
+    ('wait="${true}"', "wait='${true}': expected a duration", "wait='PT10M'"),
     ('wait="${1+}"', "expected a value, found the end", "write for example"),
     ('wait=""', "wait='': expected a duration", "wait='PT10M'"),
     ('priority="1.5"', "priority='1.5' is no whole number", "write for example priority='1'"),

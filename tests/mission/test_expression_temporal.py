@@ -27,6 +27,7 @@ DATA = {NOW: "2026-11-29T12:00:00Z", "x": 7, "due": "2030-01-01T00:00:00Z"}
          "2026-02-28T10:00:00+02:00"),
         ('duration("P1Y2M") - duration("P1M")', "P1Y1M"),
         ('duration("P14M")', "P1Y2M"),
+        ('duration("P0Y")', "P0M"),
         ('string(duration("PT90S"))', "PT1M30S"),
         ('string(duration("-PT90S"))', "-PT1M30S"),
         ('duration("PT1M") = duration("PT60S")', True),

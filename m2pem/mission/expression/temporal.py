@@ -100,14 +100,15 @@ def read_duration(value: str | timedelta | Months) -> timedelta | Months:
     text = text.removeprefix("-")
     _read("duration", times.duration_us, text, 0)
     found = isodate.parse_duration(text)
-    if isinstance(found, timedelta):
+    days = text.partition("T")[0]
+    if isinstance(found, timedelta) and "Y" not in days and "M" not in days:
         return sign * found
-    if found.tdelta:
+    if getattr(found, "tdelta", found):
         raise ExpressionError(
             f"duration(): '{text}' has months and days; it is of years and months, or of days and "
             "time"
         )
-    return Months(sign * int(found.years * 12 + found.months))
+    return Months(sign * int(getattr(found, "years", 0) * 12 + getattr(found, "months", 0)))
 
 
 def read_cycle(first: int | timedelta | Months, second: timedelta | Months | None = None) -> str:
