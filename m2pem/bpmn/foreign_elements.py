@@ -43,17 +43,31 @@ CHANGING = {
         "add what it filters to the condition",
     ),
     "connector": ("the connector is not called", _SERVICE),
+    "errorEventDefinition": (
+        "a failure of the task is not turned into that error",
+        "let the service fail with that code",
+    ),
+    "eventInParameter": ("nothing is passed with the event", "send a message with data inputs"),
     "eventListener": ("the listener is not called", _WRITES),
+    "eventOutParameter": ("nothing of the event is stored", "receive a message with data outputs"),
     "executionListener": ("the listener is not called", _WRITES),
     "executionListeners": ("the listeners are not called", _WRITES),
     "field": ("the field is not passed", _PROPERTIES),
     "formData": ("the form is not shown, and its fields and defaults are not written", _DECISIONS),
     "formProperty": ("the form is not shown, and its default is not written", _DECISIONS),
     "in": ("nothing is passed: it is no call activity", "write it in a script task before it"),
+    "mapException": (
+        "an exception is not turned into that error",
+        "let the service fail with that code",
+    ),
     "out": ("nothing is passed: it is no call activity", "write it in a script task after it"),
     "taskHeaders": ("the headers are not passed", _PROPERTIES),
     "taskListener": ("the listener is not called", _WRITES),
     "taskListeners": ("the listeners are not called", _WRITES),
+    "variableAggregation": (
+        "the values of the instances are not collected",
+        "collect them by loopDataOutputRef and outputDataItem",
+    ),
     "variableListener": ("the listener is not called", _WRITES),
 }
 """Elements that change what is executed: what becomes of them, and what to write instead."""
@@ -77,17 +91,36 @@ CHANGING_ATTRIBUTES = {
         "no one who starts a mission is stored",
         "give it with --data, or let a service write it",
     ),
+    "resource": ("the file of the script is not read", "write the script into the element"),
     "skipExpression": (
         "the task is not skipped",
         "draw a gateway before it, with a flow around it",
     ),
+    "terminateAll": (
+        "its own scope ends, and no other",
+        "throw an error that the outer one catches",
+    ),
+    "triggerable": (
+        "the task does not wait for a trigger after it",
+        "draw a receive task after it",
+    ),
     "variableMappingClass": ("nothing passes that is not listed", _CALLS),
     "variableMappingDelegateExpression": ("nothing passes that is not listed", _CALLS),
+    "variableName": (
+        "the condition is evaluated after any name of the data was written",
+        "add what it filters to the condition",
+    ),
 }
 """Attributes that change what is executed, as `CHANGING`; with the value "false" they do not."""
 
 EXPRESSIONS = ("feel", "juel")
 """Formats of scripts that are one expression, whose value a result variable gets."""
+
+AD_HOC_OUTPUT = (
+    "the values of the activities are not collected",
+    "write them in script tasks: name = expression",
+)
+"""What becomes of an `outputCollection` of `zeebe:adHoc`."""
 
 PROPAGATES = ("propagateAllParentVariables", "propagateAllChildVariables")
 """Attributes of `zeebe:calledElement` that are true where they are left out."""

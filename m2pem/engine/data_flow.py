@@ -33,7 +33,8 @@ def evaluate(
         try:
             value = mapping.source.evaluate(read)
             values.append((mapping, value))
-            done.update({mapping.target: value, **dict(flatten(mapping.target, value))})
+            if ordered:
+                done.update({mapping.target: value, **dict(flatten(mapping.target, value))})
         except ExpressionError as error:
             throw_error(x, token, "EXPRESSION", f"mapping to {mapping.target}: {error}")
             return None

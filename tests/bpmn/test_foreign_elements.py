@@ -95,6 +95,15 @@ def test_a_call_that_passes_everything_by_default_is_a_warning(attributes, count
     assert len(warned(around(call, other))) == count
 
 
+def test_an_output_collection_of_an_ad_hoc_subprocess_is_warned_of():
+    ad_hoc = (
+        '<adHocSubProcess id="T"><extensionElements><zeebe:adHoc outputCollection="results" '
+        'outputElement="= x"/></extensionElements><task id="t"/></adHocSubProcess>'
+    )
+    [(element, message, _)] = warned(around(ad_hoc))
+    assert (element, "are not collected" in message) == ("T", True)
+
+
 def test_mappings_of_camunda_7_on_a_call_activity_are_warned_of():
     call = (
         '<callActivity id="T" calledElement="Q"><extensionElements><camunda:inputOutput>'

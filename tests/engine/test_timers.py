@@ -266,3 +266,27 @@ def test_now_is_the_time_of_the_input_and_its_value_is_in_a_record() -> None:
     assert play.data["at"] == START_US / 1e6 + 90
     play.advance(1000)
     assert play.data["at"] == START_US / 1e6 + 90
+
+
+@pytest.mark.parametrize(
+    "time",
+    ['date = now() + duration("PT8S")', "timer = duration(text)", "cycle = cycle(duration(text))"],
+)
+def test_timers_of_other_places_take_what_is_computed(time: str) -> None:
+    interrupting = Play(f"""
+        <startEvent id="start"/> <userTask id="u"/> <userTask id="after"/>
+        <boundaryEvent id="late" attachedToRef="u">{time}</boundaryEvent>
+        start -> u
+        late -> after
+    """).start({"text": "PT8S"})
+    assert interrupting.advance(7.9).at == "u"
+    assert interrupting.advance(0.1).at == "after"
+    in_scope = Play(f"""
+        <startEvent id="start"/> <userTask id="u"/>
+        <subProcess id="h" triggeredByEvent="true">
+          <startEvent id="due">{time}</startEvent> <userTask id="after"/>
+          due -> after
+        </subProcess>
+        start -> u
+    """).start({"text": "PT8S"})
+    assert in_scope.advance(8).at == "after"

@@ -4,6 +4,7 @@ from lxml import etree
 
 from m2pem.bpmn.extensions import ELEMENTS, PLACES, looks_like_own, unknown_content
 from m2pem.bpmn.foreign_elements import (
+    AD_HOC_OUTPUT,
     CARRIED_OUT,
     CHANGING,
     CHANGING_ATTRIBUTES,
@@ -157,6 +158,8 @@ def _say_effect(tree: Tree, element: etree._Element, owner: etree._Element) -> b
     if name == "inputOutput" and owner.tag == _CALL:
         _say_changing(tree, element, f"{element.prefix}:{name}", NOT_OF_A_CALL)
         return True
+    if name == "adHoc" and element.get("outputCollection"):
+        _say_changing(tree, element, f"{element.prefix}:{name} outputCollection", AD_HOC_OUTPUT)
     if name in CHANGING:
         effect, right = CHANGING[name]
         if name in ("in", "out") and (source := element.get("source")):
