@@ -36,80 +36,65 @@ HARMLESS = frozenset(
 )  # fmt: skip
 """Elements without an effect on what is executed, or with a finding of their own."""
 
+_LISTENER = ("the listener is not called", _WRITES)
+_FORM = ("the form is not shown, and its fields and defaults are not written", _DECISIONS)
+_FAILURE = (
+    "a failure of the task is not turned into that error",
+    "let the service fail with that code",
+)
+_DECISION = ("the decision is not evaluated", _SERVICE)
+_LISTED = ("nothing passes that is not listed", _CALLS)
+_FILTER = (
+    "the condition is evaluated after any name of the data was written",
+    "add what it filters to the condition",
+)
+
 CHANGING = {
-    "calledDecision": ("the decision is not evaluated", _SERVICE),
-    "conditionalFilter": (
-        "the condition is evaluated after any name of the data was written",
-        "add what it filters to the condition",
-    ),
+    **dict.fromkeys(("eventListener", "variableListener"), _LISTENER),
+    **dict.fromkeys(("executionListener", "executionListeners"), _LISTENER),
+    **dict.fromkeys(("taskListener", "taskListeners"), _LISTENER),
+    **dict.fromkeys(("formData", "formProperty"), _FORM),
+    **dict.fromkeys(("errorEventDefinition", "mapException"), _FAILURE),
+    **dict.fromkeys(("field", "taskHeaders"), ("it is not passed to the service", _PROPERTIES)),
+    "calledDecision": _DECISION,
+    "conditionalFilter": _FILTER,
     "connector": ("the connector is not called", _SERVICE),
-    "errorEventDefinition": (
-        "a failure of the task is not turned into that error",
-        "let the service fail with that code",
-    ),
     "eventInParameter": ("nothing is passed with the event", "send a message with data inputs"),
-    "eventListener": ("the listener is not called", _WRITES),
     "eventOutParameter": ("nothing of the event is stored", "receive a message with data outputs"),
-    "executionListener": ("the listener is not called", _WRITES),
-    "executionListeners": ("the listeners are not called", _WRITES),
-    "field": ("the field is not passed", _PROPERTIES),
-    "formData": ("the form is not shown, and its fields and defaults are not written", _DECISIONS),
-    "formProperty": ("the form is not shown, and its default is not written", _DECISIONS),
     "in": ("nothing is passed: it is no call activity", "write it in a script task before it"),
-    "mapException": (
-        "an exception is not turned into that error",
-        "let the service fail with that code",
-    ),
     "out": ("nothing is passed: it is no call activity", "write it in a script task after it"),
-    "taskHeaders": ("the headers are not passed", _PROPERTIES),
-    "taskListener": ("the listener is not called", _WRITES),
-    "taskListeners": ("the listeners are not called", _WRITES),
     "variableAggregation": (
         "the values of the instances are not collected",
         "collect them by loopDataOutputRef and outputDataItem",
     ),
-    "variableListener": ("the listener is not called", _WRITES),
 }
 """Elements that change what is executed: what becomes of them, and what to write instead."""
 
 NOT_OF_A_CALL = ("nothing is passed by it into or out of the called process", _CALLS)
 """What becomes of `camunda:inputOutput` on a call activity."""
 
-_RESULT_ATTRIBUTES = ("resultVariable", "resultVariableName")
-
 CHANGING_ATTRIBUTES = {
-    **dict.fromkeys(_RESULT_ATTRIBUTES, ("the result is not stored", _RESULT)),
-    "decisionRef": ("the decision is not evaluated", _SERVICE),
-    "decisionTableReferenceKey": ("the decision is not evaluated", _SERVICE),
+    **dict.fromkeys(("resultVariable", "resultVariableName"), ("it is not stored", _RESULT)),
+    **dict.fromkeys(("decisionRef", "decisionTableReferenceKey"), _DECISION),
+    **dict.fromkeys(("inheritVariables", "variableMappingClass"), _LISTED),
+    "variableMappingDelegateExpression": _LISTED,
+    "variableName": _FILTER,
     "errorVariableName": (
         "the error is not stored",
         'camunda:errorCodeVariable="name" stores its code, camunda:errorMessageVariable its reason',
     ),
-    "idVariableName": ("the variable is not written", "delete it"),
-    "inheritVariables": ("nothing passes that is not listed", _CALLS),
+    "idVariableName": ("it is not written", "delete it"),
     "initiator": (
         "no one who starts a mission is stored",
         "give it with --data, or let a service write it",
     ),
     "resource": ("the file of the script is not read", "write the script into the element"),
-    "skipExpression": (
-        "the task is not skipped",
-        "draw a gateway before it, with a flow around it",
-    ),
+    "skipExpression": ("the task is not skipped", "draw a gateway and a flow around the task"),
     "terminateAll": (
         "its own scope ends, and no other",
         "throw an error that the outer one catches",
     ),
-    "triggerable": (
-        "the task does not wait for a trigger after it",
-        "draw a receive task after it",
-    ),
-    "variableMappingClass": ("nothing passes that is not listed", _CALLS),
-    "variableMappingDelegateExpression": ("nothing passes that is not listed", _CALLS),
-    "variableName": (
-        "the condition is evaluated after any name of the data was written",
-        "add what it filters to the condition",
-    ),
+    "triggerable": ("the task does not wait for a trigger", "draw a receive task after it"),
 }
 """Attributes that change what is executed, as `CHANGING`; with the value "false" they do not."""
 
