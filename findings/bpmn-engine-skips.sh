@@ -2,7 +2,7 @@
 # Program: bpmn-engine 25.0.1 (bpmn-elements). Date: 2026-11-29.
 # Expected: a conditional flow whose condition is "false" is not taken, and one in an expression language that the engine
 #   does not have ("x > 10") is an error. A task with standardLoopCharacteristics loopMaximum 3 runs up to three times
-#   (BPMN 2.0, 13.3.6), or the engine says that it does not support it, as it does for complexGateway.
+#   (BPMN 2.0.2, 13.3.6), or the engine says that it does not support it, as it does for complexGateway.
 # Seen: only ${...} is evaluated; any other text is a string that is not empty, hence true: both flows "false" and
 #   "x > 10" (x is 5) are taken instead of the default. The task with the standard loop runs once. Neither gives an error.
 # Matters: a diagram written for another engine passes every gate that should have stopped it.

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Program: SpiffWorkflow 3.2.0. Date: 2026-11-29.
-# Expected: a conditional sequence flow out of a task is taken only if its condition is true (BPMN 2.0, 8.3.13 and
-#   13.3.1); an engine that does not support conditions there refuses the file.
+# Expected: a conditional sequence flow out of a task is taken only if its condition is true (BPMN 2.0.2,
+#   13.3.1 Sequence Flow Considerations); an engine that does not support conditions there refuses the file.
 # Seen: with two outgoing flows the parser does refuse. With one, it accepts the file and never evaluates the condition:
 #   the flow is taken although it is False, even if the expression names a variable that does not exist. Behind an
 #   exclusive gateway the same lone condition counts.
