@@ -10,7 +10,8 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 cd "$work"
 python3 -m venv --without-pip venv
-python3 -m pip --python venv/bin/python install -qq --no-compile pm4py==2.7.23.11
+python3 -m pip --python venv/bin/python install -qq --no-compile --no-deps pm4py==2.7.23.11 lxml==6.1.3 \
+  networkx==3.6.1 numpy==2.4.6 packaging==26.4 pandas==3.1.1 python-dateutil==2.9.0.post0 pytz==2026.6 six==1.17.0
 
 flow() { echo "<sequenceFlow id=\"$1$2\" sourceRef=\"$1\" targetRef=\"$2\"/>"; }
 head='<definitions xmlns="http://www.omg.org/spec/BPMN/20100524/MODEL" targetNamespace="urn:t"><process id="P">'
