@@ -24,7 +24,9 @@ const choice = (condition) => `<startEvent id="S"/><exclusiveGateway id="X" defa
     <conditionExpression xsi:type="tFormalExpression">${condition}</conditionExpression></sequenceFlow>`;
 const loop = `<startEvent id="S"/><sequenceFlow id="f1" sourceRef="S" targetRef="T"/>
   <task id="T"><standardLoopCharacteristics loopMaximum="3"/></task>`;
-for (const [name, body] of [['\${false}', choice('${false}')], ['false', choice('false')], ['x > 10', choice('x &gt; 10')], ['loop', loop]]) {
+for (const [name, body] of [
+  ['${false}', choice('${false}')], ['false', choice('false')], ['x > 10', choice('x &gt; 10')], ['loop', loop],
+]) {
   const ended = [], listener = new EventEmitter();
   listener.on('activity.end', ({ id }) => ended.push(id));
   await new Promise((resolve, reject) => new Engine({ source: file(body) })

@@ -20,7 +20,8 @@ const read = async (body) => (await new BpmnModdle().fromXML(`<definitions id="d
   <process id="P">${body}</process></definitions>`)).rootElement;
 const timer = (id) => (value) => `<intermediateCatchEvent id="T"><timerEventDefinition ${id}>
   <timeDuration>${value}</timeDuration></timerEventDefinition></intermediateCatchEvent>`;
-const message = (value) => `<intermediateCatchEvent id="T"><messageEventDefinition id="D" messageRef="${value}"/></intermediateCatchEvent>`;
+const message = (value) => `<intermediateCatchEvent id="T">
+  <messageEventDefinition id="D" messageRef="${value}"/></intermediateCatchEvent>`;
 const lane = (value) => `<laneSet id="L">${['l1', 'l2'].map((l) => `<lane id="${l}">
   ${l === value ? '<flowNodeRef>T</flowNodeRef>' : ''}</lane>`).join('')}</laneSet><task id="T"/>`;
 for (const [name, make, before, after] of [

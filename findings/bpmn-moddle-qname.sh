@@ -14,7 +14,8 @@ npm install --silent --no-audit --no-fund bpmn-moddle@10.3.1 >/dev/null
 
 cat > try.mjs <<'EOF'
 import { BpmnModdle } from 'bpmn-moddle';
-const file = (ref) => `<definitions xmlns="http://www.omg.org/spec/BPMN/20100524/MODEL" xmlns:tns="urn:t" targetNamespace="urn:t">
+const file = (ref) => `<definitions xmlns="http://www.omg.org/spec/BPMN/20100524/MODEL"
+  xmlns:tns="urn:t" targetNamespace="urn:t">
   <message id="M" name="go"/>
   <process id="P"><receiveTask id="R" messageRef="${ref}"/></process></definitions>`;
 for (const ref of ['M', 'tns:M']) {

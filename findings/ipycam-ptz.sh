@@ -33,7 +33,8 @@ def after(action, content, wait_s=0.0):
 
 where = lambda s: (s["pan"], s["tilt"], s["zoom"])
 print("zoom", where(after("AbsoluteMove", '<Position><t:Zoom x="0.2"/></Position>')))
-print("zoom with speed", where(after("AbsoluteMove", '<Position><t:Zoom x="0.2"/></Position><Speed><t:PanTilt x="1" y="1"/></Speed>')))
+print("zoom with speed", where(after("AbsoluteMove",
+      '<Position><t:Zoom x="0.2"/></Position><Speed><t:PanTilt x="1" y="1"/></Speed>')))
 print("x y", where(after("AbsoluteMove", '<Position><t:PanTilt x="0.5" y="-0.5"/></Position>')))
 print("y x", where(after("AbsoluteMove", '<Position><t:PanTilt y="-0.5" x="0.5"/></Position>')))
 print("1.5 s after a timeout of 0.5 s moving:",

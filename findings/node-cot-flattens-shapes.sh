@@ -15,14 +15,17 @@ npm install --silent --no-audit --no-fund @tak-ps/node-cot@12.23.0 >/dev/null
 
 cat > try.mjs <<'EOF'
 import CoT from '@tak-ps/node-cot';
-const feature = (type, coordinates) => ({ id: 'F', type: 'Feature', properties: { callsign: 'F' }, geometry: { type, coordinates } });
+const feature = (type, coordinates) => (
+  { id: 'F', type: 'Feature', properties: { callsign: 'F' }, geometry: { type, coordinates } });
 for (const [name, input] of [
   ['line', feature('LineString', [[0, 0, 50], [0, 1, 60]])],
-  ['polygon', feature('Polygon', [[[0, 0, 50], [0, 3, 50], [3, 3, 50], [0, 0, 50]], [[1, 1.5, 50], [1, 2, 50], [1.5, 2, 50], [1, 1.5, 50]]])],
+  ['polygon', feature('Polygon', [[[0, 0, 50], [0, 3, 50], [3, 3, 50], [0, 0, 50]],
+    [[1, 1.5, 50], [1, 2, 50], [1.5, 2, 50], [1, 1.5, 50]]])],
   ['point', feature('Point', [20, 10])],
 ]) {
   const xml = CoT.from_geojson(input).to_xml();
-  console.log(name, /hae="[^"]*" ce="[^"]*"/.exec(xml)[0], [...xml.matchAll(/link point="([^"]*)"/g)].map((m) => m[1]).join(' '));
+  console.log(name, /hae="[^"]*" ce="[^"]*"/.exec(xml)[0],
+    [...xml.matchAll(/link point="([^"]*)"/g)].map((m) => m[1]).join(' '));
 }
 EOF
 diff <(node try.mjs) - <<'EOF'

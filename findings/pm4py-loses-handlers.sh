@@ -17,11 +17,13 @@ flow() { echo "<sequenceFlow id=\"$1$2\" sourceRef=\"$1\" targetRef=\"$2\"/>"; }
 head='<definitions xmlns="http://www.omg.org/spec/BPMN/20100524/MODEL" targetNamespace="urn:t"><process id="P">'
 cat > boundary.bpmn <<EOF
 $head<startEvent id="S"/>$(flow S A)<task id="A" name="fly"/>$(flow A E)<endEvent id="E"/>
-<boundaryEvent id="B" attachedToRef="A"><timerEventDefinition/></boundaryEvent>$(flow B R)<task id="R" name="land"/>$(flow R F)<endEvent id="F"/>
+<boundaryEvent id="B" attachedToRef="A"><timerEventDefinition/></boundaryEvent>
+$(flow B R)<task id="R" name="land"/>$(flow R F)<endEvent id="F"/>
 </process></definitions>
 EOF
 cat > sub.bpmn <<EOF
-$head<startEvent id="S"/>$(flow S A)<subProcess id="A"><startEvent id="s"/>$(flow s I)<task id="I" name="look"/>$(flow I e)<endEvent id="e"/></subProcess>
+$head<startEvent id="S"/>$(flow S A)<subProcess id="A">
+<startEvent id="s"/>$(flow s I)<task id="I" name="look"/>$(flow I e)<endEvent id="e"/></subProcess>
 $(flow A B)<task id="B" name="fly"/>$(flow B E)<endEvent id="E"/></process></definitions>
 EOF
 cat > try.py <<'EOF'
@@ -39,7 +41,8 @@ for name in ("boundary", "sub"):
             if after not in seen:
                 seen.add(after)
                 waiting.append(after)
-    print(name, "can fire", sorted(t.label for t in fired if t.label), "cannot", sorted(t.label for t in net.transitions - fired if t.label))
+    labels = lambda transitions: sorted(t.label for t in transitions if t.label)
+    print(name, "can fire", labels(fired), "cannot", labels(net.transitions - fired))
 EOF
 diff <(venv/bin/python try.py 2>/dev/null | grep 'can fire') - <<'EOF'
 boundary can fire ['fly'] cannot ['land']

@@ -18,7 +18,8 @@ from rosbags.typesys import Stores, get_typestore
 
 store = get_typestore(Stores.ROS2_JAZZY)
 NAME = "geometry_msgs/msg/PoseWithCovariance"
-point, quaternion, pose, message = (store.types[f"geometry_msgs/msg/{n}"] for n in ("Point", "Quaternion", "Pose", "PoseWithCovariance"))
+point, quaternion, pose, message = (
+    store.types[f"geometry_msgs/msg/{name}"] for name in ("Point", "Quaternion", "Pose", "PoseWithCovariance"))
 at = pose(position=point(x=1.0, y=2.0, z=3.0), orientation=quaternion(x=0.0, y=0.0, z=0.0, w=1.0))
 for kind in ("float64", "float32", "int32", "int64", ">f8"):
     covariance = np.diag([1, 1, 0, 0, 0, 4]).ravel().astype(kind)

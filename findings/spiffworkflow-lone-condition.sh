@@ -26,7 +26,8 @@ FILE = """<definitions xmlns="http://www.omg.org/spec/BPMN/20100524/MODEL" targe
     <conditionExpression xsi:type="tFormalExpression">{condition}</conditionExpression></sequenceFlow></process></definitions>"""
 TWO = """<sequenceFlow id="f3" sourceRef="A" targetRef="C">
     <conditionExpression xsi:type="tFormalExpression">True</conditionExpression></sequenceFlow><task id="C"/>"""
-for kind, condition, more in [("task", "False", ""), ("task", "no_such_name", ""), ("task", "False", TWO), ("exclusiveGateway", "False", "")]:
+for kind, condition, more in [("task", "False", ""), ("task", "no_such_name", ""), ("task", "False", TWO),
+                              ("exclusiveGateway", "False", "")]:
     try:
         parser = BpmnParser()
         parser.add_bpmn_xml(etree.fromstring(FILE.format(kind=kind, condition=condition, more=more)))

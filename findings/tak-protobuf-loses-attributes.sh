@@ -16,7 +16,11 @@ npm init -y >/dev/null
 npm install --silent --no-audit --no-fund @tak-ps/node-cot@12.23.0 >/dev/null
 
 cat > event.xml <<'EOF'
-<event version="2.0" uid="U1" type="a-f-G-U-C" how="m-g" time="2026-11-29T12:00:00.000Z" start="2026-11-29T12:00:00.000Z" stale="2026-11-29T12:05:00.000Z"><point lat="10" lon="20" hae="100" ce="5" le="7"/><detail><contact callsign="R1" phone="5550100"/><track course="10" speed="2.5" slope="3"/><status battery="55" readiness="true"/><sensor azimuth="30"/></detail></event>
+<event version="2.0" uid="U1" type="a-f-G-U-C" how="m-g" time="2026-11-29T12:00:00.000Z"
+  start="2026-11-29T12:00:00.000Z" stale="2026-11-29T12:05:00.000Z"><point lat="10" lon="20" hae="100" ce="5" le="7"/><detail>
+  <contact callsign="R1" phone="5550100"/><track course="10" speed="2.5" slope="3"/>
+  <status battery="55" readiness="true"/><sensor azimuth="30"/>
+</detail></event>
 EOF
 cat > try.py <<'EOF'
 from takproto import parse_proto, xml2proto

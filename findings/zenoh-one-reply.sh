@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Program: eclipse-zenoh 1.10.2 (Python). Date: 2026-11-29.
 # Expected: two vehicles declare a queryable on the same key expression, and a get() receives the reply of each, as a
-#   ROS 2 graph query or a discovery does.
+#   discovery needs it.
 # Seen: get() receives one reply. The default consolidation keeps the latest value of each *replied key*, and both reply
 #   on the same key; without timestamps it is left open which. Only ConsolidationMode.NONE shows both. If both declare
 #   complete=True, even that shows one: the default target then asks just one of them; QueryTarget.ALL asks both.
@@ -43,7 +43,8 @@ for _ in range(50):  # until both declarations have arrived
         break
     time.sleep(0.1)
 print("default", ask("who"), "no consolidation", ask("who", consolidation=NONE))
-print("complete: no consolidation", ask("all/who", consolidation=NONE), "and all", ask("all/who", consolidation=NONE, target=ALL))
+print("complete: no consolidation", ask("all/who", consolidation=NONE), "and all",
+      ask("all/who", consolidation=NONE, target=ALL))
 for each in (asking, r1, r2):
     each.close()
 EOF
