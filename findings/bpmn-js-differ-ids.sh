@@ -2,8 +2,8 @@
 # Program: bpmn-js-differ 3.2.0 with bpmn-moddle 10.3.1. Date: 2026-11-29.
 # Expected: the "semantic" diff of two versions of a diagram names the event whose timer or message has changed.
 # Seen: if the event definition has an id, as bpmn-js and Camunda Modeler write it, a change inside it is not found:
-#   PT5S against PT50S, or another message, is "no difference" (the definition is tracked apart from its event and then
-#   dropped). Without the id, which is optional, the same change is found. A task moved to another lane is not found either.
+#   PT5S against PT50S, or another message, is no difference. Without the id, which is optional, the same change is found.
+#   A task that is moved to another lane is not found either.
 # Matters: a review that trusts the diff passes a mission whose waiting time has grown tenfold.
 set -euo pipefail
 work=$(mktemp -d)

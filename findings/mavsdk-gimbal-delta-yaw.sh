@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Program: mavsdk 4.1.0 (gimbal), with pymavlink 2.4.50 in the part of the vehicle. Date: 2026-11-29.
-# Expected: GIMBAL_DEVICE_ATTITUDE_STATUS carries delta_yaw, the yaw of the vehicle at the moment of measurement, so that
-#   a receiver can turn one frame into the other (common.xml, and the Gimbal Protocol v2). With the yaw in the vehicle
-#   frame 30 degrees and delta_yaw 45, euler_angle_north has yaw 75.
+# Expected: GIMBAL_DEVICE_ATTITUDE_STATUS carries delta_yaw, from which a receiver calculates the attitude in the other
+#   frame: "q_earth = q_delta_yaw * q_vehicle" (common.xml). With a yaw of 30 degrees in the vehicle frame (flag 32) and
+#   a delta_yaw of 45, euler_angle_north has yaw 75.
 # Seen: delta_yaw is not read. The other frame is NaN until an ATTITUDE message has arrived (ATTITUDE_QUATERNION is not
 #   used either), and then follows from the yaw of that message: here 90, so 120 instead of 75.
 # Matters: where the camera looks on the map is NaN on a link without ATTITUDE, and late while the vehicle turns.
