@@ -87,6 +87,13 @@ def unit(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
     return file
 
 
+@pytest.mark.tried_with(
+    "systemd",
+    "`systemd-analyze verify` and `security` of the units",
+    kind="Platforms",
+    result="accepted",
+    version="252",
+)
 def test_systemd_accepts_the_unit_and_finds_it_hardened(unit: Path) -> None:
     if not shutil.which("systemd-analyze"):
         pytest.fail("needs systemd-analyze: run `make setup`, or install systemd")

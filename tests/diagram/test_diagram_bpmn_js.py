@@ -56,6 +56,12 @@ def their_ends(group: etree._Element) -> tuple[float, ...]:
 
 
 @each_picture
+@pytest.mark.tried_with(
+    "bpmn-js",
+    "draws the missions that m2pem draws",
+    kind="BPMN editors",
+    result="the same symbols at the same places",
+)
 def test_the_same_symbols_stand_at_the_same_places(mission: Path, theirs: Path) -> None:
     (picture,) = pictures_of(mission.read_bytes())
     ours = {

@@ -45,6 +45,12 @@ def test_an_editor_reads_the_mission_without_warning(
 
 
 @every_mission
+@pytest.mark.tried_with(
+    "bpmn-moddle",
+    "reads and writes every mission of the repository, as bpmn-js and Camunda Modeler do",
+    kind="BPMN editors",
+    result="no warning, nothing lost",
+)
 def test_an_editor_that_saves_the_mission_keeps_all_of_it(
     mission: Path, moddle: Mapping[str, Mapping[str, object]]
 ) -> None:
@@ -53,6 +59,14 @@ def test_an_editor_that_saves_the_mission_keeps_all_of_it(
 
 
 @every_mission
+@pytest.mark.tried_with(
+    "XML schema of BPMN 2.0 (OMG)",
+    "validates every mission of the repository",
+    kind="BPMN editors",
+    result="valid",
+    package="bpmn-moddle",
+    note="the package carries the schema",
+)
 def test_the_mission_is_valid_against_the_schema_of_bpmn(mission: Path) -> None:
     bpmn = schema()
     assert bpmn.validate(etree.parse(mission)), bpmn.error_log

@@ -44,6 +44,20 @@ STEPS = (QUESTION, VEHICLE, TEAM, PAYLOAD, SERVICE)
     ("editor", "modeler"),
     [("camunda", "cloud"), pytest.param("bpmn-io", "platform", marks=pytest.mark.long)],
 )
+@pytest.mark.tried_with(
+    "Camunda Modeler's editors",
+    "a mission is drawn with the element templates that m2pem writes, for Camunda 7 and 8",
+    kind="BPMN editors",
+    result="checked and rehearsed",
+    package="camunda-bpmn-js",
+)
+@pytest.mark.tried_with(
+    "element-templates-validator",
+    "validates the templates that m2pem writes",
+    kind="BPMN editors",
+    result="valid",
+    package="@bpmn-io/element-templates-validator",
+)
 def test_a_mission_drawn_of_templates_is_checked_and_rehearsed(
     m2pem: CommandLine, tmp_path: Path, editor: str, modeler: str
 ) -> None:

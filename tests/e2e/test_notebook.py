@@ -45,6 +45,13 @@ def test_the_notebook_is_kept_without_outputs() -> None:
     assert [each.execution_count for each in code] == [None] * len(code)
 
 
+@pytest.mark.tried_with(
+    "Jupyter",
+    "the notebook of the docs is executed",
+    kind="Platforms",
+    result="missions, findings and runs are shown",
+    package="nbclient",
+)
 def test_missions_are_shown_as_pictures(executed: list[Any]) -> None:
     drawn = shown(executed, "m2pem.draw(mission)")["image/svg+xml"]
     assert 'data-element-id="SurveyField"' in drawn

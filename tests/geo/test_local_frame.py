@@ -17,6 +17,12 @@ metres = st.floats(-30_000, 30_000)
 
 
 @given(latitudes, longitudes, altitudes, metres, metres, altitudes)
+@pytest.mark.tried_with(
+    "pymap3d",
+    "east, north and up anywhere on Earth",
+    kind="Maps and geodesy",
+    result="the same within a micrometre",
+)
 def test_east_north_and_up_agree_with_pymap3d(lat, lon, alt, east, north, up) -> None:
     frame = LocalFrame((lat, lon, alt))
     place = frame.from_enu(east, north, up)
@@ -76,6 +82,13 @@ def test_what_is_beyond_the_horizon_never_seems_near(lat, lon, to_lat, to_lon) -
 
 @pytest.mark.parametrize(("within_m", "by_m"), [(10_000, 0.001), (50_000, 0.01), (500_000, 2.0)])
 @given(latitudes, longitudes, st.floats(0, 360), st.floats(0, 1))
+@pytest.mark.tried_with(
+    "GeographicLib",
+    "distances of geodesics",
+    kind="Maps and geodesy",
+    result="within 1 mm at 10 km",
+    package="geographiclib",
+)
 def test_a_distance_is_that_of_the_geodesic(within_m, by_m, lat, lon, azimuth, part) -> None:
     there = Geodesic.WGS84.Direct(lat, lon, azimuth, within_m * part)
     found_m = distance_m((lat, lon), (there["lat2"], there["lon2"]))

@@ -47,6 +47,13 @@ def test_heights_of_a_tile_are_those_that_were_written(
     assert height_m == pytest.approx(plane(latitude, longitude), abs=0.51), "rounded to metres"
 
 
+@pytest.mark.tried_with(
+    "GDAL",
+    "reads heights of SRTM tiles",
+    kind="Maps and geodesy",
+    result="the same samples",
+    package="rasterio",
+)
 def test_rasterio_reads_the_same_samples(tile: Path) -> None:
     terrain = Terrain(tile.parent)
     with rasterio.open(tile) as judge:
@@ -88,6 +95,13 @@ def test_a_geotiff_in_degrees(tmp_path: Path) -> None:
     assert terrain.height_m((54.0, 7.0)) is None, "no file has it"
 
 
+@pytest.mark.tried_with(
+    "PROJ",
+    "places of a GeoTIFF in UTM",
+    kind="Maps and geodesy",
+    result="the same heights",
+    package="pyproj",
+)
 def test_a_geotiff_in_metres_of_utm(tmp_path: Path) -> None:
     write_geotiff(tmp_path / "dem.tiff", 32632, west=500_000.0, north=5_900_000.0, cell=10.0)
     terrain = Terrain(tmp_path)

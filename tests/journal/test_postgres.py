@@ -16,6 +16,13 @@ from m2pem.testing.contracts.journal import JournalContract
 from m2pem.testing.contracts.journal_harness import HEADER, PLAN, entry, info, opened, written
 
 
+@pytest.mark.tried_with(
+    "PostgreSQL",
+    "the contract of journals",
+    kind="Databases and brokers",
+    result="kept",
+    version="15",
+)
 class TestPostgresJournal(JournalContract):
     @pytest.fixture
     def open_journal(self, postgres_url):

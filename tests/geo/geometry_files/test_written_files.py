@@ -52,6 +52,13 @@ def read_again(content: bytes, file_format: str) -> Sequence[NamedGeometry]:
 # --- other libraries read it --------------------------------------------------------------------
 
 
+@pytest.mark.tried_with(
+    "fastkml",
+    "reads KML that m2pem writes",
+    kind="Maps and geodesy",
+    result="the same geometries",
+    package="fastkml",
+)
 def test_fastkml_reads_what_is_written() -> None:
     document = fastkml.KML.parse(BytesIO(written("kml", *EVERYTHING))).features[0]
     placemarks = {each.name: each for each in document.features}  # type: ignore[union-attr]
@@ -65,6 +72,13 @@ def test_fastkml_reads_what_is_written() -> None:
 
 
 @pytest.mark.parametrize("frame", ["relative", "amsl", "terrain"])
+@pytest.mark.tried_with(
+    "pymavlink",
+    "its `mavwp` reads `.waypoints` that m2pem writes",
+    kind="MAVLink clients",
+    result="the same places, heights and frames",
+    package="pymavlink",
+)
 def test_pymavlink_reads_what_is_written(
     tmp_path: Path, frame: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -105,6 +105,13 @@ def fleet_on(
     asyncio.run(run())
 
 
+@pytest.mark.tried_with(
+    "MAVSDK",
+    "reads the fleet on the MAVLink face",
+    kind="MAVLink clients",
+    result="finds all vehicles where they are",
+    package="mavsdk",
+)
 def test_mavsdk_lists_all_vehicles_with_their_positions(tmp_path: Path) -> None:
     async def main(_: Any, sdk: Client) -> None:
         for system, place in PLACES.items():
@@ -174,6 +181,13 @@ def test_mavsdks_offboard_is_refused_and_does_not_send_a_copter_home(tmp_path: P
     fleet_on(tmp_path, main, commands="all")
 
 
+@pytest.mark.tried_with(
+    "MAVSDK",
+    "downloads the plan of a run on the MAVLink face, and uploads one",
+    kind="MAVLink clients",
+    result="reads it; the upload is refused",
+    package="mavsdk",
+)
 def test_mavsdk_downloads_the_plan_and_may_not_upload_one(tmp_path: Path) -> None:
     async def main(control: Any, sdk: Client) -> None:
         missions = sdk.plugin(MissionRawAsync, ROVER1)
@@ -193,6 +207,13 @@ def test_mavsdk_downloads_the_plan_and_may_not_upload_one(tmp_path: Path) -> Non
     fleet_on(tmp_path, main, speed=1.0)
 
 
+@pytest.mark.tried_with(
+    "MAVSDK",
+    "looks for cameras and gimbals on the MAVLink face",
+    kind="MAVLink clients",
+    result="finds both",
+    package="mavsdk",
+)
 def test_mavsdk_finds_the_camera_and_the_gimbal(tmp_path: Path) -> None:
     async def main(_: Any, sdk: Client) -> None:
         gimbal, camera = sdk.plugin(GimbalAsync, UAV1), sdk.plugin(CameraAsync, UAV1)

@@ -34,6 +34,13 @@ async def at(
         return sim
 
 
+@pytest.mark.tried_with(
+    "pymavlink",
+    "lists and sets parameters of `m2pem sim mavlink`",
+    kind="MAVLink clients",
+    result="all are listed",
+    package="pymavlink",
+)
 async def test_all_parameters_are_listed_and_one_is_set(ground: Ground) -> None:
     def scene() -> None:
         ground.link.wait_heartbeat(timeout=40)
@@ -89,6 +96,13 @@ async def test_a_copter_takes_off_goes_somewhere_and_stops_when_velocities_end(
     assert (sim[1].takeoffs, sim[1].motions) == (1, 2)
 
 
+@pytest.mark.tried_with(
+    "pymavlink",
+    "uploads a mission to `m2pem sim mavlink`",
+    kind="MAVLink clients",
+    result="is flown to its end",
+    package="pymavlink",
+)
 async def test_a_mission_is_uploaded_flown_and_told_of_until_the_motors_stop(
     ground: Ground,
 ) -> None:

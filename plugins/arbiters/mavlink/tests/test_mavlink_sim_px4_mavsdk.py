@@ -165,6 +165,13 @@ async def test_a_simulated_px4_orbits_and_holds(copter: Flown) -> None:
     await copter.mode(FlightMode.HOLD)
 
 
+@pytest.mark.tried_with(
+    "MAVSDK",
+    "uploads a mission to `m2pem sim mavlink`",
+    kind="MAVLink clients",
+    result="is flown to its end",
+    package="mavsdk",
+)
 async def test_a_mission_is_flown_to_its_end(copter: Flown) -> None:
     await copter.up(10.0)
     await copter.missions.upload_mission(items((20.0, 0.0), (20.0, 20.0)))

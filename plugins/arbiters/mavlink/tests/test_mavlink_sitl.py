@@ -141,6 +141,14 @@ class _RealAutopilot(ArbiterContract):
 
 
 @pytest.mark.sitl("M2PEM_ARDUCOPTER")
+@pytest.mark.tried_with(
+    "ArduCopter",
+    "the contract of arbiters: behaviors, holding, failures, restarts; by pymavlink and by MAVSDK",
+    kind="Autopilots",
+    result="kept",
+    version="4.7.0-dev",
+    on="2026-11",
+)
 class TestArduCopter(_RealAutopilot):
     variable = "M2PEM_ARDUCOPTER"
 
@@ -149,6 +157,14 @@ class TestArduCopter(_RealAutopilot):
 
 
 @pytest.mark.sitl("M2PEM_ARDUROVER")
+@pytest.mark.tried_with(
+    "ArduRover",
+    "the contract of arbiters: behaviors, holding, failures, restarts; by pymavlink and by MAVSDK",
+    kind="Autopilots",
+    result="kept",
+    version="4.7.0-dev",
+    on="2026-11",
+)
 class TestArduRover(_RealAutopilot):
     variable = "M2PEM_ARDUROVER"
     domain = "ground"
@@ -158,6 +174,14 @@ class TestArduRover(_RealAutopilot):
 
 
 @pytest.mark.sitl("M2PEM_ARDUROVER")
+@pytest.mark.tried_with(
+    "ArduRover, as a boat",
+    "the contract of arbiters: behaviors, holding, failures, restarts; by pymavlink and by MAVSDK",
+    kind="Autopilots",
+    result="kept",
+    version="4.7.0-dev",
+    on="2026-11",
+)
 class TestMotorboat(_RealAutopilot):
     variable = "M2PEM_ARDUROVER"
     domain = "surface"
@@ -181,18 +205,43 @@ class _RealPlane(_RealAutopilot):
 
 
 @pytest.mark.sitl("M2PEM_ARDUPLANE")
+@pytest.mark.tried_with(
+    "ArduPlane",
+    "the contract of arbiters: behaviors, holding, failures, restarts; by pymavlink and by MAVSDK",
+    kind="Autopilots",
+    result="kept",
+    version="4.7.0-dev",
+    note="a plane cannot stop: five tests do not apply",
+    on="2026-11",
+)
 class TestArduPlane(_RealPlane):
     def commands(self, binary: Path, ports: list[int], folder: Path) -> list[sitl.Launch]:
         return ardupilots(binary, "plane", ports)
 
 
 @pytest.mark.sitl("M2PEM_ARDUPLANE")
+@pytest.mark.tried_with(
+    "ArduPlane, as a QuadPlane",
+    "the contract of arbiters: behaviors, holding, failures, restarts; by pymavlink and by MAVSDK",
+    kind="Autopilots",
+    result="kept",
+    version="4.7.0-dev",
+    on="2026-11",
+)
 class TestQuadPlane(_RealPlane):
     def commands(self, binary: Path, ports: list[int], folder: Path) -> list[sitl.Launch]:
         return ardupilots(binary, "quadplane", ports)
 
 
 @pytest.mark.sitl("M2PEM_PX4")
+@pytest.mark.tried_with(
+    "PX4",
+    "the contract of arbiters: behaviors, holding, failures, restarts; by pymavlink and by MAVSDK",
+    kind="Autopilots",
+    result="kept",
+    version="main of August 2026",
+    on="2026-11",
+)
 class TestPx4(_RealAutopilot):
     variable = "M2PEM_PX4"
     speed = 3.0  # two PX4s on two processors do not keep up with 5, and fall behind the clock
@@ -210,6 +259,15 @@ class TestPx4(_RealAutopilot):
 
 
 @pytest.mark.sitl("M2PEM_PX4")
+@pytest.mark.tried_with(
+    "PX4, as a rover",
+    "the contract of arbiters: behaviors, holding, failures, restarts; by pymavlink and by MAVSDK",
+    kind="Autopilots",
+    result="kept",
+    version="main of August 2026",
+    note="its simulated rover moves since PX4's change 28476",
+    on="2026-11",
+)
 class TestPx4Rover(TestPx4):
     model = "sihsim_rover_ackermann"
     domain = "ground"

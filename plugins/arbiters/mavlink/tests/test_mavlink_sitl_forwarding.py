@@ -93,6 +93,14 @@ def test_mavsdk_sees_arducopter_through_m2pem_and_may_not_arm_it(tmp_path: Path)
     asyncio.run(main())
 
 
+@pytest.mark.tried_with(
+    "MAVSDK",
+    "commands ArduCopter through the MAVLink face",
+    kind="MAVLink clients",
+    result="takes off where the fleet lets it",
+    package="mavsdk",
+    on="2026-11",
+)
 def test_mavsdk_takes_arducopter_off_through_m2pem_where_it_is_let(tmp_path: Path) -> None:
     async def main() -> None:
         async with flown(tmp_path, forward_commands=["uav1"]) as (_, action, telemetry):

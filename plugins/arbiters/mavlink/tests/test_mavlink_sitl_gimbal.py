@@ -152,6 +152,14 @@ def at_the_height_of_the_scan(pointing: Pointing) -> bool:
     return abs(pointing.elevation_deg - SCANNED_AT_DEG) < 1.0
 
 
+@pytest.mark.tried_with(
+    "ArduCopter",
+    "a camera points, scans and tracks",
+    kind="Autopilots",
+    result="looks where the mission says",
+    version="4.7.0-dev",
+    on="2026-11",
+)
 def test_a_camera_on_a_real_copter_points_scans_and_tracks(
     programs: Path, fleet: Path, tmp_path: Path
 ) -> None:

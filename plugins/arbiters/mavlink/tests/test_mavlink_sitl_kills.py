@@ -15,6 +15,14 @@ pytestmark = [pytest.mark.timeout(600), pytest.mark.sitl("M2PEM_ARDUCOPTER", "M2
 @pytest.mark.parametrize(
     "seed", [1, *(pytest.param(seed, marks=pytest.mark.long) for seed in range(2, 17))]
 )
+@pytest.mark.tried_with(
+    "ArduCopter and ArduRover",
+    "the executive is killed in a mission, and resumes it",
+    kind="Autopilots",
+    result="nothing is commanded twice",
+    version="4.7.0-dev",
+    on="2026-11",
+)
 def test_after_each_kill_nothing_is_commanded_twice_and_no_failsafe_is_interrupted(
     seed: int, tmp_path: Path
 ) -> None:

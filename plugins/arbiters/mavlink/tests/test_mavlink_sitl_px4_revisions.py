@@ -70,6 +70,14 @@ def assert_in_order(copter: Copter, *places: Place, since_s: float) -> None:
     assert max(each.place[1] for each in copter.since(turned_s)) < NEW[0][1] + 30.0
 
 
+@pytest.mark.tried_with(
+    "PX4",
+    "a mission is revised while it is flown",
+    kind="Autopilots",
+    result="goes on with the new route",
+    version="main of August 2026",
+    on="2026-11",
+)
 def test_a_route_that_is_flown_is_changed_and_a_task_is_added(copters: Copters) -> None:
     (copter,) = copters.all
     revised_s = 0.0

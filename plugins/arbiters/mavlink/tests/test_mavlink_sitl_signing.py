@@ -177,6 +177,14 @@ async def obeyed(world: World, link: RoutedLink, number: int) -> None:
 REQUEST_MESSAGE, SET_MODE, DO_SET_HOME = 512, 176, 179
 
 
+@pytest.mark.tried_with(
+    "ArduCopter",
+    "MAVLink 2 signing: the vehicle is given the key",
+    kind="Autopilots",
+    result="obeys only who has the key",
+    version="4.7.0-dev",
+    on="2026-11",
+)
 async def test_a_copter_takes_the_key_and_obeys_only_who_has_it(tmp_path: Path) -> None:
     async with flying(tmp_path) as world:
         await set_up_key(world.over_usb, world.policy, None)

@@ -64,6 +64,13 @@ def test_a_level_vehicle_sees_a_target_where_a_geodesic_leads(lat, lon, azimuth,
 
 
 @given(latitudes, longitudes, angles, distances, st.floats(-200, 200))
+@pytest.mark.tried_with(
+    "PROJ",
+    "where a camera looks",
+    kind="Maps and geodesy",
+    result="the same elevation",
+    package="pyproj",
+)
 def test_the_elevation_is_that_of_a_topocentric_frame_of_proj(lat, lon, azimuth, far, up):
     line = Geodesic.WGS84.Direct(lat, lon, math.degrees(azimuth), far)
     topocentric = pyproj.Transformer.from_pipeline(

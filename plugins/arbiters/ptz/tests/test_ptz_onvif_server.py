@@ -69,6 +69,12 @@ def account(password=ACCOUNT.password, **options):
 
 
 @on_loopback
+@pytest.mark.tried_with(
+    "onvif-zeep-async",
+    "asks the simulated ONVIF camera by the WSDL of ONVIF",
+    kind="Cameras",
+    result="understands every answer",
+)
 async def test_a_strict_client_understands_every_answer():
     async with camera(account=ACCOUNT) as server:
         async with client(server, "device", account()) as device:

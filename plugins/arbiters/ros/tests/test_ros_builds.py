@@ -161,6 +161,13 @@ async def test_without_ros_pip_builds_the_interfaces(tmp_path: Path, ros_domain:
         await exchange(ros_domain)
 
 
+@pytest.mark.tried_with(
+    "colcon",
+    "builds `ros/m2pem_interfaces` as a workspace",
+    kind="ROS 2",
+    result="built, and understood by the wheel's programs",
+    package="colcon-core",
+)
 async def test_with_ros_colcon_builds_the_interfaces(tmp_path: Path, ros_domain: int) -> None:
     """The wheels are the ROS that is there; their build tools are what ROS brings along itself."""
     tools = tomllib.loads((INTERFACES / "pyproject.toml").read_text(encoding="utf-8"))

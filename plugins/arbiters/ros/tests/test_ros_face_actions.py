@@ -27,6 +27,13 @@ FAR = point(0.1)
 MORTAL = Path(__file__).with_name("ros_face_mortal_client.py")
 
 
+@pytest.mark.tried_with(
+    "rclpy (ROS 2 Jazzy)",
+    "a client sends goals to the actions of the ROS face",
+    kind="ROS 2",
+    result="each is a run",
+    package="ros-jazzy-rclpy",
+)
 async def test_a_goal_is_a_run_of_its_own_and_ends_with_the_behavior(ros_domain: int) -> None:
     async with faced(ros_domain, ALL) as world:
         sent = await world.client.send(UGV1, behavior_goal("goto", target=point(0.0005)))

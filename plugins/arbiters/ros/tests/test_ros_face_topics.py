@@ -98,6 +98,13 @@ def matrix(transform: Any) -> Any:
     return whole
 
 
+@pytest.mark.tried_with(
+    "tf2_msgs",
+    "reads the transforms of the ROS face, from the earth on",
+    kind="ROS 2",
+    result="the place of the fix",
+    version="Jazzy",
+)
 async def test_tf_leads_from_the_earth_to_where_the_fix_says(ros_domain: int) -> None:
     async with faced(ros_domain) as world:
         static = world.client.hear("/tf_static", TFMessage, STATIC)
@@ -171,6 +178,13 @@ async def test_odometry_has_the_place_in_the_fleets_frame_and_the_twist_in_the_v
     assert [odom.twist.covariance[index] for index in (0, 21, 28, 35)] == [0.0, -1.0, -1.0, -1.0]
 
 
+@pytest.mark.tried_with(
+    "sensor_msgs, nav_msgs",
+    "a client reads fix, odometry, battery, joints and markers of the ROS face",
+    kind="ROS 2",
+    result="the values of the vehicle",
+    package="ros-common-interfaces",
+)
 async def test_the_other_topics_say_what_is_known_and_what_is_not(ros_domain: int) -> None:
     bare = VehicleState(UGV1, TIME_US)
     async with faced(ros_domain) as world:

@@ -47,6 +47,13 @@ def localization(
     return TopicLocalization(ros, V, settings, context(SystemClock()))
 
 
+@pytest.mark.tried_with(
+    "Fast DDS",
+    "odometry of a robot, between processes",
+    kind="ROS 2",
+    result="is its pose",
+    package="ros-fastrtps",
+)
 async def test_odometry_in_the_map_is_the_pose(ros: RosRuntime, teller: Sensors) -> None:
     where = localization(ros)
     assert (where.pose, where.twist, where.position, where.age_s) == (None, None, None, INF)

@@ -62,6 +62,14 @@ async def test_goto_drives_there_and_turns_to_the_heading(ugv1: Bench) -> None:
     await ugv1.until(looks_north)
 
 
+@pytest.mark.tried_with(
+    "Nav2's actions",
+    "a route is sent to its actions, over DDS",
+    kind="ROS 2",
+    result="driven through all its places",
+    version="Jazzy",
+    note="a double of Nav2's servers, not Nav2",
+)
 async def test_a_route_is_driven_through_all_its_places(ugv1: Bench) -> None:
     start = ugv1.place
     places = [elsewhere(start, 5.0, 0.0), elsewhere(start, 5.0, 5.0), elsewhere(start, 0.0, 5.0)]

@@ -185,6 +185,13 @@ def test_a_node_on_board_stands_with_clock_and_stops_when_it_jumps_back(ros_doma
         assert refused.reason.startswith("use_sim_time is set, and /clock has stood still for")
 
 
+@pytest.mark.tried_with(
+    "rosgraph_msgs, /clock",
+    "simulated time of ROS drives simulated vehicles",
+    kind="ROS 2",
+    result="they move with it",
+    version="Jazzy",
+)
 async def test_simulated_vehicles_move_with_clock(
     ros_domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:

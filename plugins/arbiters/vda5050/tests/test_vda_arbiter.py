@@ -167,6 +167,12 @@ async def test_a_refused_order_fails_with_what_the_vehicle_says(world: World) ->
         await harness.running("r1.b2")
 
 
+@pytest.mark.tried_with(
+    "paho-mqtt",
+    "receives all messages of both sides",
+    kind="Automated guided vehicles",
+    result="each as the schemas say",
+)
 async def test_a_person_takes_the_vehicle_over(world: World) -> None:
     settings = world.simulate()
     async with commanding(settings) as harness:

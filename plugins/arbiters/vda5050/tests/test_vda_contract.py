@@ -19,6 +19,14 @@ AGV1, AGV2 = ResourceId("agv1"), ResourceId("agv2")
 ROUTE = Route(((38.1080, -77.3192, None), (38.1080, -77.3186, None), (38.1084, -77.3186, None)))
 
 
+@pytest.mark.tried_with(
+    "VDA 5050",
+    "its JSON schemas validate every message of both sides",
+    kind="Automated guided vehicles",
+    result="valid",
+    package="vda5050-sdk",
+    note="the package has copies of the schemas of the VDA",
+)
 class TestVda5050Arbiter(ArbiterContract):
     unsupported: ClassVar[Mapping[str, str]] = {"virtual clock": "the vehicles keep their own time"}
     speed: ClassVar[float] = SPEED

@@ -61,6 +61,13 @@ def world(broker: Mosquitto, judge: Judge, tmp_path: Path) -> Iterator[World]:
     made.close()
 
 
+@pytest.mark.tried_with(
+    "mosquitto",
+    "missions of simulated vehicles over MQTT",
+    kind="Automated guided vehicles",
+    result="the load is brought",
+    version="2.0.11",
+)
 def test_a_mission_fetches_a_load_and_brings_it(world: World) -> None:
     mission = scenarios.one_after_another(
         "agv1",

@@ -73,6 +73,13 @@ async def link(settings: dict[str, Any], within_s: float) -> LinkState | None:
         return None if state is None else state.link
 
 
+@pytest.mark.tried_with(
+    "mosquitto",
+    "connects with a password and an authority of its own",
+    kind="Automated guided vehicles",
+    result="connected; others are refused",
+    version="2.0.11",
+)
 async def test_with_the_password_and_the_authority_it_connects(secured: Secured) -> None:
     settings = secured.settings()
     sim = SimProcess(write_fleet(secured.folder / "fleet.yaml", {AGV1: settings}), SPEED)

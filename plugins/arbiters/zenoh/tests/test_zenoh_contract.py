@@ -20,6 +20,13 @@ def warm() -> None:
     warm_up()
 
 
+@pytest.mark.tried_with(
+    "Eclipse Zenoh",
+    "the contract of arbiters, of vehicles on another host",
+    kind="Databases and brokers",
+    result="kept",
+    package="eclipse-zenoh",
+)
 class TestHostedArbiter(ArbiterContract):
     unsupported: ClassVar[Mapping[str, str]] = {"virtual clock": "the host has a clock of its own"}
     speed: ClassVar[float] = SPEED

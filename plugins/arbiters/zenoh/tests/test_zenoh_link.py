@@ -71,6 +71,13 @@ async def answer_of(listening: Host, connecting: Host, protocol: str = "tls") ->
             raise LinkError("no connection") from None
 
 
+@pytest.mark.tried_with(
+    "Eclipse Zenoh",
+    "hosts with certificates of one authority",
+    kind="Databases and brokers",
+    result="connected; others are not",
+    package="eclipse-zenoh",
+)
 async def test_hosts_with_certificates_of_one_ca_are_connected(keys: Path) -> None:
     assert await answer_of(host(keys), host(keys)) == b"got this"
 

@@ -88,6 +88,13 @@ def is_vehicle(name: str) -> Callable[[etree._Element], bool]:
     return lambda event: event.get("uid") == f"m2pem.scenario.vehicle.{name}"
 
 
+@pytest.mark.tried_with(
+    "PyTAK",
+    "reads Cursor on Target of the face",
+    kind="TAK",
+    result="every vehicle is where it is",
+    package="pytak",
+)
 async def test_pytak_reads_every_vehicle_where_it_is() -> None:
     where = f"127.0.0.1:{free_port()}"
     url = f"udp://{where}"
@@ -132,6 +139,13 @@ def marker(name: str = "lz", place: str = 'lat="38.1077" lon="-77.3190"') -> byt
     ).encode()
 
 
+@pytest.mark.tried_with(
+    "PyTAK",
+    "sends a marker",
+    kind="TAK",
+    result="handed over if the fleet allows it",
+    package="pytak",
+)
 async def test_a_marker_of_pytak_is_handed_over_if_the_fleet_allows_it() -> None:
     port = free_port()
     settings = {"url": f"udp://127.0.0.1:{free_port()}", "listen": f"udp://127.0.0.1:{port}"}

@@ -38,6 +38,13 @@ def root(spans: Sequence[Span]) -> list[Span]:
     return [each for each in spans if not each.parent_span_id]
 
 
+@pytest.mark.tried_with(
+    "OpenTelemetry",
+    "a collector of the tests decodes the OTLP spans of a run",
+    kind="Observability",
+    result="one tree, at the times of the records",
+    package="opentelemetry-proto",
+)
 async def test_a_run_is_one_tree_at_the_collector_with_the_times_of_its_records() -> None:
     with Collector() as collector:
         async with (

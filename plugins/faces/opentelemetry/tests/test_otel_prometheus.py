@@ -66,6 +66,13 @@ def values(families: Any, name: str) -> dict[tuple[str, ...], float]:
     }
 
 
+@pytest.mark.tried_with(
+    "Prometheus' Python client",
+    "parses the metrics in both formats",
+    kind="Observability",
+    result="all metrics, the right counts",
+    package="prometheus_client",
+)
 async def test_both_formats_have_all_metrics_and_the_counts_of_the_executive() -> None:
     async with scraped() as (control, client, _):
         result = await run_mission_on(control, DRIVE)

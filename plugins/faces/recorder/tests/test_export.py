@@ -124,6 +124,13 @@ def test_who_did_what_is_the_resource(folder: Path) -> None:
     assert done.loc["r4"]["org:resource"] == answer["by"]
 
 
+@pytest.mark.tried_with(
+    "PM4Py",
+    "reads the XES export and discovers a process",
+    kind="Recordings and analysis",
+    result="fits the runs",
+    package="pm4py",
+)
 def test_the_process_that_is_discovered_fits_the_runs(folder: Path) -> None:
     import pm4py  # as above
 
@@ -173,6 +180,13 @@ def test_csv_has_a_row_for_each_record(folder: Path) -> None:
         assert json.loads(row["content"]).items() <= record.items()
 
 
+@pytest.mark.tried_with(
+    "Apache Arrow",
+    "reads the Parquet export",
+    kind="Recordings and analysis",
+    result="the rows of the CSV, with types",
+    package="pyarrow",
+)
 def test_parquet_has_the_same_rows_with_types(folder: Path) -> None:
     for table in ("records", "telemetry"):
         export(folder, "r1", "r2", "--to", "parquet", "--table", table, "-o", f"{table}.parquet")
@@ -213,6 +227,13 @@ def test_tracks_of_the_web_page_stand_in_for_a_recording(folder: Path, tmp_path:
 # --- maps -------------------------------------------------------------------------------------
 
 
+@pytest.mark.tried_with(
+    "Shapely",
+    "reads the GeoJSON export",
+    kind="Recordings and analysis",
+    result="tracks and places",
+    package="shapely",
+)
 def test_geojson_has_tracks_and_places(folder: Path) -> None:
     export(folder, "r1", "--to", "geojson", "-o", "r1.geojson")
     features = json.loads((folder / "r1.geojson").read_text())["features"]
@@ -242,6 +263,13 @@ def test_what_the_mission_has_drawn_is_on_the_map(folder: Path) -> None:
     assert b'"lane"' in scene
 
 
+@pytest.mark.tried_with(
+    "fastkml",
+    "reads the KML export",
+    kind="Recordings and analysis",
+    result="tracks and places",
+    package="fastkml",
+)
 def test_kml_has_tracks_and_places(folder: Path) -> None:
     export(folder, "r1", "r2", "--to", "kml", "-o", "runs.kml")
     document = fastkml.KML.parse(folder / "runs.kml").features[0]

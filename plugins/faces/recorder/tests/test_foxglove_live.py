@@ -124,6 +124,14 @@ async def viewing(port: int, only: str = "") -> AsyncIterator[Viewer]:
         await asyncio.gather(task, return_exceptions=True)
 
 
+@pytest.mark.tried_with(
+    "Foxglove's WebSocket protocol",
+    "a viewer connects to the live view",
+    kind="Recordings and analysis",
+    result="records, positions and the scene",
+    package="websockets",
+    note="a client of the tests that speaks the protocol, not Foxglove",
+)
 async def test_a_viewer_gets_records_positions_and_the_scene() -> None:
     port = free_port()
     async with (

@@ -67,6 +67,13 @@ def record(folder: Path, mission: bytes = DRIVE, **settings: Any) -> list[Stampe
     return asyncio.run(main())
 
 
+@pytest.mark.tried_with(
+    "MCAP",
+    "reads a recording",
+    kind="Recordings and analysis",
+    result="every record once",
+    package="mcap",
+)
 def test_every_record_of_the_journal_is_there_once(tmp_path: Path) -> None:
     records = record(tmp_path)
     (path,) = tmp_path.glob("r1-*.mcap")
@@ -106,6 +113,13 @@ def test_questions_and_answers_are_messages(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", FOXGLOVE)
+@pytest.mark.tried_with(
+    "Foxglove's schemas",
+    "are compared with those of a recording, field by field",
+    kind="Recordings and analysis",
+    result="the same",
+    package="foxglove-schemas-protobuf",
+)
 def test_foxglove_schemas_are_those_of_foxglove(tmp_path: Path, name: str) -> None:
     """Field by field, against the schemas that Foxglove publishes for Python."""
     record(tmp_path)
@@ -133,6 +147,13 @@ def fields(message: Any) -> set[tuple[Any, ...]]:
     return {(f.name, f.number, f.type, f.label, f.type_name) for f in message.field}
 
 
+@pytest.mark.tried_with(
+    "MCAP",
+    "decodes the positions of a recording",
+    kind="Recordings and analysis",
+    result="the same in all schemas",
+    package="mcap-ros2-support",
+)
 def test_positions_are_the_same_in_all_schemas(tmp_path: Path) -> None:
     record(tmp_path)
     (path,) = tmp_path.glob("r1-*.mcap")

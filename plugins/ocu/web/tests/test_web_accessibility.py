@@ -36,6 +36,13 @@ SOME_KINDS = ["UserSendRoute"]
     ],
     ids=["light", "light, all", "dark, all"],
 )
+@pytest.mark.tried_with(
+    "axe-core",
+    "pages and panels, light and dark",
+    kind="Browsers and the web",
+    result="no violation",
+    package="axe-playwright-python",
+)
 async def test_first_page_and_editor_have_no_violation(desk: Desk, dark: bool, whole: bool) -> None:
     """`whole`: not only one of each kind of part."""
     eyes = await opened(desk, dark)

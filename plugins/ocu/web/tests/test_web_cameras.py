@@ -5,6 +5,7 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
 
+import pytest
 from playwright.async_api import Locator, Page, async_playwright, expect
 from test_web_alerts import look
 from web_axe import Accessibility
@@ -73,6 +74,12 @@ async def assert_picture(tile: Locator) -> None:
     assert drawn == [320, 180]
 
 
+@pytest.mark.tried_with(
+    "aiortc", "serves WebRTC (WHEP) to the page", kind="Cameras", result="a picture is seen"
+)
+@pytest.mark.tried_with(
+    "hls.js", "plays HLS on the page", kind="Cameras", result="a picture is seen"
+)
 async def test_operators_look_through_cameras_of_every_kind(tmp_path: Path) -> None:
     hls = tmp_path / "hls"
     hls.mkdir()

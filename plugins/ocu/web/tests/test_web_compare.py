@@ -2,6 +2,7 @@
 
 import json
 
+import pytest
 from playwright.async_api import Page, expect
 from web_axe import Accessibility
 from web_desk import IN_ONE_LOOP, MISSION, Desk
@@ -34,6 +35,12 @@ async def compared(page: Page) -> None:
     await expect(page.get_by_role("dialog")).to_contain_text("added")
 
 
+@pytest.mark.tried_with(
+    "bpmn-js-differ",
+    "compares versions of a mission on the page",
+    kind="BPMN editors",
+    result="what differs is marked",
+)
 async def test_versions_are_compared_on_diagrams_on_the_map_and_in_words(desk: Desk) -> None:
     xml = (await desk.ask("GET", f"/api/missions/{MISSION}"))["xml"]
     assert xml.count("10 m") == 1 and xml.count('name="REVERSE"') == 1

@@ -55,6 +55,20 @@ def kinds_of_first_process(path: Path) -> Counter[str]:
 
 
 @pytest.mark.long
+@pytest.mark.tried_with(
+    "bpmn-js",
+    "a mission is drawn with the mouse, checked, verified, run and replayed",
+    kind="BPMN editors",
+    result="completed",
+    package="bpmn-js",
+)
+@pytest.mark.tried_with(
+    "Chromium",
+    "the life of a mission on the page",
+    kind="Browsers and the web",
+    result="completed",
+    package="playwright",
+)
 async def test_vignette1_is_drawn_from_an_empty_page_and_lives_its_whole_life(
     chromium: Browser, tmp_path: Path
 ) -> None:

@@ -27,6 +27,13 @@ ALL_PHASES = "examples,coverage,fuzzing,stateful"
         pytest.param(ALL_PHASES, 100, marks=[pytest.mark.long, pytest.mark.timeout(1800)]),
     ],
 )
+@pytest.mark.tried_with(
+    "Schemathesis",
+    "sends what the description of the API allows, and what it does not",
+    kind="Browsers and the web",
+    result="answers as described",
+    package="schemathesis",
+)
 async def test_the_description_of_the_api_is_true(
     world: MakeWorld, tmp_path: Path, phases: str, examples: int
 ) -> None:

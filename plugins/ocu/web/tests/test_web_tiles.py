@@ -145,6 +145,13 @@ def test_a_damaged_part_of_an_archive_has_no_tiles(
 
 @IN_ONE_LOOP
 @pytest.mark.parametrize("format_", ["mbtiles", "pmtiles"])
+@pytest.mark.tried_with(
+    "PMTiles and MBTiles",
+    "maps without the network",
+    kind="Maps and geodesy",
+    result="shown on the page",
+    package="pmtiles",
+)
 async def test_the_map_shows_them_and_whom_they_are_from(
     chromium: Browser, world: MakeWorld, tmp_path: Path, format_: str
 ) -> None:
