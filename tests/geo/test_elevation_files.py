@@ -115,6 +115,13 @@ def test_a_datum_near_to_wgs_84_is_read(tmp_path: Path, crs: str) -> None:
 # --- scale, offset, unit ------------------------------------------------------------------------
 
 
+@pytest.mark.tried_with(
+    "GDAL",
+    "GeoTIFF with scale, offset and feet is read",
+    kind="Maps and geodesy",
+    result="metres",
+    package="rasterio",
+)
 @pytest.mark.parametrize(
     ("raw", "said", "height_m"),
     [

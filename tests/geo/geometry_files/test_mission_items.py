@@ -204,6 +204,13 @@ def test_a_waypoint_of_another_frame_is_refused(frame: str) -> None:
     assert error == f"item 2 (line 4): MAV_FRAME {frame} is not global, relative or terrain"
 
 
+@pytest.mark.tried_with(
+    "pymavlink",
+    "its `mavwp` reads `.waypoints` with frames that differ",
+    kind="MAVLink clients",
+    result="the same places and frames",
+    package="pymavlink",
+)
 def test_places_and_frames_are_those_that_pymavlink_reads(tmp_path: Path) -> None:
     rows = ["# planned by hand", "", f"1 0 {A} 1", f"2 0 0{B[1:]} 1", f"3 0 10{A[1:]} 1"]
     path = tmp_path / "m.txt"

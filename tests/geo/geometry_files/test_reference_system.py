@@ -24,6 +24,13 @@ def named(name: str) -> dict[str, object]:
     return {"type": "name", "properties": {"name": name}}
 
 
+@pytest.mark.tried_with(
+    "GDAL",
+    "converts positions of 19 reference systems, named in WKT of GDAL, Esri and WKT 2",
+    kind="Maps and geodesy",
+    result="the same positions",
+    package="rasterio",
+)
 @pytest.mark.parametrize("version", ["WKT1_ESRI", "WKT1_GDAL", "WKT2_2019"])
 @pytest.mark.parametrize(
     ("code", "longitude", "latitude"),

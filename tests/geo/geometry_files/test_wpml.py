@@ -54,6 +54,14 @@ def archive(*names: str, **members: str) -> GeometryFile:
     return read_geometry_file("a.kmz", file.getvalue())
 
 
+@pytest.mark.tried_with(
+    "DJI's WPML",
+    "waylines of a `.kmz` as its documentation describes them are read",
+    kind="Maps and geodesy",
+    result="heights, speeds and order",
+    note="actions and turns are named as left out",
+    version="1.0.2",
+)
 def test_an_archive_is_read_as_it_is_flown_in_the_order_of_its_indices() -> None:
     file = archive(
         "wpmz/template.kml", "wpmz/waylines.wpml", template=wpml(""), waylines=wpml(wayline(TWO))

@@ -197,6 +197,13 @@ def test_every_vehicle_answers_pings_and_time_requests(tmp_path: Path) -> None:
     asyncio.run(main())
 
 
+@pytest.mark.tried_with(
+    "pymavlink",
+    "sets modes on the MAVLink face by their names",
+    kind="MAVLink clients",
+    result="the vehicle does so",
+    package="pymavlink",
+)
 @pytest.mark.parametrize(
     ("system", "names"),
     [

@@ -171,6 +171,13 @@ async def test_a_marker_of_pytak_is_handed_over_if_the_fleet_allows_it() -> None
         writer.close()
 
 
+@pytest.mark.tried_with(
+    "takproto",
+    "writes a marker in the TAK protocol (protobuf), which pytak sends",
+    kind="TAK",
+    result="is handed over",
+    package="takproto",
+)
 async def test_a_marker_in_the_tak_protocol_is_handed_over() -> None:
     """As ATAK sends it to its multicast group; pytak 7.6.1 sends what takproto 3.0.1 has made."""
     port = free_port()

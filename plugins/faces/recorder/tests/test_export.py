@@ -355,6 +355,14 @@ def bag(folder: Path) -> Path:
     return folder / "bag"
 
 
+@pytest.mark.tried_with(
+    "rosbags",
+    "reads every message of an exported bag",
+    kind="ROS 2",
+    result="all are read",
+    note="it refuses a recording, which has JSON beside CDR",
+    package="rosbags",
+)
 def test_rosbags_reads_every_message_of_a_bag(folder: Path, bag: Path) -> None:
     """rosbags 0.11.9 refuses a recording: "Profile is not ros2."."""
     found = messages_of_bag(bag)
