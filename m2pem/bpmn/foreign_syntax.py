@@ -113,6 +113,8 @@ def time_remedy(kind: str, text: str) -> str:
         match = pattern.fullmatch(text)
         if match and _reads(_TIMES[kind], match[match.re.groups]):
             return f"write {match[match.re.groups]} alone"
+    if "(" in text and _reads(parse, f"= {text}"):
+        return f"write = {shorten(text)}, as FEEL does"
     if _reads(_TIMES[kind], text.upper()):
         return f"write {text.upper()}, in capitals"
     for other, read in _TIMES.items():

@@ -74,6 +74,11 @@ def test_a_line_of_a_script_in_no_language_in_particular() -> None:
         ("timeDuration", "PT10s", "write PT10S, in capitals"),
         ("timeDuration", '"PT0.2S"', "write PT0.2S alone"),
         ("timeDuration", '= duration("PT5S")', "write PT5S alone"),
+        (
+            "timeDuration",
+            'duration("PT5S") * lap',
+            'write = duration("PT5S") * lap, as FEEL does',
+        ),
         ("timeDuration", "1000", "write it with its unit: PT1000S are seconds"),
         ("timeDuration", "R3/PT1S", "put it into a timeCycle"),
         (

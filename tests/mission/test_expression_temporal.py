@@ -51,6 +51,22 @@ DATA = {NOW: "2026-11-29T12:00:00Z", "x": 7, "due": "2030-01-01T00:00:00Z"}
         ('now() + duration("PT1M")', "2026-11-29T12:01:00Z"),
         ("now() < date and time(due)", True),
         ("duration(nothing)", None),
+        # One kind of number: 3.0 is as whole as 3.
+        ('cycle(6 / 2, duration("PT10S"))', "R3/PT10S"),
+        ("date(2026.0, 4 / 2, 28)", "2026-02-28"),
+        # Properties (DMN 1.3, table 61).
+        ('date("2026-03-09").year', 2026),
+        ('date("2026-03-09").weekday', 1),
+        ("now().hour", 12),
+        ('date and time("2026-03-09T10:20:30.5Z").second', 30),
+        ("(date(due) - today()).days > 365", True),
+        ('duration("P3DT4H5M6S").hours', 4),
+        ('duration("-P3DT4H5M6.5S").minutes', -5),
+        ('duration("-P3DT4H5M6.5S").seconds', -6),
+        ('duration("P1Y2M").months', 2),
+        ('duration("-P14M").years', -1),
+        ("is defined(now())", True),
+        ("list contains([today()], date(2026, 11, 29))", True),
     ],
 )  # fmt: skip
 def test_feel_computes_with_dates_and_durations(text, expected):
@@ -63,7 +79,9 @@ def test_feel_computes_with_dates_and_durations(text, expected):
         ('duration("P1M2D")', "has months and days"),
         ('duration("30 s")', "such as PT30S"),
         ('date("tomorrow")', "such as 2026-01-01"),
-        ("date(2026, 2, 30)", "day is out of range"),
+        ("date(2026, 2, 30)", "there is no date 2026, 2, 30"),
+        ("date(2026, 1.5, 30)", "there is no date 2026, 1.5, 30"),
+        ("now().days", "has no item under the text 'days'"),
         ("date(2026)", "a year, a month and a day"),
         ('duration("PT1S") + 5', "duration PT1S and the number 5"),
         ("now() + now()", "takes two numbers or two texts"),

@@ -22,6 +22,7 @@ from m2pem.mission.expression.operators import (
 from m2pem.mission.expression.temporal import (
     DATE,
     DAYS,
+    KINDS,
     MOMENT,
     MONTHS,
     Computed,
@@ -38,7 +39,7 @@ EARTH_RADIUS_M = 6_371_008.8
 `m2pem.geo`: missions and journals that exist must always give the same values.
 """
 
-_ANY = ("null", "boolean", "number", "text", "list", "map")
+_ANY = ("null", "boolean", "number", "text", "list", "map", *KINDS.values())
 
 
 @dataclass(frozen=True, slots=True)

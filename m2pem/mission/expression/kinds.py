@@ -1,6 +1,6 @@
 """Which kinds of values an expression can have, whatever is in the data."""
 
-from itertools import product
+from itertools import chain, product, repeat
 
 from m2pem.mission.expression.functions import LISTED
 from m2pem.mission.expression.operators import kind
@@ -32,8 +32,11 @@ def kinds(node: Node) -> frozenset[str]:
             return frozenset() if value is None else frozenset({kind(value)})
         case Name() | Index():
             return _DATA
-        case Call(function):
-            return frozenset(LISTED[function].gives)
+        case Call(function, arguments):
+            called = LISTED[function]
+            takes = chain(called.takes, repeat(called.takes[-1]))
+            fits = all((kinds(each) | {"null"}) & {*next(takes)} for each in arguments)
+            return frozenset(called.gives) if fits else frozenset()
         case If(_, then, otherwise):
             return kinds(then) | kinds(otherwise)
         case Negate(operand):

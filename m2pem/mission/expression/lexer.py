@@ -34,7 +34,7 @@ _HINTS = {
     "^": "there is no power operator",
     "?": "write 'if a then b else c'",
     "/": "paths into XML are not read; a division is written 'div'",
-    "@": "paths into XML are not read",
+    "@": 'paths into XML are not read; for FEEL\'s @"PT5S" write duration("PT5S")',
     "{": "maps cannot be written",
     "$": "put the whole expression into one '${...}', or write it without '${' and '}'",
     "#": "put the whole expression into one '${...}', or write it without '#{' and '}'",

@@ -17,6 +17,7 @@ from m2pem.mission.expression.temporal import (
     Temporal,
     calculate,
     iso,
+    parts,
     result_kind,
 )
 from m2pem.mission.expression.tree import Comparison, Operation
@@ -135,6 +136,8 @@ def index(container: Computed, key: Computed) -> Computed:
         return container[key] if -len(container) <= key < len(container) else None
     if isinstance(container, dict) and isinstance(key, str):
         return container.get(key)
+    if type(container) in KINDS and isinstance(key, str) and key in (found := parts(container)):  # type: ignore[arg-type]
+        return found[key]
     raise ExpressionError(f"{describe(container)} has no item under {describe(key)}")
 
 

@@ -4,6 +4,7 @@ FEEL has two kinds of durations, as how many days a month has depends on where i
 table 44). Without an offset, a date and time is UTC.
 """
 
+import math
 import operator
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -45,6 +46,10 @@ KINDS: dict[type, str] = {date: DATE, datetime: MOMENT, timedelta: DAYS, Months:
 """What FEEL calls them."""
 
 
+_OF_DURATIONS = ("days", "hours", "minutes", "seconds")
+_OF_DATES = ("year", "month", "day", "hour", "minute", "second")
+
+
 def iso(value: Temporal) -> str:
     """The ISO 8601 text of a date or duration."""
     match value:
@@ -57,6 +62,19 @@ def iso(value: Temporal) -> str:
         case datetime():
             return value.isoformat().replace("+00:00", "Z")
     return value.isoformat()
+
+
+def parts(value: Temporal) -> dict[str, int]:
+    """The properties of a date or duration (DMN 1.3, table 61)."""
+    match value:
+        case Months(months):
+            return {"years": int(months / 12), "months": int(math.fmod(months, 12))}
+        case timedelta():
+            sign, size = (-1, -value) if value.days < 0 else (1, value)
+            whole = (size.days, size.seconds // 3600, size.seconds // 60 % 60, size.seconds % 60)
+            return {n: sign * each for n, each in zip(_OF_DURATIONS, whole, strict=True)}
+    found = {name: getattr(value, name) for name in _OF_DATES if hasattr(value, name)}
+    return {**found, "weekday": value.isoweekday()}
 
 
 def to_data(value: Computed) -> Value:
@@ -82,10 +100,11 @@ def read_moment(value: str | date) -> datetime:
 def read_date(value: str | date | int, month: int | None = None, day: int | None = None) -> date:
     """`date(x)`, `date(year, month, day)`; raises ExpressionError."""
     if month is not None and day is not None:
+        whole = [_whole(each) for each in (value, month, day)]
         try:
-            return date(value, month, day)  # type: ignore[arg-type]
-        except (TypeError, ValueError, OverflowError) as error:
-            raise ExpressionError(f"date(): {error}") from None
+            return date(*whole)  # type: ignore[arg-type]
+        except (TypeError, ValueError, OverflowError):
+            raise ExpressionError(f"date(): there is no date {value}, {month}, {day}") from None
     if isinstance(value, int | float):
         raise ExpressionError("date() takes a text, a date, or a year, a month and a day")
     return read_moment(value).date()
@@ -114,10 +133,15 @@ def read_duration(value: str | timedelta | Months) -> timedelta | Months:
 def read_cycle(first: int | timedelta | Months, second: timedelta | Months | None = None) -> str:
     """Camunda's `cycle(duration)` and `cycle(repetitions, duration)`: a text such as R3/PT10S."""
     period = first if second is None else second
-    count = "" if second is None else first
+    count = "" if second is None else _whole(first)
     if isinstance(period, int | float) or not (count == "" or isinstance(count, int)):
         raise ExpressionError("cycle() takes a duration, or a whole number and a duration")
     return f"R{count}/{iso(period)}"
+
+
+def _whole(value: Computed) -> Computed:
+    """FEEL has one kind of number: 3.0 is as whole as 3."""
+    return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
 def _read(name: str, read: Callable[..., Any], *arguments: str | int) -> Any:
