@@ -114,7 +114,7 @@ def read_lanes(context: ReadingContext, lane_set: etree._Element, process: Proce
                     element.get("name", ""),
                     context.findings.line(element),
                     process.id,
-                    tuple(text_of(each) for each in found.of("flowNodeRef")),
+                    tuple(reference(text_of(each)) for each in found.of("flowNodeRef")),
                 )
             )
             stack += found.of("childLaneSet")

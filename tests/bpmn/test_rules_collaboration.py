@@ -172,7 +172,7 @@ CASES = read_cases("""
 ! <flowNodeRef>S</flowNodeRef>
 </lane></laneSet>
 *
-~ <lane id="a"><flowNodeRef>S</flowNodeRef> => <lane id="a"><flowNodeRef>E</flowNodeRef>
+~ <lane id="a"><flowNodeRef>S</flowNodeRef> => <lane id="a"><flowNodeRef>tns:E</flowNodeRef>
 
 # lane-other-process | a | 'x'
 <laneSet id="L"><lane id="a">

@@ -94,7 +94,7 @@ CASES = read_cases("""
 ! <boundaryEvent id="D" attachedToRef="T"><compensateEventDefinition /></boundaryEvent>
 <association id="a" sourceRef="B" targetRef="C"/><association id="b" sourceRef="D" targetRef="C"/>
 *T
-~ id="D" attachedToRef="T" => id="D" attachedToRef="U"
+~ id="D" attachedToRef="T" => id="D" attachedToRef="tns:U"
 
 # handler-not-marked | C | not marked | unreachable
 <task id="T"/><boundaryEvent id="B" attachedToRef="T"><compensateEventDefinition/></boundaryEvent>

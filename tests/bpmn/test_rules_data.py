@@ -56,14 +56,14 @@ CASES = read_cases("""
 ! <dataInput id="i"/>
 <inputSet></inputSet><outputSet/></ioSpecification></task>
 *T
-~ <inputSet> => <inputSet><dataInputRefs>i</dataInputRefs>
+~ <inputSet> => <inputSet><dataInputRefs>tns:i</dataInputRefs>
 
 # output-in-no-set | T | 'way'
 <task id="T"><ioSpecification>
 ! <dataOutput id="o" name="way"/>
 <inputSet/><outputSet></outputSet></ioSpecification></task>
 *T
-~ <outputSet> => <outputSet><dataOutputRefs>o</dataOutputRefs>
+~ <outputSet> => <outputSet><dataOutputRefs>tns:o</dataOutputRefs>
 
 # input-set-reference | T | 'j'
 <task id="T"><ioSpecification>

@@ -15,6 +15,7 @@ from m2pem.bpmn.rules.tree import (
     has_trigger,
     is_false,
     is_true,
+    named,
     names,
     parent,
     what,
@@ -178,7 +179,7 @@ def _boundary(tree: Tree, event: etree._Element) -> None:
         tree.report(COMPENSATION_BOUNDARY_FLOW, event)
     if is_false(event, "cancelActivity"):
         tree.report(COMPENSATION_BOUNDARY_NOT_INTERRUPTING, event)
-    beside = tree.boundary.get(event.get("attachedToRef", ""), [])
+    beside = tree.boundary.get(named(event.get("attachedToRef", "")), [])
     if [each for each in beside if has_trigger(tree, each, "compensate")][:1] != [event]:
         tree.report(TWO_COMPENSATION_EVENTS, event)
     handlers = _associated(tree, event, ACTIVITIES)

@@ -227,7 +227,7 @@ def _specification(tree: Tree, element: etree._Element) -> None:
 def _in_a_set(
     tree: Tree, element: etree._Element, name: str, sets: Sequence[etree._Element], rule: Rule
 ) -> None:
-    used = {text for each in sets for text in texts(each, f"{name}Refs")}
+    used = {named(text) for each in sets for text in texts(each, f"{name}Refs")}
     for data in children(element, name):
         if data.get("id") not in used:
             tree.report(rule, data, f"'{data.get('name') or data.get('id', '')}'")
@@ -248,22 +248,22 @@ def _output_set(tree: Tree, element: etree._Element) -> None:
 def _references(tree: Tree, element: etree._Element, name: str, rule: Rule) -> None:
     known = {data.get("id") for data in children(parent(element), name)}
     for text in texts(element, f"{name}Refs"):
-        if text.rpartition(":")[2] not in known:
+        if named(text) not in known:
             tree.report(rule, element, f"'{text}'")
 
 
 def _optional(tree: Tree, element: etree._Element, direction: str, rule: Rule) -> None:
-    listed = set(texts(element, f"data{direction}Refs"))
+    listed = {named(text) for text in texts(element, f"data{direction}Refs")}
     for name in (f"optional{direction}Refs", f"whileExecuting{direction}Refs"):
         for text in texts(element, name):
-            if text not in listed:
+            if named(text) not in listed:
                 tree.report(rule, element, f"'{text}'")
 
 
 def _pair(tree: Tree, element: etree._Element, other: str) -> None:
     known = {each.get("id") for each in children(parent(element), other)}
     for text in texts(element, f"{other}Refs"):
-        if text.rpartition(":")[2] not in known:
+        if named(text) not in known:
             tree.report(PAIRED_SET, element, f"'{text}'")
 
 

@@ -55,7 +55,7 @@ _TRUE = frozenset({"true", "1"})
 
 def named(text: str) -> str:
     """The id that a reference names, without the prefix of its namespace."""
-    return text.rpartition(":")[2] if ":" in text else text
+    return text.strip().rpartition(":")[2]
 
 
 class Tree:
@@ -120,7 +120,7 @@ class Tree:
         """Boundary events by the id of what they are attached to."""
         found: dict[str, list[etree._Element]] = {}
         for event in self.root.iter(BPMN + "boundaryEvent"):
-            found.setdefault(event.get("attachedToRef", "").rpartition(":")[2], []).append(event)
+            found.setdefault(named(event.get("attachedToRef", "")), []).append(event)
         return found
 
     @cached_property
@@ -129,8 +129,7 @@ class Tree:
         found: dict[str, list[etree._Element]] = {}
         for association in self.root.iter(BPMN + "association"):
             for attribute in ("sourceRef", "targetRef"):
-                name = association.get(attribute, "").rpartition(":")[2]
-                found.setdefault(name, []).append(association)
+                found.setdefault(named(association.get(attribute, "")), []).append(association)
         return found
 
     # --- references -----------------------------------------------------------------------------
