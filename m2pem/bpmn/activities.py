@@ -30,7 +30,16 @@ from m2pem.bpmn.tasks import (
     read_service_task,
     read_user_task,
 )
-from m2pem.bpmn.xml import BPMN, CAMUNDA, M2PEM, ZEEBE, attribute_names, local
+from m2pem.bpmn.xml import (
+    ACTIVITI,
+    BPMN,
+    CAMUNDA,
+    FLOWABLE,
+    M2PEM,
+    ZEEBE,
+    attribute_names,
+    local,
+)
 from m2pem.errors import ExpressionSyntaxError
 from m2pem.mission.behavior import Mapping, Mappings
 from m2pem.mission.elements import Activity, CallActivity, FlowNode, Process, SubProcess
@@ -49,7 +58,7 @@ _ATTRIBUTES = frozenset(
 )
 
 _USED = frozenset({"in", "out"})
-_PLAIN = (M2PEM, CAMUNDA)
+_PLAIN = (M2PEM, CAMUNDA, FLOWABLE, ACTIVITI)
 _ALL = 'list each value: <m2pem:in source="a.b" target="x"/>'
 
 

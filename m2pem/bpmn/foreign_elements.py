@@ -5,9 +5,9 @@ carries out, as it has the same. The others change what is executed, so that wit
 branch may be taken: of these it warns each time, with what to write instead.
 """
 
-from m2pem.bpmn.xml import ACTIVITI, CAMUNDA, FLOWABLE, ZEEBE
+from m2pem.bpmn.xml import ACTIVITI, BPMN, CAMUNDA, FLOWABLE, JBPM, ZEEBE
 
-ENGINES = (ZEEBE, CAMUNDA, FLOWABLE, ACTIVITI)
+ENGINES = (ZEEBE, CAMUNDA, FLOWABLE, ACTIVITI, JBPM)
 """Namespaces of the engines whose elements are known."""
 
 _CALLS = 'list each value: <m2pem:in source="a.b" target="x"/> and <m2pem:out .../>'
@@ -17,24 +17,18 @@ _RESULT = "let a service or a script task write it: name = expression"
 _DECISIONS = 'ask for it: <m2pem:prompt store="name">...?</m2pem:prompt> with m2pem:decision'
 _PROPERTIES = '<m2pem:property name="..." value="..."/> for each, beside the service'
 
-CARRIED_OUT = frozenset(
-    {
-        "adHoc", "calledElement", "input", "inputOutput", "inputParameter", "ioMapping",
-        "loopCharacteristics", "output", "outputParameter", "script", "subscription",
-        "taskDefinition",
-    }
-)  # fmt: skip
-"""Elements that say what m2pem does, too (docs/missions.md)."""
-
 HARMLESS = frozenset(
     {
-        "assignmentDefinition", "constraint", "failedJobRetryTimeCycle", "formDefinition",
-        "linkedResource", "linkedResources", "listener", "parameter", "potentialStarter",
-        "priorityDefinition", "properties", "property", "taskSchedule", "userTask",
+        "adHoc", "assignmentDefinition", "calledElement", "constraint", "failedJobRetryTimeCycle",
+        "formDefinition", "input", "inputOutput", "inputParameter", "ioMapping", "linkedResource",
+        "linkedResources", "listener", "loopCharacteristics", "metaData", "output",
+        "outputParameter", "parameter", "potentialStarter", "priorityDefinition", "properties",
+        "property", "script", "subscription", "taskDefinition", "taskSchedule", "userTask",
         "userTaskForm", "versionTag",
     }
 )  # fmt: skip
-"""Elements without an effect on what is executed, or with a finding of their own."""
+"""Elements that m2pem carries out (docs/missions.md), that do not change what is executed, or that
+have a finding of their own."""
 
 _LISTENER = ("the listener is not called", _WRITES)
 _FORM = ("the form is not shown, and its fields and defaults are not written", _DECISIONS)
@@ -53,6 +47,7 @@ CHANGING = {
     **dict.fromkeys(("eventListener", "variableListener"), _LISTENER),
     **dict.fromkeys(("executionListener", "executionListeners"), _LISTENER),
     **dict.fromkeys(("taskListener", "taskListeners"), _LISTENER),
+    **dict.fromkeys(("onEntry-script", "onExit-script"), ("the script is not run", _WRITES)),
     **dict.fromkeys(("formData", "formProperty"), _FORM),
     **dict.fromkeys(("errorEventDefinition", "mapException"), _FAILURE),
     **dict.fromkeys(("field", "taskHeaders"), ("it is not passed to the service", _PROPERTIES)),
@@ -70,20 +65,36 @@ CHANGING = {
 }
 """Elements that change what is executed: what becomes of them, and what to write instead."""
 
+SERVING = frozenset({BPMN + "serviceTask", BPMN + "businessRuleTask"})
+"""What does the work of a class or job of another engine."""
+
+NOT_SERVING = ("the worker is not called", _SERVICE)
+"""What becomes of a class or job at any other element."""
+
+COUNTED = ("loopCounter is 0 in the first instance here, and 1 there", "write loopCounter + 1")
+"""What becomes of `loopCounter` in an activity with `zeebe:loopCharacteristics`."""
+
 NOT_OF_A_CALL = ("nothing is passed by it into or out of the called process", _CALLS)
 """What becomes of `camunda:inputOutput` on a call activity."""
 
+_VARIABLES = (
+    "idVariableName", "processInstanceIdVariableName", "taskCompleterVariableName",
+    "taskIdVariableName",
+)  # fmt: skip
 CHANGING_ATTRIBUTES = {
     **dict.fromkeys(("resultVariable", "resultVariableName"), ("it is not stored", _RESULT)),
     **dict.fromkeys(("decisionRef", "decisionTableReferenceKey"), _DECISION),
     **dict.fromkeys(("inheritVariables", "variableMappingClass"), _LISTED),
+    **dict.fromkeys(("class", "delegateExpression", "expression", "type"), NOT_SERVING),
+    **dict.fromkeys(("formKey", "formRef"), _FORM),
+    **dict.fromkeys(_VARIABLES, ("it is not written", "delete it")),
+    "elementIndexVariable": ("it is not written", "read loopCounter, which counts from 0"),
     "variableMappingDelegateExpression": _LISTED,
     "variableName": _FILTER,
     "errorVariableName": (
         "the error is not stored",
         'camunda:errorCodeVariable="name" stores its code, camunda:errorMessageVariable its reason',
     ),
-    "idVariableName": ("it is not written", "delete it"),
     "initiator": (
         "no one who starts a mission is stored",
         "give it with --data, or let a service write it",

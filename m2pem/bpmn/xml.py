@@ -55,6 +55,7 @@ BPMN = "{http://www.omg.org/spec/BPMN/20100524/MODEL}"
 M2PEM = "{https://m2pem.org/schema/1}"
 CAMUNDA = "{http://camunda.org/schema/1.0/bpmn}"
 ACTIVITI = "{http://activiti.org/bpmn}"
+JBPM = "{http://www.jboss.org/drools}"
 FLOWABLE = "{http://flowable.org/bpmn}"
 ZEEBE = "{http://camunda.org/schema/zeebe/1.0}"
 

@@ -153,12 +153,12 @@ def test_a_condition_may_be_in_any_dialect(condition: str, attributes: str) -> N
     assert not definition.condition.holds({"x": 3}.get)
 
 
-def test_what_other_engines_say_beside_the_condition_is_ignored_without_a_word() -> None:
+def test_what_filters_a_condition_elsewhere_is_a_warning() -> None:
     text = conditional("x > 3").replace(
         "<conditionalEventDefinition>",
         '<conditionalEventDefinition camunda:variableName="x" camunda:variableEvents="create">',
     )
-    assert summary(around(text)) == []
+    assert summary(around(text)) == [("foreign-effect", 3, "T")]
 
 
 def test_a_condition_may_stand_in_an_event_definition_of_the_file() -> None:

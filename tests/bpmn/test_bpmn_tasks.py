@@ -295,6 +295,8 @@ def mapped(data: bytes) -> tuple[list[tuple[str, str]], list[tuple[str, str]]]:
         '<m2pem:in source="a.b" target="x"/><m2pem:out source="y" target="c"/>',
         '<camunda:in source="a.b" target="x"/><camunda:out source="y" target="c"/>'
         '<camunda:in businessKey="#{execution.processBusinessKey}"/>',
+        '<f:in xmlns:f="http://flowable.org/bpmn" source="a.b" target="x"/>'
+        '<a:out xmlns:a="http://activiti.org/bpmn" source="y" target="c"/>',
     ],
 )
 def test_mappings_by_name(content: str) -> None:

@@ -5,15 +5,17 @@ from lxml import etree
 from m2pem.bpmn.extensions import ELEMENTS, PLACES, looks_like_own, unknown_content
 from m2pem.bpmn.foreign_elements import (
     AD_HOC_OUTPUT,
-    CARRIED_OUT,
     CHANGING,
     CHANGING_ATTRIBUTES,
+    COUNTED,
     ENGINES,
     EXPRESSIONS,
     HARMLESS,
     NOT_OF_A_CALL,
+    NOT_SERVING,
     PROPAGATES,
     PROPAGATES_REMEDY,
+    SERVING,
 )
 from m2pem.bpmn.rules.rule import E, Rule, W
 from m2pem.bpmn.rules.tree import Checks, Tree, parent
@@ -160,6 +162,10 @@ def _say_effect(tree: Tree, element: etree._Element, owner: etree._Element) -> b
         return True
     if name == "adHoc" and element.get("outputCollection"):
         _say_changing(tree, element, f"{element.prefix}:{name} outputCollection", AD_HOC_OUTPUT)
+    if name == "taskDefinition" and owner.tag not in SERVING:
+        _say_changing(tree, element, f"{element.prefix}:{name}", NOT_SERVING)
+    if name == "loopCharacteristics" and b"loopCounter" in etree.tostring(parent(owner)):
+        _say_changing(tree, element, f"{element.prefix}:{name}", COUNTED)
     if name in CHANGING:
         effect, right = CHANGING[name]
         if name in ("in", "out") and (source := element.get("source")):
@@ -172,7 +178,7 @@ def _say_effect(tree: Tree, element: etree._Element, owner: etree._Element) -> b
             what = "every value passes there, and here what is listed"
             named = f"{element.prefix}:calledElement without {' and '.join(left_out)}"
             _say_changing(tree, element, named, (what, PROPAGATES_REMEDY))
-    return name in CARRIED_OUT or name in HARMLESS or owner.tag not in PLACES
+    return name in HARMLESS
 
 
 def _say_changing(tree: Tree, element: etree._Element, named: str, effect: tuple[str, str]) -> None:
@@ -193,7 +199,9 @@ def _attributes(tree: Tree) -> None:
 
 
 def _is_carried_out(element: etree._Element, name: str) -> bool:
-    """Whether a script task in FEEL or JUEL stores its value in a result variable."""
+    """Whether a script task in FEEL or JUEL stores its value, or a service task names its work."""
+    if CHANGING_ATTRIBUTES[name] is NOT_SERVING:
+        return element.tag in SERVING
     language = element.get("scriptFormat", "").strip().lower()
     return name == "resultVariable" and language in EXPRESSIONS
 
