@@ -71,6 +71,9 @@ SERVING = frozenset({BPMN + "serviceTask", BPMN + "businessRuleTask"})
 NOT_SERVING = ("the worker is not called", _SERVICE)
 """What becomes of a class or job at any other element."""
 
+COMPUTED = ("it is read as it stands, and not evaluated", "write an element for each value")
+"""What becomes of an expression in the name or code of a signal, message, error or escalation."""
+
 COUNTED = ("loopCounter is 0 in the first instance here, and 1 there", "write loopCounter + 1")
 """What becomes of `loopCounter` in an activity with `zeebe:loopCharacteristics`."""
 
@@ -88,6 +91,11 @@ CHANGING_ATTRIBUTES = {
     **dict.fromkeys(("class", "delegateExpression", "expression", "type"), NOT_SERVING),
     **dict.fromkeys(("formKey", "formRef"), _FORM),
     **dict.fromkeys(_VARIABLES, ("it is not written", "delete it")),
+    "businessCalendarName": ("every day counts", "write the times as a cron text"),
+    "endDate": (
+        "the cycle does not end then",
+        "write R3/START/PERIOD, or R/PERIOD/END, in ISO 8601",
+    ),
     "elementIndexVariable": ("it is not written", "read loopCounter, which counts from 0"),
     "variableMappingDelegateExpression": _LISTED,
     "variableName": _FILTER,

@@ -179,3 +179,19 @@ def test_scripts_of_jbpm_before_and_after_a_task_are_not_run():
         "the script is not run",
         "the script is not run",
     ]
+
+
+@pytest.mark.parametrize(
+    ("element", "attribute"),
+    [
+        ('<signal id="X" name="= &quot;dock&quot; + bay"/>', "name"),
+        ('<message id="X" name="ready_${bay}"/>', "name"),
+        ('<error id="X" errorCode="#{code}"/>', "errorCode"),
+        ('<escalation id="X" escalationCode="=code"/>', "escalationCode"),
+    ],
+)
+def test_a_name_or_code_that_is_an_expression_elsewhere_is_a_warning(element, attribute):
+    [(_, message, _)] = warned(around('<task id="T"/>', element))
+    assert f"here: {attribute}='" in message
+    assert message.endswith("it is read as it stands, and not evaluated")
+    assert warned(around('<task id="T"/>', '<error id="X" errorCode="a=b"/>')) == []

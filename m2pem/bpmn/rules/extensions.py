@@ -7,6 +7,7 @@ from m2pem.bpmn.foreign_elements import (
     AD_HOC_OUTPUT,
     CHANGING,
     CHANGING_ATTRIBUTES,
+    COMPUTED,
     COUNTED,
     ENGINES,
     EXPRESSIONS,
@@ -18,7 +19,7 @@ from m2pem.bpmn.foreign_elements import (
     SERVING,
 )
 from m2pem.bpmn.rules.rule import E, Rule, W
-from m2pem.bpmn.rules.tree import Checks, Tree, parent
+from m2pem.bpmn.rules.tree import Check, Checks, Tree, parent
 from m2pem.bpmn.xml import BPMN, CAMUNDA, M2PEM, a, attribute_names, kind, local
 from m2pem.suggestions import suggest_or
 
@@ -214,4 +215,21 @@ def _say_foreign(tree: Tree, namespace: str, elements: list[etree._Element]) -> 
     tree.report(FOREIGN_EXTENSION, elements[0], f"{count} {whose} from here on: {listed}")
 
 
-CHECKS = Checks({}, (_extensions, _attributes))
+def _computed(attribute: str) -> Check:
+    def check(tree: Tree, element: etree._Element) -> None:
+        text = element.get(attribute, "").strip()
+        if text.startswith("=") or "${" in text or "#{" in text:
+            _say_changing(tree, element, f"{attribute}='{text}'", COMPUTED)
+
+    return check
+
+
+CHECKS = Checks(
+    {
+        "signal": _computed("name"),
+        "message": _computed("name"),
+        "error": _computed("errorCode"),
+        "escalation": _computed("escalationCode"),
+    },
+    (_extensions, _attributes),
+)
