@@ -6,6 +6,7 @@ when it has completed. Each mapping reads what those before it have set.
 
 import re
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 from lxml import etree
 
@@ -49,7 +50,7 @@ def read_foreign_mappings(
         own = {mapping.target.partition(".")[0] for mapping in inputs}
         script = foreign_script(found)
         if local_result and isinstance(node, ScriptTask) and script is not None:
-            own.add(script.get("resultVariable", "").strip())
+            own.add(script.key)
         object.__setattr__(node, "own_data", node.own_data | own)
     keeps = local_result and isinstance(node, ReceiveTask | ServiceTask)
     return Mappings(inputs, outputs, ordered=True, keeps_result=keeps)
@@ -119,51 +120,44 @@ def _warn_of_collection(
 # --- scripts --------------------------------------------------------------------------------------
 
 
-def foreign_script(found: Children) -> etree._Element | None:
-    """The `zeebe:script` of a script task; None: it has none."""
-    return next((each for each in found.extensions() if each.tag == _SCRIPT), None)
+@dataclass(frozen=True, slots=True)
+class ForeignScript:
+    """An expression whose value another engine stores."""
+
+    where: etree._Element
+    text: str
+    key: str
+    language: str
 
 
-def has_foreign_script(found: Children) -> bool:
-    """Whether a script task has an expression whose value another engine stores."""
-    written = found.element.get("scriptFormat", "").strip().lower() in EXPRESSIONS
-    return foreign_script(found) is not None or (written and bool(_result_variable(found)))
+def foreign_script(found: Children) -> ForeignScript | None:
+    """What a script task stores by `zeebe:script`, or by an expression with a result variable."""
+    for each in found.extensions():
+        if each.tag == _SCRIPT:
+            text, key = each.get("expression", ""), each.get("resultVariable", "")
+            return ForeignScript(each, text, key.strip(), "FEEL")
+    language = found.element.get("scriptFormat", "").strip()
+    names = (found.element.get(engine + "resultVariable", "").strip() for engine in _ENGINES)
+    key = next(filter(None, names), "")
+    for each in found.of("script") if key and language.lower() in EXPRESSIONS else ():
+        return ForeignScript(each, text_of(each), key, language)
+    return None
 
 
-def read_foreign_script(context: ReadingContext, found: Children) -> Script | None:
-    """The assignment that such a script task is."""
-    element = foreign_script(found)
-    if element is not None:
-        text, key = element.get("expression", ""), element.get("resultVariable", "")
-        return _assignment(context, found, element, text, key, "FEEL")
-    script = found.of("script")[0]
-    language = found.element.get("scriptFormat")
-    return _assignment(context, found, script, text_of(script), _result_variable(found), language)
-
-
-def _result_variable(found: Children) -> str:
-    names = (found.element.get(engine + "resultVariable") for engine in _ENGINES)
-    return next((name for name in names if name), "") if found.of("script") else ""
-
-
-def _assignment(
-    context: ReadingContext,
-    found: Children,
-    where: etree._Element,
-    text: str,
-    key: str,
-    language: str | None,
+def read_foreign_script(
+    context: ReadingContext, found: Children, script: ForeignScript
 ) -> Script | None:
-    if not KEY.fullmatch(key.strip()):
+    """The assignment that such a script is."""
+    if not KEY.fullmatch(script.key):
         context.findings.error(
-            where,
+            script.where,
             found.id,
             BAD_KEY,
-            f"the script's result variable, '{key}', is no name of the data",
+            f"the script's result variable, '{script.key}', is no name of the data",
             'write for example resultVariable="mission.speed"',
         )
         return None
-    expression = context.expression(where, found.id, text, language)
+    expression = context.expression(script.where, found.id, script.text, script.language)
     if expression is None:
         return None
-    return Script((Assignment(key.strip(), expression, context.findings.line(where)),))
+    return Script((Assignment(script.key, expression, context.findings.line(script.where)),))

@@ -12,7 +12,7 @@ from m2pem.bpmn.children import Children, own_extensions
 from m2pem.bpmn.context import KEY, MessageUse, PendingPrompt, ReadingContext, association, text_of
 from m2pem.bpmn.events import look_up
 from m2pem.bpmn.extensions import unknown_content
-from m2pem.bpmn.foreign_data import has_foreign_script, read_foreign_script
+from m2pem.bpmn.foreign_data import foreign_script, read_foreign_script
 from m2pem.bpmn.foreign_syntax import script_remedy, statement_remedy, time_remedy
 from m2pem.bpmn.rules.activities import (
     BAD_SCRIPT,
@@ -372,8 +372,8 @@ def read_script_task(context: ReadingContext, found: Children) -> ScriptTask:
                 "delete one of the two",
             )
         behavior = read_carried(context, found, carried)
-    elif has_foreign_script(found):
-        statements = read_foreign_script(context, found)
+    elif (foreign := foreign_script(found)) is not None:
+        statements = read_foreign_script(context, found, foreign)
     elif script is not None and has_script:
         behavior, statements = _script(context, found, script)
     else:

@@ -8,6 +8,7 @@ from m2pem.bpmn.rules.references import ITEMS
 from m2pem.bpmn.rules.rule import E, Rule, W
 from m2pem.bpmn.rules.tree import (
     SUBPROCESSES,
+    Check,
     Checks,
     Tree,
     children,
@@ -233,38 +234,27 @@ def _in_a_set(
             tree.report(rule, data, f"'{data.get('name') or data.get('id', '')}'")
 
 
-def _input_set(tree: Tree, element: etree._Element) -> None:
-    _references(tree, element, "dataInput", INPUT_SET_REFERENCE)
-    _optional(tree, element, "Input", OPTIONAL_INPUT)
-    _pair(tree, element, "outputSet")
+def _set(direction: str, other: str, unknown: Rule, optional: Rule) -> Check:
+    data = f"data{direction}"
+
+    def check(tree: Tree, element: etree._Element) -> None:
+        _only(tree, element, f"{data}Refs", _ids(element, data), unknown)
+        listed = {named(text) for text in texts(element, f"{data}Refs")}
+        for name in (f"optional{direction}Refs", f"whileExecuting{direction}Refs"):
+            _only(tree, element, name, listed, optional)
+        _only(tree, element, f"{other}Refs", _ids(element, other), PAIRED_SET)
+
+    return check
 
 
-def _output_set(tree: Tree, element: etree._Element) -> None:
-    _references(tree, element, "dataOutput", OUTPUT_SET_REFERENCE)
-    _optional(tree, element, "Output", OPTIONAL_OUTPUT)
-    _pair(tree, element, "inputSet")
+def _ids(element: etree._Element, name: str) -> set[str]:
+    return {each.get("id", "") for each in children(parent(element), name)}
 
 
-def _references(tree: Tree, element: etree._Element, name: str, rule: Rule) -> None:
-    known = {data.get("id") for data in children(parent(element), name)}
-    for text in texts(element, f"{name}Refs"):
+def _only(tree: Tree, element: etree._Element, name: str, known: set[str], rule: Rule) -> None:
+    for text in texts(element, name):
         if named(text) not in known:
             tree.report(rule, element, f"'{text}'")
-
-
-def _optional(tree: Tree, element: etree._Element, direction: str, rule: Rule) -> None:
-    listed = {named(text) for text in texts(element, f"data{direction}Refs")}
-    for name in (f"optional{direction}Refs", f"whileExecuting{direction}Refs"):
-        for text in texts(element, name):
-            if named(text) not in listed:
-                tree.report(rule, element, f"'{text}'")
-
-
-def _pair(tree: Tree, element: etree._Element, other: str) -> None:
-    known = {each.get("id") for each in children(parent(element), other)}
-    for text in texts(element, f"{other}Refs"):
-        if named(text) not in known:
-            tree.report(PAIRED_SET, element, f"'{text}'")
 
 
 CHECKS = Checks(
@@ -275,8 +265,8 @@ CHECKS = Checks(
         "dataInput": _collection,
         "dataOutput": _collection,
         "ioSpecification": _specification,
-        "inputSet": _input_set,
-        "outputSet": _output_set,
+        "inputSet": _set("Input", "outputSet", INPUT_SET_REFERENCE, OPTIONAL_INPUT),
+        "outputSet": _set("Output", "inputSet", OUTPUT_SET_REFERENCE, OPTIONAL_OUTPUT),
     },
 )
 
