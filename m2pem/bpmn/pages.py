@@ -81,8 +81,8 @@ attributes in other places than listed here have no effect (`misplaced-extension
 Extension elements of other programs have no effect on the execution, except those that
 [mission files](missions.md#coming-from-another-engine) names. Where m2pem has an equivalent,
 `m2pem check` names those that it ignores, once for each namespace (`foreign-extension`), but not
-the settings of editors, such as colours. What changes the execution in Camunda, Zeebe, Flowable or
-Activiti it names each time (`foreign-effect`).
+the settings of editors, such as colours. What changes the execution in Camunda, Zeebe, Flowable,
+Activiti or jBPM it names each time (`foreign-effect`).
 
 This page is generated from the table by which m2pem checks files:
 `python -m m2pem.bpmn.pages extensions`.
