@@ -11,6 +11,7 @@ from lxml import etree
 
 from m2pem.bpmn.children import Children, read_children
 from m2pem.bpmn.context import KEY, Association, PendingCall, ReadingContext, association, reference
+from m2pem.bpmn.foreign_elements import ENGINES, PROPAGATES
 from m2pem.bpmn.rules.activities import (
     COMPLETION_QUANTITY,
     MAPPING_SOURCE,
@@ -30,16 +31,7 @@ from m2pem.bpmn.tasks import (
     read_service_task,
     read_user_task,
 )
-from m2pem.bpmn.xml import (
-    ACTIVITI,
-    BPMN,
-    CAMUNDA,
-    FLOWABLE,
-    M2PEM,
-    ZEEBE,
-    attribute_names,
-    local,
-)
+from m2pem.bpmn.xml import BPMN, M2PEM, ZEEBE, attribute_names, local
 from m2pem.errors import ExpressionSyntaxError
 from m2pem.mission.behavior import Mapping, Mappings
 from m2pem.mission.elements import Activity, CallActivity, FlowNode, Process, SubProcess
@@ -58,7 +50,7 @@ _ATTRIBUTES = frozenset(
 )
 
 _USED = frozenset({"in", "out"})
-_PLAIN = (M2PEM, CAMUNDA, FLOWABLE, ACTIVITI)
+_PLAIN = (M2PEM, *ENGINES)
 _ALL = 'list each value: <m2pem:in source="a.b" target="x"/>'
 
 
@@ -221,7 +213,7 @@ def _source(context: ReadingContext, found: Children, element: etree._Element) -
 
 
 def _refuse_propagation(context: ReadingContext, found: Children, element: etree._Element) -> None:
-    for name in ("propagateAllChildVariables", "propagateAllParentVariables"):
+    for name in PROPAGATES:
         if element.get(name) == "true":
             context.findings.error(
                 element,

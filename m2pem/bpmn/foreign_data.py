@@ -12,11 +12,11 @@ from lxml import etree
 
 from m2pem.bpmn.children import Children
 from m2pem.bpmn.context import KEY, ReadingContext, text_of
-from m2pem.bpmn.foreign_elements import EXPRESSIONS
+from m2pem.bpmn.foreign_elements import ENGINES, EXPRESSIONS
 from m2pem.bpmn.foreign_syntax import expression_remedy
 from m2pem.bpmn.rules.data import BAD_KEY
 from m2pem.bpmn.rules.extensions import FOREIGN_EFFECT
-from m2pem.bpmn.xml import ACTIVITI, CAMUNDA, FLOWABLE, ZEEBE, local
+from m2pem.bpmn.xml import CAMUNDA, ZEEBE, local
 from m2pem.errors import ExpressionSyntaxError
 from m2pem.mission.behavior import Assignment, Mapping, Mappings, Script
 from m2pem.mission.elements import Activity, Event, ReceiveTask, ScriptTask, ServiceTask
@@ -29,7 +29,6 @@ _TARGET = re.compile(r"[^\W\d]\w*(?:[. ]\w+)*")
 """A name of the data; one with spaces FEEL can read."""
 
 _SCRIPT = ZEEBE + "script"
-_ENGINES = (CAMUNDA, FLOWABLE, ACTIVITI)
 
 
 def read_foreign_mappings(
@@ -66,38 +65,24 @@ def _mappings(
     for element in (each for wrapper in wrappers for each in wrapper if each.tag in tags):
         target = (element.get("target") or element.get("name") or "").strip()
         source = element.get("source") if element.tag.startswith(ZEEBE) else text_of(element)
+        because, remedy = "", "write an expression, or a script task before it"
+        expression = literal(None)
         if not _TARGET.fullmatch(target):
-            _not_carried_out(context, element, node, target, "that is no name of the data")
+            because = "that is no name of the data"
         elif len(element):
-            _not_carried_out(
-                context, element, node, target, f"a {local(element[0].tag)} is not read"
-            )
-        else:
+            because = f"a {local(element[0].tag)} is not read"
+        elif source:
             try:
-                expression = template(source) if source else literal(None)
+                expression = template(source)
             except ExpressionSyntaxError as error:
-                _not_carried_out(context, element, node, target, str(error), source or "")
-                continue
-            if element.tag in _OUTPUTS and isinstance(node, Activity):
-                _warn_of_collection(context, found, element, expression)
-            yield Mapping(expression, target, context.findings.line(element))
-
-
-def _not_carried_out(
-    context: ReadingContext,
-    element: etree._Element,
-    node: Activity | Event,
-    target: str,
-    because: str,
-    source: str = "",
-) -> None:
-    context.findings.warning(
-        element,
-        node.id,
-        FOREIGN_EFFECT,
-        f"'{target}' gets no value from {local(element.tag)}: {because}",
-        expression_remedy(source) if source else "write an expression, or a script task before it",
-    )
+                because, remedy = str(error), expression_remedy(source)
+        if because:
+            what = f"'{target}' gets no value from {local(element.tag)}: {because}"
+            context.findings.warning(element, node.id, FOREIGN_EFFECT, what, remedy)
+            continue
+        if element.tag in _OUTPUTS and isinstance(node, Activity):
+            _warn_of_collection(context, found, element, expression)
+        yield Mapping(expression, target, context.findings.line(element))
 
 
 def _warn_of_collection(
@@ -137,7 +122,7 @@ def foreign_script(found: Children) -> ForeignScript | None:
             text, key = each.get("expression", ""), each.get("resultVariable", "")
             return ForeignScript(each, text, key.strip(), "FEEL")
     language = found.element.get("scriptFormat", "").strip()
-    names = (found.element.get(engine + "resultVariable", "").strip() for engine in _ENGINES)
+    names = (found.element.get(engine + "resultVariable", "").strip() for engine in ENGINES)
     key = next(filter(None, names), "")
     for each in found.of("script") if key and language.lower() in EXPRESSIONS else ():
         return ForeignScript(each, text_of(each), key, language)

@@ -23,6 +23,7 @@ from m2pem.bpmn.context import (
     text_of,
 )
 from m2pem.bpmn.events import definition_elements, read_thrown, referred_definition
+from m2pem.bpmn.foreign_elements import ENGINES
 from m2pem.bpmn.rules.data import BAD_KEY
 from m2pem.bpmn.rules.events import MISSING_REFERENCE
 from m2pem.bpmn.rules.loops import (
@@ -37,7 +38,7 @@ from m2pem.bpmn.rules.loops import (
 )
 from m2pem.bpmn.rules.references import DANGLING_REFERENCE
 from m2pem.bpmn.rules.rule import Rule
-from m2pem.bpmn.xml import ACTIVITI, BPMN, CAMUNDA, FLOWABLE, M2PEM, ZEEBE, local
+from m2pem.bpmn.xml import BPMN, M2PEM, ZEEBE, local
 from m2pem.mission.elements import Activity, SubProcess
 from m2pem.mission.events import EventDefinition, Signal, SignalEventDefinition
 from m2pem.mission.expression import Expression
@@ -49,7 +50,7 @@ _MULTI_INSTANCE = BPMN + "multiInstanceLoopCharacteristics"
 LOOPS = (_STANDARD, _MULTI_INSTANCE, BPMN + "loopCharacteristics")
 _MARKERS = frozenset(LOOPS)
 
-_EDITORS = (M2PEM, CAMUNDA, FLOWABLE, ACTIVITI)
+_EDITORS = (M2PEM, *ENGINES)
 """Whose attributes `collection` and `elementVariable` mean the same."""
 
 _NUMBER = re.compile(r"[0-9]{1,18}")

@@ -13,6 +13,7 @@ from m2pem.bpmn.context import KEY, MessageUse, PendingPrompt, ReadingContext, a
 from m2pem.bpmn.events import look_up
 from m2pem.bpmn.extensions import unknown_content
 from m2pem.bpmn.foreign_data import foreign_script, read_foreign_script
+from m2pem.bpmn.foreign_elements import ENGINES
 from m2pem.bpmn.foreign_syntax import script_remedy, statement_remedy, time_remedy
 from m2pem.bpmn.rules.activities import (
     BAD_SCRIPT,
@@ -28,10 +29,8 @@ from m2pem.bpmn.rules.extensions import UNKNOWN_EXTENSION
 from m2pem.bpmn.rules.rule import Rule
 from m2pem.bpmn.times import wrong_time
 from m2pem.bpmn.xml import (
-    ACTIVITI,
     BPMN,
     CAMUNDA,
-    FLOWABLE,
     M2PEM,
     ZEEBE,
     XmlError,
@@ -57,8 +56,7 @@ from m2pem.mission.expression.literals import shorten
 from m2pem.mission.script import parse_script
 
 _SERVICE = frozenset({"behavior", "service", "property", "role"})
-_ENGINES = (CAMUNDA, FLOWABLE, ACTIVITI)
-_CLASSES = tuple(engine + name for engine in _ENGINES for name in ("class", "topic"))
+_CLASSES = tuple(engine + name for engine in ENGINES for name in ("class", "topic"))
 """What other engines call the name of who does the work."""
 
 _JOB = ZEEBE + "taskDefinition"
@@ -147,7 +145,7 @@ def _service_call(
 def _bound_elsewhere(found: Children) -> str:
     """Return a note for the message on how another engine binds the task."""
     for key in attribute_names(found.element):
-        if key.startswith(_ENGINES) and local(key) in ("expression", "delegateExpression", "type"):
+        if key.startswith(ENGINES) and local(key) in ("expression", "delegateExpression", "type"):
             value = found.element.get(key) or ""
             return f" (its {local(key)} '{shorten(value)}' is another engine's)"
     return ""

@@ -153,33 +153,33 @@ def _namespace(tag: str) -> str:
 
 def _say_effect(tree: Tree, element: etree._Element, owner: etree._Element) -> bool:
     """Say what becomes of an engine's element, if it matters. False: the element is not known."""
-    name = local(element.tag)
-    if name in ("in", "out") and owner.tag == _CALL:
-        return True
+    name, called = local(element.tag), owner.tag == _CALL
+    effect: tuple[str, str] | None = None
+    beside = ""
     if name == "properties" and not element.tag.startswith(CAMUNDA):
         return False
-    if name == "inputOutput" and owner.tag == _CALL:
-        _say_changing(tree, element, f"{element.prefix}:{name}", NOT_OF_A_CALL)
+    if name in ("in", "out") and called:
         return True
-    if name == "adHoc" and element.get("outputCollection"):
-        _say_changing(tree, element, f"{element.prefix}:{name} outputCollection", AD_HOC_OUTPUT)
-    if name == "taskDefinition" and owner.tag not in SERVING:
-        _say_changing(tree, element, f"{element.prefix}:{name}", NOT_SERVING)
-    if name == "loopCharacteristics" and b"loopCounter" in etree.tostring(parent(owner)):
-        _say_changing(tree, element, f"{element.prefix}:{name}", COUNTED)
     if name in CHANGING:
-        effect, right = CHANGING[name]
+        effect = CHANGING[name]
         if name in ("in", "out") and (source := element.get("source")):
-            right += f": {element.get('target')} = {source}"
-        _say_changing(tree, element, f"{element.prefix}:{name}", (effect, right))
-        return True
-    if name == "calledElement":
+            effect = (effect[0], f"{effect[1]}: {element.get('target')} = {source}")
+    elif name == "inputOutput" and called:
+        effect = NOT_OF_A_CALL
+    elif name == "adHoc" and element.get("outputCollection"):
+        effect, beside = AD_HOC_OUTPUT, " outputCollection"
+    elif name == "taskDefinition" and owner.tag not in SERVING:
+        effect = NOT_SERVING
+    elif name == "loopCharacteristics" and b"loopCounter" in etree.tostring(parent(owner)):
+        effect = COUNTED
+    elif name == "calledElement":
         left_out = [each for each in PROPAGATES if element.get(each) is None]
         if left_out and "true" not in map(element.get, PROPAGATES):  # that is refused
-            what = "every value passes there, and here what is listed"
-            named = f"{element.prefix}:calledElement without {' and '.join(left_out)}"
-            _say_changing(tree, element, named, (what, PROPAGATES_REMEDY))
-    return name in HARMLESS
+            effect = ("every value passes there, and here what is listed", PROPAGATES_REMEDY)
+            beside = f" without {' and '.join(left_out)}"
+    if effect is not None:
+        _say_changing(tree, element, f"{element.prefix}:{name}{beside}", effect)
+    return effect is not None or name in HARMLESS
 
 
 def _say_changing(tree: Tree, element: etree._Element, named: str, effect: tuple[str, str]) -> None:
