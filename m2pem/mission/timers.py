@@ -190,7 +190,6 @@ MACROS = {
     "@hourly": "0 * * * *",
 }
 _DAYS = ("SUN", "MON", "TUE", "WED", "THU", "FRI", "SAT")
-_DAY_NAMES = ("Sunday", "Monday", "Tuesday", "Wednesday", "Thursday", "Friday", "Saturday")
 _DAY = r"[0-9]+|SUN|MON|TUE|WED|THU|FRI|SAT"
 _DAY_TERM = re.compile(
     rf"(?P<first>{_DAY}|\*)(?:-(?P<last>{_DAY}))?(?:/(?P<step>[1-9][0-9]*))?"
@@ -273,9 +272,11 @@ def parse_cron(text: str) -> Cron:
             text, "give the day of the month or the day of the week, and '?' for the other"
         )
     words[-3] = day.replace("?", "*")
-    if len(words) == 5:
-        _five_fields(text, weekday)
-    words[-1] = _weekdays(text, weekday, quartz) if len(words) == 6 else weekday.replace("?", "*")
+    if len(words) == 6:
+        words[-1] = _weekdays(text, weekday, quartz)
+    else:
+        terms = weekday.replace("?", "*").split(",")
+        words[-1] = ",".join(_five_fields(text, term) for term in terms)
     fields = " ".join(words)
     try:
         CronSim(fields, _EPOCH)
@@ -288,21 +289,13 @@ def _is_any(field: str) -> bool:
     return field == "?" or field.startswith("*")
 
 
-def _five_fields(text: str, field: str) -> None:
-    """Refuse days of the week that have another form in five fields, by what they mean."""
-    for term in field.split(","):
-        match = _DAY_TERM.fullmatch(term)
-        if match is None:
-            continue
-        if match["day"] in _DAYS and match["which"] == "L":
-            number = _DAYS.index(match["day"])
-            what = f"'{term}' is the last {_DAY_NAMES[number]} of the month"
-            raise _wrong(text, f"{what}: with five fields, write {number}L")
-        if match["first"] in _DAYS and match["last"] in _DAYS:
-            first, last = _DAYS.index(match["first"]), _DAYS.index(match["last"])
-            if first > last:
-                days = ",".join((*_DAYS, *_DAYS)[first : last + 8])
-                raise _wrong(text, f"'{term}' passes the end of the week: write {days}")
+def _five_fields(text: str, term: str) -> str:
+    """A term of named days (FRIL, FRI-MON) in numbers; cronsim reads the others there."""
+    match = _DAY_TERM.fullmatch(term)
+    if match is None or match["step"]:
+        return term
+    days = {match["first"], match["last"], match["day"]} - {None}
+    return _weekdays(text, term, False) if days <= {*_DAYS} else term
 
 
 def _weekdays(text: str, field: str, quartz: bool) -> str:
