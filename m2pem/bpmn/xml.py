@@ -57,6 +57,9 @@ CAMUNDA = "{http://camunda.org/schema/1.0/bpmn}"
 ACTIVITI = "{http://activiti.org/bpmn}"
 JBPM = "{http://www.jboss.org/drools}"
 FLOWABLE = "{http://flowable.org/bpmn}"
+OPERATON = "{http://operaton.org/schema/1.0/bpmn}"
+"""Camunda 7's successor, whose elements are Camunda's: they are read as those."""
+
 ZEEBE = "{http://camunda.org/schema/zeebe/1.0}"
 
 attribute_names = cast("Callable[[etree._Element], list[str]]", etree._Element.keys)
@@ -152,7 +155,7 @@ def parse_xml(data: bytes, *, declared: bool = True) -> Document:
         raise XmlError(TOO_LARGE, 1, *too_large(len(data)))
     text = _decode(data) if declared else data.decode()
     _refuse_doctype(text)
-    utf8 = text.encode()
+    utf8 = text.encode().replace(OPERATON[1:-1].encode(), CAMUNDA[1:-1].encode())
     parser = _parser()
     try:
         root = etree.fromstring(utf8, parser)

@@ -1,11 +1,12 @@
 """Elements and attributes of other engines: harmless, carried out, or warned of each time."""
 
 import pytest
-from bpmn_text import around, findings, process
+from bpmn_text import HEAD, around, findings, load, process
 
 from m2pem.bpmn.foreign_elements import CHANGING, CHANGING_ATTRIBUTES, HARMLESS
 
 RULE = "foreign-effect"
+HEAD_WITHOUT_CAMUNDA = HEAD.replace(' xmlns:camunda="http://camunda.org/schema/1.0/bpmn"', "")
 
 
 def warned(data: bytes) -> list[tuple[str, str, str]]:
@@ -165,7 +166,7 @@ def test_an_element_that_is_not_known_is_named_wherever_it_is(place):
 
 
 def test_scripts_of_jbpm_before_and_after_a_task_are_not_run():
-    """As jBPM's editor writes them (7.74, "Process designer")."""
+    """As jBPM's editors write them."""
     script = (
         '<tns:{0} scriptFormat="http://www.java.com/java"><tns:script>kcontext.setVariable("x", 1);'
         "</tns:script></tns:{0}>"
@@ -195,3 +196,19 @@ def test_a_name_or_code_that_is_an_expression_elsewhere_is_a_warning(element, at
     assert f"here: {attribute}='" in message
     assert message.endswith("it is read as it stands, and not evaluated")
     assert warned(around('<task id="T"/>', '<error id="X" errorCode="a=b"/>')) == []
+
+
+def test_those_of_operaton_are_those_of_camunda():
+    """Operaton has a namespace of its own for the same."""
+    space = 'xmlns:operaton="http://operaton.org/schema/1.0/bpmn"'
+    mapping = (
+        "<extensionElements><operaton:inputOutput><operaton:outputParameter name='z'>${x}"
+        "</operaton:outputParameter></operaton:inputOutput></extensionElements>"
+    )
+    data = around(f'<userTask id="T" {space} operaton:formKey="f">{mapping}</userTask>').replace(
+        HEAD.encode(), HEAD_WITHOUT_CAMUNDA.encode()
+    )
+    [(_, message, _)] = warned(data)
+    assert "formKey='f': the form is not shown" in message
+    [output] = load(data).elements["T"].data_flow.outputs
+    assert (output.target, output.source.text) == ("z", "${x}")

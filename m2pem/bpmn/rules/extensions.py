@@ -20,7 +20,7 @@ from m2pem.bpmn.foreign_elements import (
 )
 from m2pem.bpmn.rules.rule import E, Rule, W
 from m2pem.bpmn.rules.tree import Check, Checks, Tree, parent
-from m2pem.bpmn.xml import BPMN, CAMUNDA, M2PEM, a, attribute_names, kind, local
+from m2pem.bpmn.xml import BPMN, CAMUNDA, M2PEM, OPERATON, a, attribute_names, kind, local
 from m2pem.suggestions import suggest_or
 
 WRONG_NAMESPACE = Rule(
@@ -187,7 +187,7 @@ def _say_changing(tree: Tree, element: etree._Element, named: str, effect: tuple
 
 
 def _attributes(tree: Tree) -> None:
-    if not any(tree.mentions(engine[1:-1]) for engine in ENGINES):
+    if not any(tree.mentions(engine[1:-1]) for engine in (*ENGINES, OPERATON)):
         return
     for element in tree.root.iter(etree.Element):
         for key in attribute_names(element):
