@@ -175,10 +175,12 @@ class Vehicle:
             "%s: %s waits: not discovered yet: %s", self.resource, name, missing
         )
         missing = await self._until_found(awaited.request, FOUND_WITHIN_S)
+        while not missing and self._is_held and order():  # noqa: ASYNC110  # resumed, or replaced
+            await asyncio.sleep(LOOK_EVERY_S)
         awaited = order()
         if self._waiting == name:
             self._waiting = ""
-        if awaited is None:
+        if awaited is None or self._cancelled == name:
             return  # it was cancelled or replaced, or the vehicle is lost
         late = f"not discovered within {FOUND_WITHIN_S:g} s: {missing}" if missing else ""
         if reason := late or self.refusal(awaited.request):
@@ -186,8 +188,6 @@ class Vehicle:
             self._tracker.end(name, BehaviorState.REJECTED, reason=reason)
             return
         await self._give(awaited, query_first=query_first)
-        if self._is_held:
-            self.hold()
 
     async def _give(self, order: Order, *, query_first: bool) -> None:
         request = order.request
@@ -210,11 +210,13 @@ class Vehicle:
         self._unresolved.clear()
         if wrong := self._call_driver("begin", lambda: self.driver.begin(order)):
             self._tracker.end(request.id, BehaviorState.FAILED, reason=wrong)
+        elif self._is_held:  # meanwhile
+            self.hold()
 
     def cancel(self, behavior: BehaviorId) -> None:
         """Cancel a behavior. It fails if the vehicle does not stop in time."""
         goal = goal_id(self._context.journal, behavior)
-        if self._waiting == behavior:
+        if self._waiting == behavior and goal not in self._unresolved:
             self._waiting, self._order = "", None
             self._tracker.end(behavior, BehaviorState.CANCELLED, reason="it was not sent yet")
             return

@@ -247,16 +247,41 @@ async def test_a_behavior_that_waits_can_be_cancelled(
             assert truth.begun() == 1
 
 
-async def test_a_vehicle_that_is_held_before_it_comes_does_not_drive(
+async def test_what_may_run_since_before_a_restart_is_cancelled_when_its_vehicle_comes(
     ros_domain: int, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr(vehicle, "FOUND_WITHIN_S", AMPLE_S)
-    async with connected(ros_domain, driver="base") as (bench, truth):
+    monkeypatch.setattr(vehicle, "ASKED_WITHIN_S", 0.0)
+    reference = encode_checkpoint(Checkpoint((UGV1,), "goto", 1, {"target": ahead()}))
+    async with connected(ros_domain) as (bench, truth):
+        asked = await bench.arbiter.query("r1.b1", reference)
+        assert asked.state is BehaviorState.UNKNOWN
+        await bench.start("r1.b1", "goto", UGV1, target=ahead())
+        await until(lambda: "r1.b1 waits: " in caplog.text)
+        await bench.arbiter.cancel("r1.b1", 1)
+        async with late(ros_domain, "node"):
+            assert (await bench.ended("r1.b1", AMPLE_S)).state is BehaviorState.CANCELLED
+            await until(lambda: any(truth.cancels()))
+            assert truth.begun() == 0
+
+
+@pytest.mark.parametrize(("kind", "settings"), [("base", {"driver": "base"}), ("node", {})])
+async def test_a_vehicle_that_is_held_before_it_comes_begins_when_it_is_resumed(
+    ros_domain: int,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+    kind: str,
+    settings: Mapping[str, Any],
+) -> None:
+    monkeypatch.setattr(vehicle, "FOUND_WITHIN_S", AMPLE_S)
+    async with connected(ros_domain, **settings) as (bench, truth):
         await bench.start("r1.b1", "goto", UGV1, target=ahead())
         await until(lambda: "r1.b1 waits: " in caplog.text)
         await bench.arbiter.hold(UGV1)
-        async with late(ros_domain, "base"):
-            await bench.running("r1.b1", AMPLE_S)
+        async with late(ros_domain, kind):
+            await until(lambda: (now := state(bench)) is not None and now.link == "connected")
+            received = len(bench.states)
+            await until(lambda: len(bench.states) > received + 5)
             assert truth.begun() == 0
             await bench.arbiter.resume(UGV1)
             await until(lambda: truth.speed() > 0.3)
