@@ -276,8 +276,18 @@ def test_a_station_that_asks_as_those_of_ardupilot_do_reads_its_modes(
     asyncio.run(main())
 
 
-def test_offboard_of_px4_is_not_taken_for_the_return_of_ardupilot(tmp_path: Path) -> None:
-    """Both are mode 6; MAVSDK sets the parameters that it does not use to NaN, pymavlink to 0."""
+@pytest.mark.parametrize(
+    ("base", "rest"),
+    [
+        (1, [math.nan] * 4),  # MAVSDK, and the parameters that it does not use
+        (29, [0.0] * 4),  # px4_map["OFFBOARD"] of pymavlink's mavutil 2.4.50
+    ],
+)
+@pytest.mark.parametrize("as_int", [False, True])
+def test_offboard_of_px4_is_not_taken_for_the_return_of_ardupilot(
+    tmp_path: Path, base: int, rest: list[float], as_int: bool
+) -> None:
+    """Both are mode 6."""
 
     async def main() -> None:
         async with (
@@ -285,12 +295,51 @@ def test_offboard_of_px4_is_not_taken_for_the_return_of_ardupilot(tmp_path: Path
             ground_station(port) as station,
         ):
             await station.hears("HEARTBEAT", of(UAV1))
-            rest, mode = [math.nan] * 4, dialect.MAV_CMD_DO_SET_MODE
-            assert await station.command(UAV1, mode, 1, 6, 0, *rest) == dialect.MAV_RESULT_DENIED
+            mode = dialect.MAV_CMD_DO_SET_MODE
+            if as_int:
+                values = (base, 6, 0, rest[0], 0, 0, rest[3])
+                station.mav.command_int_send(UAV1, 1, 0, mode, 0, 0, *values)
+                ack = await station.hears("COMMAND_ACK", of(UAV1))
+                assert ack.result == dialect.MAV_RESULT_DENIED
+            else:
+                answer = await station.command(UAV1, mode, base, 6, 0, *rest)
+                assert answer == dialect.MAV_RESULT_DENIED
             await station.told("Guided cannot be commanded")
             assert not await control.runs()
-            assert await station.command(UAV1, mode, 1, 4, 5, *rest) == 0
-            assert await station.command(UAV1, mode, 1, 4, 3) == 0
+            assert await station.command(UAV1, mode, base, 4, 5, *rest) == 0
+            assert await station.command(UAV1, mode, base, 4, 3) == 0
+
+    asyncio.run(main())
+
+
+@pytest.mark.parametrize("asks_for_streams", [False, True])
+def test_a_mode_of_both_autopilots_from_a_station_that_may_speak_to_px4_is_refused(
+    tmp_path: Path, asks_for_streams: bool
+) -> None:
+    """PX4 enters Offboard only while targets come in; data streams are ArduPilot's."""
+
+    async def main() -> None:
+        async with (
+            gateway(tmp_path, commands="all") as (control, port),
+            ground_station(port) as station,
+        ):
+            await station.hears("HEARTBEAT", of(UAV1))
+            ignore_all = 0xFFF
+            place = (1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0)
+            station.mav.set_position_target_local_ned_send(0, UAV1, 1, 1, ignore_all, *place)
+            if asks_for_streams:
+                station.mav.request_data_stream_send(UAV1, 1, 0, 4, 1)
+            rtl, land, set_mode = 6, 9, dialect.MAV_CMD_DO_SET_MODE
+            answer = await station.command(UAV1, set_mode, 1, rtl)
+            assert (answer == 0) is asks_for_streams
+            if not asks_for_streams:
+                await station.told("mode 6 is OFFBOARD of PX4 and RTL of ArduPilot")
+                assert not await control.runs()
+                assert await station.command(UAV1, set_mode, 1, land) == 0
+                since = len(station.received)
+                station.mav.set_mode_send(UAV1, 29, rtl)
+                accepted = lambda each: each.result == 0  # noqa: E731
+                await station.hears("COMMAND_ACK", accepted, since)
 
     asyncio.run(main())
 

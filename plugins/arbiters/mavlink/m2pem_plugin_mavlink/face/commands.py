@@ -37,6 +37,9 @@ YAW_LOCK = 16
 
 YAW_IN_EARTH_FRAME = 64
 
+_OF_BOTH = dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | dialect.MAV_MODE_FLAG_SAFETY_ARMED
+"""Flags of a base mode that stations of ArduPilot and PX4 send."""
+
 
 class RefusedCommandError(Exception):
     """A command that is not carried out. `result`: its MAV_RESULT."""
@@ -59,7 +62,8 @@ class Order:
 @dataclass(frozen=True, slots=True)
 class Command:
     """COMMAND_LONG or COMMAND_INT. `place`: latitude and longitude in degrees, if both are given;
-    `z`: parameter 7, an altitude in the frame `altitude_frame`; `flags`: parameter 5 as it is."""
+    `z`: parameter 7, an altitude in the frame `altitude_frame`; `flags`: parameter 5 as it is.
+    `may_be_px4s`: its station does what PX4's Offboard mode needs, and nothing of ArduPilot."""
 
     id: int
     params: tuple[float, float, float, float]
@@ -68,6 +72,7 @@ class Command:
     altitude_frame: str
     confirmation: int
     flags: int = 0
+    may_be_px4s: bool = False
 
     @property
     def name(self) -> str:
@@ -78,7 +83,7 @@ class Command:
         return str(entry.name).removeprefix("MAV_CMD_") if entry is not None else f"{self.id}"
 
 
-def command_of(message: Message, frame: RawFrame) -> Command:
+def command_of(message: Message, frame: RawFrame, *, may_be_px4s: bool = False) -> Command:
     """Read a command."""
     params = (message.param1, message.param2, message.param3, message.param4)
     if frame.id == dialect.MAVLINK_MSG_ID_COMMAND_LONG:
@@ -88,7 +93,8 @@ def command_of(message: Message, frame: RawFrame) -> Command:
     else:
         x, y, z, confirmation = message.x * 1e-7, message.y * 1e-7, message.z, 0
         altitude_frame, flags = _FRAMES.get(message.frame, ""), message.x
-    return Command(message.command, params, _place(x, y), z, altitude_frame, confirmation, flags)
+    place, id_ = _place(x, y), message.command
+    return Command(id_, params, place, z, altitude_frame, confirmation, flags, may_be_px4s)
 
 
 def _place(latitude: float, longitude: float) -> tuple[float, float] | None:
@@ -200,14 +206,21 @@ def _loiter(command: Command, vehicle: ShownVehicle) -> Order:
 def _set_mode(command: Command, vehicle: ShownVehicle) -> Order:
     base, main, sub = (int(each) if math.isfinite(each) else 0 for each in command.params[:3])
     if not base & dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
-        raise RefusedCommandError(f"modes are set by their numbers, not by base mode {base}")
-    if 0 <= main < 256 and not sub and not math.isnan(command.params[3]):
-        # PX4's modes without a sub mode are manual ones and Offboard. MAVSDK sets them with NaN in
-        # what it does not use; pymavlink sends zeros, and ArduPilot's numbers.
-        name, mode = modes.by_ardupilot_number(main, vehicle.type)
-    else:
+        raise RefusedCommandError("modes are set by their numbers, with base mode 1")
+    # ArduPilot's numbers and PX4's main modes without a sub mode are alike: 6 is RTL of a copter,
+    # and Offboard. pymavlink sends ArduPilot's with base mode 1 and zeros, PX4's with more flags;
+    # MAVSDK sends PX4's with NaN.
+    is_px4s = main >= 256 or sub or math.isnan(command.params[3]) or base & ~_OF_BOTH
+    if is_px4s or main < 0:
         number = main if main >= 256 else px4_mode(main & 255, sub & 255)
         name, mode = f"mode {number:#x}", modes.BY_NUMBER.get(number)
+    else:
+        name, mode = modes.by_ardupilot_number(main, vehicle.type)
+        px4s = modes.px4_main_mode(main) if command.may_be_px4s else ""
+        if mode is not None and px4s:
+            raise RefusedCommandError(
+                f"mode {main} is {px4s} of PX4 and {name} of ArduPilot, which SET_MODE sets"
+            )
     if mode is None:
         raise RefusedCommandError(f"{name} cannot be commanded")
     return _of_mode(mode, vehicle)

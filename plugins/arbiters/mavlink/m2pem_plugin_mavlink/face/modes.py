@@ -13,7 +13,7 @@ from functools import cache
 
 from m2pem_plugin_mavlink.protocol.messages import Message, MessageType, message_type_of
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode
-from m2pem_plugin_mavlink.vehicle.identity import Firmware, Identity, kind_of
+from m2pem_plugin_mavlink.vehicle.identity import Firmware, Identity, Kind, kind_of
 from m2pem_plugin_mavlink.vehicle.modes import (
     PX4_AUTO,
     PX4_MANUAL,
@@ -88,6 +88,13 @@ def by_ardupilot_number(number: int, type_: int) -> tuple[str, Mode | None]:
     name, purpose = modes.name(number), modes.purpose(number)
     means = next((each for each in MODES if each.purpose is purpose and each.behavior), None)
     return name, None if name in OTHER_WAYS else means
+
+
+def px4_main_mode(main: int) -> str:
+    """Return PX4's name of a main mode; "": it has none."""
+    names = modes_of(Identity(Firmware.PX4, Kind.COPTER)).names
+    found = (name for number, name in names.items() if number >> 16 & 255 == main)
+    return next(found, "").partition(".")[0]
 
 
 @cache

@@ -68,6 +68,11 @@ _NO_REQUEST = frozenset(
     getattr(dialect, f"MAVLINK_MSG_ID_{name}")
     for name in ("HEARTBEAT", "SYSTEM_TIME", "MISSION_ACK", "COMMAND_ACK", "LOG_REQUEST_END")
 )
+_TARGETS = (
+    POSITION_TARGET,
+    dialect.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED,
+    dialect.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET,
+)
 _CLOCK_REQUESTS = (dialect.MAVLINK_MSG_ID_PING, dialect.MAVLINK_MSG_ID_TIMESYNC)
 """They go to all vehicles."""
 
@@ -241,10 +246,14 @@ class FaceServer:
         if component != AUTOPILOT and camera is None:
             return
         message = type_.unpack(frame.payload)
+        station.sends_targets |= frame.id in _TARGETS
         if frame.id in (COMMAND_LONG, COMMAND_INT):
-            self._command(command_of(message, frame), frame, station, vehicle, camera)
-        elif frame.id == SET_MODE:
-            params = float(message.base_mode), float(message.custom_mode), 0.0, 0.0
+            may_be_px4s = station.sends_targets and not station.ardupilot_modes
+            command = command_of(message, frame, may_be_px4s=may_be_px4s)
+            self._command(command, frame, station, vehicle, camera)
+        elif frame.id == SET_MODE:  # its number is whole: below 256, it is ArduPilot's
+            is_custom = message.base_mode & dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+            params = float(is_custom), float(message.custom_mode), 0.0, 0.0
             mode = Command(dialect.MAV_CMD_DO_SET_MODE, params, None, 0.0, "", 0)
             self._orders.command(mode, frame, station, vehicle)
         elif camera is not None:

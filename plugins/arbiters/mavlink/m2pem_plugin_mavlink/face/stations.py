@@ -34,7 +34,7 @@ _logger = logging.getLogger(__name__)
 class Station:
     """A peer: one ground station, or a router with several. `addresses`: those that send over it.
     `ignored`: its frames that were dropped, as there were too many. `ardupilot_modes`: it is sent
-    ArduPilot's numbers of modes."""
+    ArduPilot's numbers of modes. `sends_targets`: as PX4 needs them before its Offboard mode."""
 
     def __init__(self, peer: Peer, now_s: float) -> None:
         self.peer = peer
@@ -42,6 +42,7 @@ class Station:
         self.addresses: set[Address] = set()
         self.ignored = 0
         self.ardupilot_modes = False
+        self.sends_targets = False
         self._budget = MOST_FRAMES_AT_ONCE
         self._refilled_s = now_s
 
