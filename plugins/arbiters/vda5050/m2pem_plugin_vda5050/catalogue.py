@@ -79,6 +79,7 @@ _LOAD = {
     "side": "text",
 }
 _MAP = {"mapId": _REQUIRED_TEXT, "mapVersion": _REQUIRED_TEXT}
+_INSTANT = {"scope": "instant"}
 
 PREDEFINED: Mapping[str, Mapping[str, Any]] = {
     "pick": {"parameters": _LOAD, "doc": "Pick a load up."},
@@ -103,13 +104,19 @@ PREDEFINED: Mapping[str, Mapping[str, Any]] = {
             **{"theta": {"kind": "angle", "required": True}, "mapId": _REQUIRED_TEXT},
             "lastNodeId": _REQUIRED_TEXT,
         },
-        "action": {"scope": "instant"},
+        "action": _INSTANT,
         "doc": "Tell the vehicle where it is on its map.",
     },
-    "enableMap": {"parameters": _MAP, "action": {"scope": "instant"}, "doc": "Use a map."},
+    "enableMap": {"parameters": _MAP, "action": _INSTANT, "doc": "Use a map."},
+    "downloadMap": {
+        "parameters": {**_MAP, "mapDownloadLink": _REQUIRED_TEXT, "mapHash": "text"},
+        "action": _INSTANT,
+        "doc": "Load a map onto the vehicle.",
+    },
+    "deleteMap": {"parameters": _MAP, "action": _INSTANT, "doc": "Remove a map."},
     "logReport": {
         "parameters": {"reason": _REQUIRED_TEXT},
-        "action": {"scope": "instant"},
+        "action": _INSTANT,
         "doc": "Have the vehicle store a log report.",
     },
 }
@@ -119,7 +126,7 @@ The row of `drop` calls `stationType` and `loadType` optional and refers to `pic
 them; there are vehicles that refuse a `drop` without. In version 3.0 both are optional for both.
 """
 
-_NEW_IN_2_1 = ("enableMap",)
+_NEW_IN_2_1 = ("enableMap", "downloadMap", "deleteMap")
 _ANY_SCOPE = ("startCharging", "stopCharging", "finePositioning", "initPosition", "enableMap")
 
 _ENDLESS = (ParameterKind.AREA, ParameterKind.VEHICLE, ParameterKind.OFFSETS)
@@ -197,7 +204,7 @@ def read_own_behaviors(
                 f"{place}: every vehicle of this arbiter has it already; leave it out"
             )
     actions = [] if factsheet is None else factsheet.protocol_features.agv_actions
-    known = {each.action for each in declared.values()}
+    known = {*declared, *(own.action for own in declared.values()), *(own.name for own in USUAL)}
     offered = [_of_factsheet(each) for each in actions if each.action_type not in known]
     return (*declared.values(), *(each for each in offered if each is not None))
 

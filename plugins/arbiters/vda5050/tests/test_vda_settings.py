@@ -113,6 +113,10 @@ def test_all_that_a_connection_may_say() -> None:
             "agv1: connection.own_behaviors.enableMap: VDA 5050 2.0.0 has no action enableMap",
         ),
         (
+            {"own_behaviors": {"x": {"action": {"type": "deleteMap", "scope": "instant"}}}},
+            "agv1: connection.own_behaviors.x.parameters: VDA 5050 2.1.0 requires mapId and",
+        ),
+        (
             {"own_behaviors": {"x": {**FETCH, "action": {"type": "pick", "scope": "instant"}}}},
             "agv1: connection.own_behaviors.x: VDA 5050 has no instant action pick: write `scope:",
         ),
@@ -232,6 +236,17 @@ def test_a_factsheet_offers_its_actions(tmp_path: Path) -> None:
     ]
 
 
+def test_an_action_of_a_factsheet_takes_the_place_of_no_other_behavior(tmp_path: Path) -> None:
+    actions = dict.fromkeys(("pick", "goto", "fetch"), 1.0)
+    spec = AgvSpec("agv1", "KIT", "0001", "2.1.0", "hall", actions=actions)
+    file = tmp_path / "factsheet.json"
+    file.write_bytes(factsheet(spec, Headers("KIT", "0001").of("factsheet", 0)))
+    settings = read(factsheet=str(file), own_behaviors={"fetch": FETCH})
+    own = [(each.spec.name, each.action) for each in settings.own_behaviors]
+    assert own[0] == ("fetch", "pick")
+    assert {name for name, _ in own[1:]} == {"initPosition", "logReport"}
+
+
 @pytest.mark.parametrize(
     ("action", "required"),
     [
@@ -244,6 +259,8 @@ def test_a_factsheet_offers_its_actions(tmp_path: Path) -> None:
         ("waitForTrigger", {"triggerType"}),
         ("initPosition", {"x", "y", "theta", "mapId", "lastNodeId"}),
         ("enableMap", {"mapId", "mapVersion"}),
+        ("downloadMap", {"mapId", "mapVersion", "mapDownloadLink"}),
+        ("deleteMap", {"mapId", "mapVersion"}),
         ("logReport", {"reason"}),
     ],
 )
