@@ -17,7 +17,7 @@ import shapely.geometry
 from m2pem_plugin_recorder.export.xes import XesExporter
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
-from recording_world import DRIVE, GATE, HOME, ROAD, finished, write_fleet
+from recording_world import DRIVE, FLEET, GATE, HOME, ROAD, finished, write_fleet
 from rosbags.highlevel import AnyReader
 from rosbags.interfaces import Connection, MessageDefinitionFormat
 from rosbags.typesys import Stores, get_typestore
@@ -36,6 +36,7 @@ from m2pem.api import (
 from m2pem.api import records as r
 from m2pem.testing.scenarios import drawn, interrupted, question
 
+ALIKE = ("u-2", "u_2", "2u")
 JOURNAL = ("--journal", "journal.db")
 ABORTED = interrupted("goto", "ugv1", after="PT2S", target="gate")
 
@@ -407,6 +408,25 @@ def test_a_bag_is_as_rosbag2_of_jazzy_writes_it(bag: Path) -> None:
         assert reader.get_header().profile == "ros2"
         read = Counter(channel.topic for _, channel, _, _ in reader.iter_decoded_messages())
     assert read == counts
+
+
+def test_vehicles_whose_names_are_alike_in_ros_have_topics_of_their_own(tmp_path: Path) -> None:
+    write_fleet(tmp_path)
+    fleet = tmp_path / "fleet.yaml"
+    (line,) = (each for each in FLEET.splitlines(keepends=True) if "ugv2" in each)
+    lines = "".join(line.replace("ugv2", name) for name in ALIKE)
+    fleet.write_text(FLEET.replace(line, lines))
+    finished(tmp_path, *run("drive"), "--face", "recorder")
+    export(tmp_path, "r1", "--to", "rosbag2", "-o", "bag")
+    odometry = [
+        (each.topic, message.child_frame_id)
+        for each, _, message in messages_of_bag(tmp_path / "bag")
+        if each.msgtype == "nav_msgs/msg/Odometry"
+    ]
+    topics = {topic: frame.partition("/")[0] for topic, frame in odometry}
+    assert len(set(odometry)) == 1 + len(ALIKE)
+    assert set(topics.values()) == {"ugv1", *ALIKE}
+    assert set(topics) == {"/ugv1/odom", "/u_2/odom", "/u_2/odom_2", "/_2u/odom"}
 
 
 def test_a_bag_is_not_written_over_another_folder(folder: Path, bag: Path) -> None:

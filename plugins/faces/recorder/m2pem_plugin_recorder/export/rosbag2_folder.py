@@ -7,7 +7,8 @@ bag says the types of its topics itself: their definitions, and their hashes (RE
 
 import heapq
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Sequence
+from itertools import chain, count
 from pathlib import Path
 
 from rosbags.interfaces import (
@@ -31,7 +32,9 @@ from m2pem_plugin_recorder.ros_messages import STORE
 from m2pem_plugin_recorder.telemetry_messages import TelemetryEncoder
 
 _STRING = "std_msgs/msg/String"
-_NOT_IN_NAMES = re.compile(r"[^A-Za-z0-9_/]")
+_NOT_IN_NAMES = re.compile(r"[^A-Za-z0-9_/]|(?<=/)(?=[0-9])")
+"""What becomes "_" in names of ROS, none of whose parts begins with a digit."""
+
 
 _NO_BOUND = QosTime(0, 0)
 _QOS = Qos(
@@ -78,11 +81,12 @@ class Rosbag2Exporter:
             both = (self._telemetry(run, LocalFrame(run.fleet.origin)), _records(run))
             for found in heapq.merge(*both, key=lambda message: message.time_us):
                 is_cdr = found.channel.encoding == "cdr"
-                topic = _NOT_IN_NAMES.sub("_", found.channel.topic)
+                topic = found.channel.topic
                 type_ = found.channel.schema.name if is_cdr else _STRING
                 if topic not in connections:
+                    name = _ros_name(topic, {each.topic for each in connections.values()})
                     connections[topic] = writer.add_connection(
-                        topic, type_, typestore=STORE, offered_qos_profiles=[_QOS]
+                        name, type_, typestore=STORE, offered_qos_profiles=[_QOS]
                     )
                 data = found.data if is_cdr else _string(found.data)
                 writer.write(connections[topic], max(0, found.time_us) * NS_PER_US, data)
@@ -106,6 +110,13 @@ def _records(run: ExportedRun) -> Iterator[ChannelMessage]:
 def _readable(messages: Iterable[ChannelMessage]) -> Iterator[ChannelMessage]:
     """Leave out protobuf: the same is there as messages of ROS or as JSON."""
     return (each for each in messages if each.channel.encoding in ("cdr", "json"))
+
+
+def _ros_name(topic: str, taken: Container[str]) -> str:
+    """Return a name that ROS takes and no other topic of the bag has."""
+    name = _NOT_IN_NAMES.sub("_", topic)
+    others = (f"{name}_{number}" for number in count(2))
+    return next(each for each in chain((name,), others) if each not in taken)
 
 
 def _string(text: bytes) -> bytes:
