@@ -10,6 +10,8 @@ from struct import pack, unpack_from
 from typing import Any
 
 import pytest
+from m2pem_plugin_mavlink.face.commands import Command, RefusedCommandError, order_of
+from m2pem_plugin_mavlink.face.vehicle import ShownVehicle
 from m2pem_plugin_mavlink.simulator.simulator import Simulator
 from m2pem_plugin_mavlink.simulator.specification import Kind
 from mavlink_gcs import FIELD, FLEET, GroundStation, gateway, ground_station
@@ -17,6 +19,8 @@ from mavlink_ground import Ground
 from mavlink_simulated import specs
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from m2pem.api import ResourceId
 
 ROVER1, UAV1 = 1, 2
 FENCE: int = dialect.MAV_SYS_STATUS_GEOFENCE
@@ -342,6 +346,34 @@ def test_a_mode_of_both_autopilots_from_a_station_that_may_speak_to_px4_is_refus
                 await station.hears("COMMAND_ACK", accepted, since)
 
     asyncio.run(main())
+
+
+@pytest.mark.parametrize(
+    ("type_", "params", "behavior"),
+    [
+        (dialect.MAV_TYPE_QUADROTOR, (1.0, 6.0, 0.0, 0.0), "return_to_launch"),
+        (dialect.MAV_TYPE_QUADROTOR, (1.0, 6.0, math.nan, 0.0), ""),
+        (dialect.MAV_TYPE_QUADROTOR, (1.0, 4.0, 262.0, 0.0), ""),
+        (dialect.MAV_TYPE_VTOL_QUADROTOR, (1.0, 20.0, 0.0, 0.0), "land"),
+        # A plane lands by the sequence of its mission, not by QLAND.
+        (dialect.MAV_TYPE_FIXED_WING, (1.0, 20.0, 0.0, 0.0), ""),
+        # 6 is HOLD of ArduPilot's Blimp.
+        (dialect.MAV_TYPE_AIRSHIP, (1.0, 6.0, 0.0, 0.0), ""),
+    ],
+)
+def test_a_mode_number_means_what_the_protocol_and_the_vehicle_have(
+    type_: int, params: tuple[float, float, float, float], behavior: str
+) -> None:
+    behaviors = ("land", "return_to_launch", "hold")
+    vehicle = ShownVehicle(ResourceId("uav1"), "air", UAV1, behaviors, type=type_)
+    command = Command(dialect.MAV_CMD_DO_SET_MODE, params, None, 0.0, "amsl", 0)
+    if behavior:
+        order = order_of(command, vehicle, None)
+        assert order is not None
+        assert order.behavior == behavior
+    else:
+        with pytest.raises(RefusedCommandError):
+            order_of(command, vehicle, None)
 
 
 def test_a_mavlink_plane_is_shown_as_a_plane(tmp_path: Path) -> None:

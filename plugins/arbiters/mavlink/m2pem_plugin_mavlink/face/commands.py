@@ -210,9 +210,9 @@ def _set_mode(command: Command, vehicle: ShownVehicle) -> Order:
     # ArduPilot's numbers and PX4's main modes without a sub mode are alike: 6 is RTL of a copter,
     # and Offboard. pymavlink sends ArduPilot's with base mode 1 and zeros, PX4's with more flags;
     # MAVSDK sends PX4's with NaN.
-    is_px4s = main >= 256 or sub or math.isnan(command.params[3]) or base & ~_OF_BOTH
-    if is_px4s or main < 0:
-        number = main if main >= 256 else px4_mode(main & 255, sub & 255)
+    is_of_px4 = any(math.isnan(each) for each in (*command.params[2:], command.z))
+    if is_of_px4 or main >= 256 or sub or base & ~_OF_BOTH:
+        number = main if main >= 256 else px4_mode(main, sub)
         name, mode = f"mode {number:#x}", modes.BY_NUMBER.get(number)
     else:
         name, mode = modes.by_ardupilot_number(main, vehicle.type)

@@ -11,14 +11,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
 from m2pem_plugin_mavlink.protocol.messages import Message, MessageType, message_type_of
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode
-from m2pem_plugin_mavlink.vehicle.identity import Firmware, Identity, Kind, kind_of
+from m2pem_plugin_mavlink.vehicle.identity import Firmware, Identity, Kind, identity, kind_of
 from m2pem_plugin_mavlink.vehicle.modes import (
     PX4_AUTO,
     PX4_MANUAL,
     PX4_OFFBOARD,
-    Modes,
     modes_of,
     px4_mode,
 )
@@ -74,20 +75,21 @@ def mode_of(behavior: str, operator: str) -> Mode:
 
 
 OTHER_WAYS = ("SMART_RTL", "AUTO_RTL", "QRTL", "AUTOLAND", "LOITER_ALT_QLAND")
-"""Modes of ArduPilot that return or land in another way than m2pem's behaviors."""
-
-
-def _ardupilot(type_: int) -> Modes:
-    return modes_of(Identity(Firmware.ARDUPILOT, kind_of(type_)))
+"""Modes of ArduPilot that return or land in another way than m2pem's behaviors; QLAND, too, of a
+plane, which lands by the sequence of its mission."""
 
 
 def by_ardupilot_number(number: int, type_: int) -> tuple[str, Mode | None]:
     """Return ArduPilot's name of a mode of a MAV_TYPE, and what commanding it means; None:
     nothing."""
-    modes = _ardupilot(type_)
+    known = identity(dialect.MAV_AUTOPILOT_ARDUPILOTMEGA, type_)
+    if known is None:
+        return f"mode {number}", None
+    modes = modes_of(known)
     name, purpose = modes.name(number), modes.purpose(number)
     means = next((each for each in MODES if each.purpose is purpose and each.behavior), None)
-    return name, None if name in OTHER_WAYS else means
+    is_other = name in OTHER_WAYS or (name == "QLAND" and known.kind is Kind.PLANE)
+    return name, None if is_other else means
 
 
 def px4_main_mode(main: int) -> str:
@@ -129,9 +131,10 @@ def current_mode(mode: Mode) -> Message:
 
 def renumbered(heartbeat: Message) -> Message:
     """Return a HEARTBEAT with ArduPilot's number of the mode; GUIDED's, if it has no such mode."""
-    mode, modes = BY_NUMBER.get(heartbeat.custom_mode), _ardupilot(heartbeat.type)
+    mode = BY_NUMBER.get(heartbeat.custom_mode)
     if mode is None:
         return heartbeat  # of a camera
+    modes = modes_of(Identity(Firmware.ARDUPILOT, kind_of(heartbeat.type)))
     number = modes.for_purpose(mode.purpose)
     number = modes.number("GUIDED") if number is None else number
     made: Message = heartbeat._replace(custom_mode=number)
