@@ -665,6 +665,6 @@ def _action_values(own: OwnBehavior, parameters: Mapping[str, ResolvedValue]) ->
         value = parameters.get(spec.name, spec.default)
         if spec.name in DRIVING_PARAMETERS or value is None:
             continue
-        is_count = spec.kind is ParameterKind.COUNT and isinstance(value, int | float)
-        values[spec.name] = int(value) if is_count and isinstance(value, int | float) else value
+        is_count = spec.kind is ParameterKind.COUNT
+        values[spec.name] = int(value) if is_count and isinstance(value, float) else value
     return values

@@ -172,7 +172,7 @@ class EventStream:
             elif end - begin > MAX_EVENT_BYTES:
                 self.too_long += 1
             else:
-                yield _without_prologue(waiting[begin:end])
+                yield waiting[begin:end].strip()  # of line ends between events
             begin = end
         self._skipped_bytes = max(0, begin - len(waiting))
         self._waiting = waiting[begin:]
@@ -181,8 +181,3 @@ class EventStream:
             self._skips = True
             # What may be the begin of its end stays.
             self._waiting = self._waiting[-len(END) :]
-
-
-def _without_prologue(event: bytes) -> bytes:
-    """An event of a stream may have an XML declaration, and line ends between it and the last."""
-    return event.strip()

@@ -7,7 +7,7 @@ bag says the types of its topics itself: their definitions, and their hashes (RE
 
 import heapq
 import re
-from collections.abc import Container, Iterable, Iterator, Sequence
+from collections.abc import Container, Sequence
 from itertools import chain, count
 from pathlib import Path
 
@@ -24,7 +24,6 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, W
 
 from m2pem.api import ExportedRun, ExportOptions, LocalFrame, StampedRecord
 from m2pem.errors import PluginError
-from m2pem_plugin_recorder.channels import ChannelMessage
 from m2pem_plugin_recorder.export.states import States
 from m2pem_plugin_recorder.record_messages import RecordEncoder
 from m2pem_plugin_recorder.recording import NS_PER_US
@@ -78,15 +77,25 @@ class Rosbag2Exporter:
         writer.set_custom_data("m2pem_run", name)
         with writer:
             # Both are in the order of their times, but for clocks that were set back.
-            both = (self._telemetry(run, LocalFrame(run.fleet.origin)), _records(run))
+            telemetry, records = TelemetryEncoder(LocalFrame(run.fleet.origin)), RecordEncoder(name)
+            both = (
+                (each for state in self._states.of(run) for each in telemetry.messages(state)),
+                (
+                    each
+                    for seq, _, t_s, record in run.records
+                    for each in records.messages(StampedRecord(name, seq, t_s, record))
+                ),
+            )
             for found in heapq.merge(*both, key=lambda message: message.time_us):
+                if found.channel.encoding == "protobuf":
+                    continue  # the same is there as a message of ROS or as JSON
                 is_cdr = found.channel.encoding == "cdr"
                 topic = found.channel.topic
                 type_ = found.channel.schema.name if is_cdr else _STRING
                 if topic not in connections:
-                    name = _ros_name(topic, {each.topic for each in connections.values()})
+                    taken = {each.topic for each in connections.values()}
                     connections[topic] = writer.add_connection(
-                        name, type_, typestore=STORE, offered_qos_profiles=[_QOS]
+                        _ros_name(topic, taken), type_, typestore=STORE, offered_qos_profiles=[_QOS]
                     )
                 data = found.data if is_cdr else _string(found.data)
                 writer.write(connections[topic], max(0, found.time_us) * NS_PER_US, data)
@@ -94,22 +103,6 @@ class Rosbag2Exporter:
     def close(self) -> Sequence[str]:
         """See `m2pem.api.Exporter.close`."""
         return self._states.remarks
-
-    def _telemetry(self, run: ExportedRun, frame: LocalFrame) -> Iterator[ChannelMessage]:
-        encoder = TelemetryEncoder(frame)
-        for state in self._states.of(run):
-            yield from _readable(encoder.messages(state))
-
-
-def _records(run: ExportedRun) -> Iterator[ChannelMessage]:
-    encoder = RecordEncoder(run.summary.run)
-    for seq, _, t_s, record in run.records:
-        yield from _readable(encoder.messages(StampedRecord(run.summary.run, seq, t_s, record)))
-
-
-def _readable(messages: Iterable[ChannelMessage]) -> Iterator[ChannelMessage]:
-    """Leave out protobuf: the same is there as messages of ROS or as JSON."""
-    return (each for each in messages if each.channel.encoding in ("cdr", "json"))
 
 
 def _ros_name(topic: str, taken: Container[str]) -> str:
