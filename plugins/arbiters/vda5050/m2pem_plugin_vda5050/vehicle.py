@@ -141,10 +141,8 @@ class Vehicle:
 
     def receive(self, topic: str, payload: bytes) -> VehicleState | None:
         """Process a message. Return the new state for the fleet; None: nothing new is known."""
-        if not payload:
-            return (
-                None  # a client has cleared what the broker retained: MQTT 3.1.1, section 3.3.1.3
-            )
+        if not payload:  # a client has cleared what the broker retained: MQTT 3.1.1, 3.3.1.3
+            return None
         try:
             match topic:
                 case "state":
@@ -158,8 +156,7 @@ class Vehicle:
                 case _:
                     self._note_other_version(other_version(payload))
         except MessageError as error:
-            if version := other_version(payload):
-                self._note_other_version(version)
+            self._note_other_version(other_version(payload))
             self._invalid = f"its last message on {topic} was invalid: {text_of(error)}"
             self._log(f"{topic}: {text_of(error)}")
         return None

@@ -94,9 +94,7 @@ def by_ardupilot_number(number: int, type_: int) -> tuple[str, Mode | None]:
 
 def px4_main_mode(main: int) -> str:
     """Return PX4's name of a main mode; "": it has none."""
-    names = modes_of(Identity(Firmware.PX4, Kind.COPTER)).names
-    found = (name for number, name in names.items() if number >> 16 & 255 == main)
-    return next(found, "").partition(".")[0]
+    return modes_of(Identity(Firmware.PX4, Kind.COPTER)).names.get(px4_mode(main), "")
 
 
 @cache

@@ -175,6 +175,7 @@ _PX4 = Modes(
         px4_mode(PX4_POSCTL): "POSCTL",
         px4_mode(PX4_POSCTL, 1): "POSCTL.ORBIT",
         px4_mode(PX4_POSCTL, 2): "POSCTL.SLOW",
+        px4_mode(PX4_AUTO): "AUTO",
         px4_mode(PX4_AUTO, 1): "AUTO.READY",
         px4_mode(PX4_AUTO, 2): "AUTO.TAKEOFF",
         px4_mode(PX4_AUTO, 3): "AUTO.LOITER",
