@@ -185,7 +185,10 @@ class Vehicle:
         late = f"not discovered within {FOUND_WITHIN_S:g} s: {missing}" if missing else ""
         if reason := late or self.refusal(awaited.request):
             self._order = None
-            self._tracker.end(name, BehaviorState.REJECTED, reason=reason)
+            if late and goal in self._unresolved:  # it may run, and is to be ended
+                self._tracker.lose(self.resource, reason)
+            else:
+                self._tracker.end(name, BehaviorState.REJECTED, reason=reason)
             return
         await self._give(awaited, query_first=query_first)
 

@@ -265,6 +265,25 @@ async def test_what_may_run_since_before_a_restart_is_cancelled_when_its_vehicle
             assert truth.begun() == 0
 
 
+async def test_what_may_run_since_before_a_restart_is_lost_and_ended_when_its_vehicle_comes_late(
+    ros_domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(vehicle, "FOUND_WITHIN_S", 0.5)
+    monkeypatch.setattr(vehicle, "ASKED_WITHIN_S", 0.0)
+    monkeypatch.setattr(vehicle, "RECLAIM_WITHIN_S", AMPLE_S)
+    reference = encode_checkpoint(Checkpoint((UGV1,), "goto", 1, {"target": ahead()}))
+    async with connected(ros_domain) as (bench, truth):
+        await bench.arbiter.query("r1.b1", reference)
+        await bench.start("r1.b1", "goto", UGV1, target=ahead())
+        end = await bench.ended("r1.b1", AMPLE_S)
+        assert end.state is BehaviorState.LOST
+        assert end.reason.startswith("not discovered within 0.5 s: ")
+        async with late(ros_domain, "node"):
+            assert await bench.arbiter.reclaim(UGV1) == ""  # type: ignore[attr-defined]
+            await until(lambda: any(truth.cancels()))
+            assert truth.begun() == 0
+
+
 @pytest.mark.parametrize(("kind", "settings"), [("base", {"driver": "base"}), ("node", {})])
 async def test_a_vehicle_that_is_held_before_it_comes_begins_when_it_is_resumed(
     ros_domain: int,
