@@ -15,7 +15,7 @@ it, the version of the standard does. A behavior with the parameter `target` or 
 first, in the same order.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any, Literal
@@ -176,6 +176,16 @@ def why_unsupported(own: OwnBehavior, version: str, factsheet: Factsheet | None)
     return ""
 
 
+def lacking(
+    own: OwnBehavior, given: Collection[str], version: str, factsheet: Factsheet | None
+) -> str:
+    """Return which parameters that an action requires are not among the given ones; "": none."""
+    required = required_parameters(own.action, factsheet)
+    missing = [key for key in required if key not in given]
+    source = f"VDA 5050 {version}" if factsheet is None else "the vehicle's factsheet"
+    return f"{source} requires {' and '.join(missing)} of {own.action}" if missing else ""
+
+
 def read_own_behaviors(
     resource: ResourceId, value: Any, version: str, factsheet: Factsheet | None
 ) -> tuple[OwnBehavior, ...]:
@@ -251,14 +261,11 @@ def _judged(
     """
     if reason := why_unsupported(own, version, factsheet):
         raise PluginError(f"{place}: {reason}")
+    declared = [each.name for each in own.spec.parameters]
+    if reason := lacking(own, declared, version, factsheet):
+        remedy = "declare them, or name the `factsheet` of a vehicle that does without"
+        raise PluginError(f"{place}.parameters: {reason}: {remedy}")
     required = required_parameters(own.action, factsheet)
-    missing = [key for key in required if key not in {each.name for each in own.spec.parameters}]
-    if missing:
-        source = f"VDA 5050 {version}" if factsheet is None else "the vehicle's factsheet"
-        raise PluginError(
-            f"{place}.parameters: {source} requires {' and '.join(missing)} of {own.action}: "
-            f"declare {missing[0]}, or name the `factsheet` of a vehicle that does without"
-        )
     parameters = tuple(
         replace(
             each,

@@ -33,7 +33,7 @@ from m2pem_plugin_vda5050.catalogue import (
     USUAL,
     OwnBehavior,
     Scope,
-    required_parameters,
+    lacking,
     why_unsupported,
 )
 from m2pem_plugin_vda5050.checkpoint import order_id
@@ -599,16 +599,9 @@ class Vehicle:
         it speaks; "" if it would not."""
         version = self.settings.version if self._state is None else self._state.version
         factsheet = self._factsheet or self.settings.factsheet
-        if reason := why_unsupported(own, version, factsheet):
-            return reason
-        sent = _action_values(own, request.parameters)
-        lacking = [
-            key for key in required_parameters(own.action, factsheet) if sent.get(key) in (None, "")
-        ]
-        if not lacking:
-            return ""
-        source = f"VDA 5050 {version}" if factsheet is None else "the vehicle's factsheet"
-        return f"{source} requires {' and '.join(lacking)} of {own.action}"
+        values = _action_values(own, request.parameters)
+        given = [key for key, value in values.items() if value != ""]
+        return why_unsupported(own, version, factsheet) or lacking(own, given, version, factsheet)
 
     def _breach(self, request: BehaviorRequest) -> str:
         """Return where the request would leave the fence of the fleet; "" if it does not."""
