@@ -54,6 +54,18 @@ UNITS: Mapping[Dimension, Mapping[str, float]] = {
 }
 """Factor to SI of every unit that is understood."""
 
+_LENGTHS = UNITS[Dimension.DISTANCE]
+LENGTHS_IN_FILES: Mapping[str, float] = {
+    **_LENGTHS,
+    **dict.fromkeys(("metre", "metres", "meter", "meters"), 1.0),
+    **dict.fromkeys(("centimetre", "centimeter"), 0.01),
+    **dict.fromkeys(("foot", "feet"), _LENGTHS["ft"]),
+    **dict.fromkeys(("ft_us", "us_ft", "ftus", "foot_us"), 1200 / 3937),
+    **dict.fromkeys(("us_survey_foot", "us_survey_feet"), 1200 / 3937),
+}
+"""Units of length by their names in tables and elevation files: in lower case, with _ for spaces
+and hyphens."""
+
 _UNIT_REQUIRED = frozenset({Dimension.ANGLE, Dimension.ANGULAR_SPEED})
 _DIMENSION_OF = {unit: dimension for dimension, units in UNITS.items() for unit in units}
 _QUANTITY = re.compile(r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s*(\S*)\s*")

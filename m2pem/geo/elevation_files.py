@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING
 
 from m2pem.errors import M2pemError
 from m2pem.geo.local_frame import SEMI_MAJOR_M
-from m2pem.geo.vertical_datums import METRES, DatumError, heights_of
+from m2pem.geo.vertical_datums import DatumError, heights_of
+from m2pem.units import LENGTHS_IN_FILES
 
 if TYPE_CHECKING:
     from pyproj import CRS, Transformer
@@ -24,6 +25,7 @@ _TILE = re.compile(r"([NS])(\d{2})([EW])(\d{3})", re.IGNORECASE)
 _SIDES = {2 * side * side: side for side in (1201, 3601)}
 """Samples of a side of a tile, by its bytes: 3 and 1 seconds of arc apart."""
 
+_SPACES = str.maketrans(" -", "__")
 _VOID = -32768
 _LOWEST_M, _HIGHEST_M = -12_000, 9_000
 """No ground is beyond: files whose voids are -32768 do not always say so."""
@@ -101,7 +103,7 @@ class Raster:
 
         try:
             self._data: DatasetReader = rasterio.open(path)
-            unit = (self._data.units[0] or "").lower().replace(" ", "_")
+            unit = (self._data.units[0] or "").lower().translate(_SPACES)
             self._scale, self._offset = self._data.scales[0], self._data.offsets[0]
         except (RasterioError, OSError) as error:
             raise TerrainError(f"{path}: cannot be read as GeoTIFF: {error}") from None
@@ -116,11 +118,11 @@ class Raster:
             self._system = _from_wgs84(level)
         except (ProjError, DatumError) as error:
             raise TerrainError(f"{path}: {error}") from None
-        if unit and unit not in METRES:
+        if unit and unit not in LENGTHS_IN_FILES:
             raise TerrainError(
                 f"{path}: its heights are in '{unit}'; known are metres, feet and US survey feet"
             )
-        self._unit_m = METRES[unit] if unit else unit_m
+        self._unit_m = LENGTHS_IN_FILES[unit] if unit else unit_m
         self._to_pixel = ~self._data.transform
         self._turns = (0.0, 360.0, -360.0) if level.is_geographic else (0.0,)
 

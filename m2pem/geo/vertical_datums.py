@@ -1,13 +1,15 @@
-"""What the heights of an elevation file count from, and what makes them altitudes above mean sea
-level (EGM96).
+"""What the heights of a coordinate reference system count from, and what makes them altitudes above
+mean sea level (EGM96).
 
-A file whose system has no heights counts from mean sea level, as most do. Heights above the
-ellipsoid are converted by the geoid; the ellipsoids of WGS 84, ITRF, ETRS89 and NAD83 are taken as
+Those of a system that says nothing of heights are taken as they are. Heights above the ellipsoid
+are converted by the geoid; the ellipsoids of WGS 84, ITRF, ETRS89 and NAD83 are taken as
 the same (at most 2 m apart). Heights of another vertical datum are converted by PROJ where it has
 the grid for it; without the grid, those of `NEAR` are taken as they are.
 """
 
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Collection
+from functools import cache
 from typing import TYPE_CHECKING
 
 from m2pem.geo.geoid import mean_sea_level_m
@@ -19,20 +21,11 @@ ToSeaLevel = Callable[[float, float, float], float]
 """Makes latitude, longitude and a height in metres an altitude above mean sea level; NaN or
 infinite: not known there."""
 
-_NAMES = {
-    1.0: "m metre metres meter meters",
-    0.01: "cm centimetre centimeter",
-    0.3048: "ft foot feet",
-    1200 / 3937: "ftus us-ft us_survey_foot us_survey_feet foot_us",
-}
-METRES = {name: metres for metres, names in _NAMES.items() for name in names.split()}
-"""The units of heights, by their names in elevation files: in lower case, with _ for spaces."""
-
-_SEA_LEVEL = frozenset([5773, 5714, 8050, 8052])
-"""EPSG's vertical systems "EGM96 height" and "MSL height", the latter also in feet."""
+_SEA_LEVEL = (5773, 5714)
+"""EPSG's vertical systems "EGM96 height" and "MSL height"."""
 
 # NAVD88, NGVD29, CGVD28, CGVD2013.
-_NORTH_AMERICA = (5703, 6360, 8228, 5702, 7968, 5713, 6647, 9245, 20035)
+_NORTH_AMERICA = (5703, 5702, 5713, 6647, 9245, 20035)
 # EVRF; Germany, Austria, Switzerland, France, the Netherlands.
 _EUROPE = (5730, 5621, 9389, 9390, 9651, 9274, 5783, 5784, 7837, 5778, 5728, 5729, 5720, 5709)
 # Great Britain, Ireland, Norway, Sweden, Finland, Denmark, Spain, Portugal, Italy; Baltic 1977.
@@ -41,8 +34,8 @@ _COASTS = (5701, 5732, 5731, 5776, 5941, 5613, 3900, 5717, 5733, 5782, 5780, 521
 _SOUTH_AND_EAST = (5711, 5712, 9458, 7839, 5723, 6694, 6695, 5737, 9279)
 _EGM2008 = 3855
 NEAR = frozenset({_EGM2008, *_NORTH_AMERICA, *_EUROPE, *_COASTS, *_SOUTH_AND_EAST})
-"""EPSG's vertical systems whose zero is within about 2 m of mean sea level by EGM96 (EGM2008 mostly
-within 1 m, in high mountains and Antarctica several)."""
+"""EPSG's vertical systems, one of each datum, whose zero is within about 2 m of mean sea level by
+EGM96 (EGM2008 mostly within 1 m, in high mountains and Antarctica several)."""
 
 
 class DatumError(ValueError):
@@ -50,46 +43,59 @@ class DatumError(ValueError):
 
 
 def heights_of(crs: "CRS") -> tuple[float, ToSeaLevel]:
-    """Return the unit of a system's heights, in metres (1 if it has none), and what makes them
-    altitudes above mean sea level.
+    """Return the unit of a system's heights, in metres (1 if it has none, negative: they count
+    downwards), and what makes heights in metres altitudes above mean sea level.
 
     Raises:
-        DatumError: they count from something that is not known, or downwards.
+        DatumError: they count from something that is not known.
     """
-    if crs.is_bound and crs.source_crs is not None:
-        crs = crs.source_crs
-    if crs.is_geocentric:
+    horizontal, *vertical = map(unbound, crs.sub_crs_list if crs.is_compound else [crs])
+    if horizontal.is_geocentric:
         raise DatumError(f"'{crs.name}' has no heights: use geographic or projected coordinates")
-    if not crs.is_compound:
-        if len(crs.axis_info) < 3:
+    if not vertical:
+        if len(horizontal.axis_info) < 3:
             return 1.0, _as_it_is
-        return crs.axis_info[2].unit_conversion_factor, mean_sea_level_m
-    vertical = crs.sub_crs_list[1]
-    axis, code = vertical.axis_info[0], vertical.to_epsg()
-    if axis.direction != "up":
-        raise DatumError(f"'{vertical.name}' counts depths; heights are needed")
-    convert = _as_it_is if code in _SEA_LEVEL else _by_grid(vertical)
-    if convert is None and code in NEAR:
+        return horizontal.axis_info[2].unit_conversion_factor, mean_sea_level_m
+    axis, datum = vertical[0].axis_info[0], _datum(vertical[0])
+    unit_m = axis.unit_conversion_factor * (-1 if axis.direction == "down" else 1)
+    convert = _as_it_is if datum in _datums(_SEA_LEVEL) else _by_grid(vertical[0], unit_m)
+    if convert is None and datum in _datums(NEAR):
         convert = _as_it_is
     if convert is None:
         raise DatumError(
-            f"its heights are of '{vertical.name}', of which the distance to mean sea level is not"
-            " known; convert it to EGM96 heights (EPSG:4326+5773)"
+            f"its heights are of '{vertical[0].name}', of which the distance to mean sea level is"
+            " not known; convert it to EGM96 heights (EPSG:4326+5773)"
         )
-    return axis.unit_conversion_factor, convert
+    return unit_m, convert
+
+
+def unbound(crs: "CRS") -> "CRS":
+    """Return a system without the transformation that its text names."""
+    return crs.source_crs if crs.is_bound and crs.source_crs is not None else crs
+
+
+def _datum(vertical: "CRS") -> str:
+    """Return the name of its datum without what differs between Esri's and EPSG's."""
+    return re.sub(r"[\W_]+", "", vertical.datum.name).lower() if vertical.datum else ""
+
+
+@cache
+def _datums(codes: Collection[int]) -> frozenset[str]:
+    from pyproj import CRS  # noqa: PLC0415
+
+    return frozenset(_datum(CRS.from_epsg(code)) for code in codes)
 
 
 def _as_it_is(_latitude_deg: float, _longitude_deg: float, height_m: float) -> float:
     return height_m
 
 
-def _by_grid(vertical: "CRS") -> ToSeaLevel | None:
+def _by_grid(vertical: "CRS", unit_m: float) -> ToSeaLevel | None:
     """Return the conversion by PROJ; None: it has no grid for it here."""
     from pyproj import CRS, Transformer  # noqa: PLC0415
     from pyproj.crs import CompoundCRS  # noqa: PLC0415
     from pyproj.exceptions import ProjError  # noqa: PLC0415
 
-    unit_m = vertical.axis_info[0].unit_conversion_factor
     system = CompoundCRS(vertical.name, [CRS("EPSG:4326"), vertical])
     try:
         # Without `allow_ballpark`, PROJ gives heights back as they were where a grid is missing.

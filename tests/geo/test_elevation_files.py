@@ -93,7 +93,7 @@ def test_heights_near_mean_sea_level_are_taken_in_the_unit_of_their_system(
         ("EPSG:4326+5798", r"dem\.tif: its heights are of 'EGM84 height', of which .* EGM96"),
         ("EPSG:4326+5710", "its heights are of 'Ostend height'"),  # low water, 2.3 m lower
         ("EPSG:4326+5829", "its heights are of 'Instantaneous Water Level height'"),
-        ("EPSG:4326+5715", "'MSL depth' counts depths"),
+        ("EPSG:4326+5861", "its heights are of 'LAT depth'"),
         ("EPSG:4978", "has no heights"),
         ("+proj=utm +zone=18 +ellps=bessel", "cannot be converted from WGS 84"),
     ],

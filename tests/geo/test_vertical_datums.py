@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from pyproj import CRS
 
-from m2pem.geo.vertical_datums import NEAR, DatumError, heights_of
+from m2pem.geo.vertical_datums import NEAR, heights_of
 
 
 @pytest.mark.parametrize("code", sorted(NEAR))
@@ -25,9 +25,17 @@ def test_the_unit_of_the_plane_is_not_that_of_heights() -> None:
     assert to_sea_level(40.7, -74.0, 60.0) == 60.0
 
 
-def test_depths_are_refused() -> None:
-    with pytest.raises(DatumError, match="'MSL depth' counts depths"):
-        heights_of(CRS("EPSG:4326+5715"))
+def test_depths_below_mean_sea_level_count_downwards() -> None:
+    unit_m, to_sea_level = heights_of(CRS("EPSG:4326+5715"))
+    assert to_sea_level(40.7, -74.0, 60.0 * unit_m) == -60.0
+
+
+def test_a_datum_is_known_by_its_name_whatever_the_unit_and_the_name_of_the_system() -> None:
+    datum = 'VDATUM["North_American_Vertical_Datum_1988"],PARAMETER["Vertical_Shift",0.0]'
+    unit = 'PARAMETER["Direction",1.0],UNIT["Foot_US",0.3048006096012192]'
+    horizontal = CRS.from_epsg(4326).to_wkt("WKT1_ESRI")
+    system = CRS.from_wkt(f'{horizontal},VERTCS["NAVD_1988_Foot_US",{datum},{unit}]')
+    assert heights_of(system)[0] == pytest.approx(1200 / 3937)
 
 
 CONVERTS = """

@@ -9,7 +9,6 @@ from itertools import islice, zip_longest
 from typing import TypeAlias
 
 from m2pem.geo.csv_waypoints import (
-    METRES,
     OTHER_NAMES,
     Column,
     csv_frame,
@@ -33,7 +32,7 @@ from m2pem.geo.geometry_files.contents import (
     NamedGeometry,
 )
 from m2pem.mission.geometry import Area, Coordinate, Point, Route
-from m2pem.units import UNITS, Dimension
+from m2pem.units import LENGTHS_IN_FILES, UNITS, Dimension
 
 _SPEED = "speed_m_s"
 _HEADER = ("name", "kind", "ring", "lat_deg", "lon_deg", "alt_m", "altitude_frame")
@@ -72,21 +71,15 @@ _MODES = {
 _LITCHI = {"0": "relative", "1": "terrain"}
 """The numbers in Litchi's column `altitudemode`, beside which speed 0 means the mission's."""
 
-_LENGTHS = {
-    **METRES,
-    **dict.fromkeys(("meter", "meters", "metre", "metres"), 1.0),
-    **dict.fromkeys(("foot", "feet"), METRES["ft"]),
-    **dict.fromkeys(("ft_us", "us_ft", "us_survey_foot", "us_survey_feet"), 1200 / 3937),
-}
 _SPEEDS = {
     **{unit.replace("/", "_"): scale for unit, scale in UNITS[Dimension.SPEED].items()},
     **dict.fromkeys(("mps", "meters_per_second", "metres_per_second"), 1.0),
     **dict.fromkeys(("kph", "kmh", "kmph"), 1 / 3.6),
     **dict.fromkeys(("kt", "kts", "knot", "knots"), UNITS[Dimension.SPEED]["kn"]),
-    "fps": METRES["ft"],
+    "fps": LENGTHS_IN_FILES["ft"],
 }
 _DEGREES = dict.fromkeys(("deg", "degree", "degrees", "°", "decimal_degrees", "dd", "wgs84"), 1.0)
-_UNITS = {"lat": _DEGREES, "lon": _DEGREES, "alt": _LENGTHS, _SPEED: _SPEEDS}
+_UNITS = {"lat": _DEGREES, "lon": _DEGREES, "alt": LENGTHS_IN_FILES, _SPEED: _SPEEDS}
 _BRACKETS = re.compile(r"([^\[(]+)[\[(]([^\])]*)[\])]")
 _FRAMES = f"in a column altitude_frame one of {', '.join(FILE_FRAMES)}; or leave it out"
 _OF_FLIGHT = {

@@ -7,14 +7,15 @@ the area for which the chosen transformation is meant.
 
 import re
 from collections.abc import Sequence
+from functools import cached_property
 from math import isfinite
 
 from pyproj import CRS, Transformer
 from pyproj.exceptions import CRSError, ProjError
 
-from m2pem.geo.geoid import mean_sea_level_m
-from m2pem.geo.geojson import crs_name
+from m2pem.geo.geojson import GeometryError, crs_name
 from m2pem.geo.geometry_files.contents import Contents, FeatureProblemError
+from m2pem.geo.vertical_datums import DatumError, ToSeaLevel, heights_of, unbound
 
 MAX_WKT_CHARACTERS = 20_000
 _EXPORT = "export it as WGS 84 (EPSG:4326), with heights in metres"
@@ -30,10 +31,6 @@ _ALIGNED_WITH_WGS84 = frozenset({"China 2000"})
 
 _WGS84 = re.compile(r"WGS[ _]?(19)?84")
 _ANGLE = re.compile(r"deg|grad|gon|rad", re.I)
-_OF_TIDES = re.compile(
-    r"\b(low|high|tid\w+|chart|MLLW|MLW|MHW|LAT|HAT)\b|low.?water|high.?water", re.I
-)
-"""Vertical datums that are metres away from mean sea level."""
 
 
 class ReferenceSystem:
@@ -47,19 +44,15 @@ class ReferenceSystem:
 
     def __init__(self, crs: CRS) -> None:
         self.name = " ".join(crs.name.split())[:80]
-        horizontal, *vertical = crs.sub_crs_list if crs.is_compound else [crs]
+        self._crs = crs
+        horizontal = crs.sub_crs_list[0] if crs.is_compound else crs
         if not (horizontal.is_geographic or horizontal.is_projected):
             raise self._refused(f"is neither geographic nor projected ({horizontal.type_name})")
-        for each in vertical:
-            datum = each.datum.name if each.datum else ""
-            if _OF_TIDES.search(f"{each.name} {datum}".replace("_", " ")):
-                raise self._refused(f"has heights above {each.name!r}, not above sea level")
-        own = horizontal.source_crs if horizontal.is_bound else horizontal
-        axes = (own or horizontal).axis_info
-        self._is_3d = len(axes) == 3
-        self.has_heights = self._is_3d or bool(vertical)
-        self._axis = vertical[0].axis_info[0] if vertical else axes[-1]
-        self._transformer = self._of(horizontal, own.datum.name if own and own.datum else "")
+        own = unbound(horizontal)
+        self._is_3d = len(own.axis_info) == 3
+        self.has_heights = self._is_3d or crs.is_compound
+        self._axis = own.axis_info[0]
+        self._transformer = self._of(horizontal, own.datum.name if own.datum else "")
         self._accuracies_m: dict[str, float] = {}
 
     def _of(self, crs: CRS, datum: str) -> Transformer:
@@ -88,11 +81,14 @@ class ReferenceSystem:
             positions, self._converted(positions), strict=True
         ):
             place = [longitude, latitude]
-            if len(given) > 2:
-                if self._is_3d and not frame:
-                    place.append(mean_sea_level_m(latitude, longitude, height))
-                else:
-                    place.append(self._metres(given[2]))
+            if len(given) > 2 and frame:
+                place.append(given[2] * self._unit_m(given[2]))
+            elif len(given) > 2:
+                height_m = height if self._is_3d else given[2] * self._unit_m(given[2])
+                place.append(self._heights[1](latitude, longitude, height_m))
+                if not isfinite(place[2]):
+                    what = f"the height {given[2]:g} at ({longitude:.10g}, {latitude:.10g})"
+                    raise self._refused(f"of {what} no transformation is known")
             result.append(place)
         return result
 
@@ -103,14 +99,19 @@ class ReferenceSystem:
             message = f"is converted from {self.name!r} by {description!r} with an accuracy"
             contents.warn(where, f"{message} {accuracy}")
 
-    def _metres(self, height: float) -> float:
-        factor: float = self._axis.unit_conversion_factor
-        if self.has_heights:
-            return -height * factor if self._axis.direction == "down" else height * factor
-        if height and factor != 1.0 and not _ANGLE.match(self._axis.unit_name):
+    @cached_property
+    def _heights(self) -> tuple[float, ToSeaLevel]:
+        try:
+            return heights_of(self._crs)
+        except DatumError as error:
+            raise GeometryError(str(error)) from None
+
+    def _unit_m(self, height: float) -> float:
+        is_metre = self._axis.unit_conversion_factor == 1.0 or _ANGLE.match(self._axis.unit_name)
+        if height and not (self.has_heights or is_metre):
             what = f"{self.name!r} is in {self._axis.unit_name!r} and does not say in which"
             raise FeatureProblemError(f"{what} unit the height {height:g} is", _EXPORT)
-        return height
+        return self._heights[0]
 
     def _converted(
         self, positions: Sequence[Sequence[float]]

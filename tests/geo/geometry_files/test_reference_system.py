@@ -93,7 +93,6 @@ def test_a_datum_with_parameters_in_the_file_is_moved_by_them() -> None:
         ('LOCAL_CS["works",UNIT["Meter",1]]', "'works', which cannot be converted: is neither geo"),
         ("PROJCS[", "cannot be read"),
         ("hello", "cannot be read"),
-        (CRS("EPSG:4326+5861").to_wkt("WKT1_ESRI"), "heights above 'LAT depth', not above sea"),
         (geographic("D_X", f'{WGS84},EXTENSION["PROJ4_GRIDS","/etc/passwd"]'), "refers to a grid"),
     ],
 )
@@ -148,6 +147,13 @@ def test_heights_are_metres_above_mean_sea_level(code: str, height_m: float) -> 
     system = system_of_wkt(CRS(code).to_wkt("WKT1_ESRI"))
     ((_, _, height),) = system.to_wgs84([(-77.3192, 38.1075, 100.0)])
     assert height == pytest.approx(height_m, abs=0.05)
+
+
+def test_heights_of_another_zero_are_refused_and_places_without_them_are_read() -> None:
+    tidal = system_of_wkt(CRS("EPSG:4326+5861").to_wkt("WKT1_ESRI"))
+    assert tidal.to_wgs84([(7, 53)]) == [[7, 53]]
+    with pytest.raises(GeometryError, match="heights are of 'LAT depth', of which the distance"):
+        tidal.to_wgs84([(7, 53, 30.0)])
 
 
 def test_a_height_with_a_frame_beside_the_system_keeps_it_and_only_its_unit_changes() -> None:
