@@ -119,7 +119,9 @@ class Contents:
         self.note(FileProblem(Severity.WARNING, feature, message, remedy, kind))
 
     def note(self, problem: FileProblem) -> None:
-        """Add a problem, if the file has not too many."""
+        """Add a problem, once, if the file has not too many."""
+        if problem in self._problems:
+            return
         self._has_error = self._has_error or problem.severity is Severity.ERROR
         if len(self._problems) < MAX_PROBLEMS:
             self._problems.append(problem)

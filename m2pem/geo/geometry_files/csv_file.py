@@ -53,6 +53,7 @@ _ABOVE = {
     "relative": ("relative", "rel", "abovetakeoff", "abovehome"),
     "terrain": ("agl", "aboveground", "abovegroundlevel", "aboveterrain"),
     "amsl": ("amsl", "msl", "asl", "abovesealevel", "abovemeansealevel"),
+    "ellipsoid": ("ellipsoid", "ellipsoidal", "hae", "aboveellipsoid"),
 }
 _HEIGHTS = {
     name: frame
@@ -78,25 +79,38 @@ _SPEEDS = {
     **dict.fromkeys(("kt", "kts", "knot", "knots"), UNITS[Dimension.SPEED]["kn"]),
     "fps": LENGTHS_IN_FILES["ft"],
 }
-_DEGREES = dict.fromkeys(("deg", "degree", "degrees", "°", "decimal_degrees", "dd", "wgs84"), 1.0)
+_DEGREES = dict.fromkeys(
+    (
+        *("deg", "degree", "degrees", "°", "decimal_degrees", "decimal", "dd", "wgs84"),
+        *("n", "e", "degrees_north", "degrees_east"),
+    ),
+    1.0,
+)
 _UNITS = {"lat": _DEGREES, "lon": _DEGREES, "alt": LENGTHS_IN_FILES, _SPEED: _SPEEDS}
-_BRACKETS = re.compile(r"([^\[(]+)[\[(]([^\])]*)[\])]")
 _FRAMES = f"in a column altitude_frame one of {', '.join(FILE_FRAMES)}; or leave it out"
 _OF_FLIGHT = {
-    re.compile(r"(?!wind)(.*_)?(speed|velocity|ground_?speed|air_?speed)"): (
+    re.compile(r"(?!.*wind_?s).*(speed|velocity|geschwindigkeit)|(.*_)?vel(_|$)"): (
         "write speed_m_s or speed_km_h; or leave it out"
     ),
-    re.compile(r"(.*_)?(mode|datum)$"): f"write {_FRAMES}",
-    re.compile(r"(.*_)?(alt|height|elev|hgt|agl|a?msl|asl|hae)"): (
-        f"write alt_m or alt_ft, and {_FRAMES}"
-    ),
+    re.compile(r"(.*_)?(mode|datum|frame)$"): f"write {_FRAMES}",
+    re.compile(
+        r"(.*_)?(crs|srs|srid|epsg)$"
+    ): "positions are WGS 84; convert them, or leave it out",
+    re.compile(
+        r"(.*_)?(alt(?!ern)|height|elev|hgt|agl|a?msl|asl|hae|ell(h|ips)|depth)|.*h(ö|oe)he"
+    ): f"write alt_m or alt_ft, and {_FRAMES}",
 }
 """Columns that say how to fly: the import stops if it cannot be read, and says what would be."""
 
 _COMMANDS = re.compile(
     r"(poi|gimbal|action|photo|camera|curve|rotation|heading|yaw|turn|hover|stay|wait|delay|loiter"
-    r"|hold|command|cmd|trigger)"
+    r"|hold|(mav_)?command|(mav_)?cmd|trigger|task)"
 )
+_COMMAND = re.compile(r"(mav_)?(command|cmd)")
+_NO_WAYPOINT = re.compile(
+    r"(?:mav_cmd_)?(?:nav_)?(?:vtol_)?(land|take_?off|rtl|return|spline)", re.I
+)
+_WAYPOINTS = frozenset({"", "16", "16.0", "wp", "waypoint", "nav_waypoint", "mav_cmd_nav_waypoint"})
 _KINDS = ("route", "area", "point")
 
 _Cells: TypeAlias = dict[str, tuple[str, Column]]
@@ -119,6 +133,11 @@ def read_csv(content: bytes, contents: Contents) -> None:
     rows = csv_rows(text, delimiter)
     line, header = next(rows, (1, [""]))
     columns = _columns(header, f"line {line}", contents)
+    commands = {
+        index: _COMMAND.match(words) is not None
+        for index, text in enumerate(header)
+        if index not in columns and _COMMANDS.match(words := _column(text)[1])
+    }
     index_of_name = next((at for at, each in columns.items() if each.name == "name"), None)
     groups: dict[str, list[tuple[int, list[str]]]] = {}
     for number, row in rows:
@@ -126,6 +145,13 @@ def read_csv(content: bytes, contents: Contents) -> None:
             raise GeometryError(
                 f"line {number}: has {len(row)} columns where the header has {len(header)}"
             )
+        for index, is_command in commands.items():
+            text = row[index]
+            if _NO_WAYPOINT.match(text) or (is_command and text.lower() not in _WAYPOINTS):
+                raise FeatureProblemError(
+                    f"line {number}: {header[index]} {text[:40]!r} is no waypoint",
+                    "leave its row out, and draw it as a task of the mission",
+                )
         name = "" if index_of_name is None else row[index_of_name]
         groups.setdefault(name, []).append((number, row))
     is_litchi = any(each.lower().startswith("curvesize") for each in header)
@@ -145,7 +171,7 @@ def _cells(row: Sequence[str], columns: Mapping[int, "_Named"], is_litchi: bool)
         cells["altitude_frame"] = (height[1].frame, height[1])
     elif "altitude_frame" in cells:
         text, column = cells["altitude_frame"]
-        word = text.lower().replace("_", "")
+        word = "".join(_words(text))
         cells["altitude_frame"] = (
             (_LITCHI.get(word) if is_litchi else None) or _MODES.get(word, text),
             column,
@@ -247,12 +273,10 @@ class _Named(Column):
 
 def _column(text: str) -> tuple[_Named | None, str]:
     """Return what a column holds, if it can be read, and the words of its name joined by `_`."""
-    brackets = _BRACKETS.fullmatch(text[:200].lower())
-    words = _words(brackets[1] if brackets else text[:200].lower())
-    units = [(len(words), "_".join(_words(brackets[2])))] if brackets else []
-    units += [] if brackets else [(-size, "_".join(words[-size:])) for size in (3, 2, 1)]
-    for end, unit in [*units, (len(words), "")]:
-        key = "".join(words[:end])
+    words = _words(text[:200])
+    spans = [(at, at + size) for size in (3, 2, 1) for at in range(1, len(words) - size + 1)]
+    for start, end in (*spans, (len(words), len(words))):
+        key, unit = "".join(words[:start] + words[end:]), "_".join(words[start:end])
         name = "alt" if key in _HEIGHTS else _NAMES.get(key, "")
         scales = _UNITS.get(name, {})
         if name and (unit in scales or (not unit and name != _SPEED)):
@@ -262,7 +286,8 @@ def _column(text: str) -> tuple[_Named | None, str]:
 
 
 def _words(text: str) -> list[str]:
-    return [each for each in re.split(r"[\s_/.-]+", text) if each]
+    spaced = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", text).lower()
+    return [each for each in re.split(r"[\s_/.,()\[\]-]+", spaced) if each]
 
 
 def _geometry(rows: Iterable[tuple[int, _Cells]]) -> Point | Route | Area:

@@ -23,6 +23,10 @@ _BEFORE_ROOT = re.compile(
 )
 _USED_PREFIX = re.compile(rb"[<\s]([A-Za-z_][\w.-]*+):[A-Za-z_]")
 _MOST_PREFIXES = 50
+_ROOTS = (
+    *("kml", "Document", "Folder", "Placemark", "NetworkLink", "NetworkLinkControl", "Tour"),
+    *("GroundOverlay", "PhotoOverlay", "ScreenOverlay"),
+)
 
 
 def kml_root(content: bytes) -> Element:
@@ -45,7 +49,7 @@ def kml_root(content: bytes) -> Element:
             raise GeometryError(f"is not XML: {str(error)[:200]}") from None
     if root.getroottree().docinfo.internalDTD is not None:
         raise FeatureProblemError("has a document type", "save it as KML without one")
-    if local_name(root) not in ("kml", "Document", "Folder", "Placemark"):
+    if local_name(root) not in _ROOTS:
         found = local_name(root)
         raise GeometryError(f"is not KML: its root is {found!r}, where 'kml' is expected")
     return root

@@ -104,6 +104,8 @@ class MissionReader:
     _frames: list[str] = field(default_factory=list)
     _speeds_m_s: dict[int, float] = field(default_factory=dict)
     """By the place from which on the vehicle is as fast; one that is set earlier: by the first."""
+    _is_up: bool = False
+    """Whether an item before has an altitude."""
     _endings: list[_Ending] = field(default_factory=list)
     _landing: list[int] = field(default_factory=list)
     """The items of a landing that the mission does not come to."""
@@ -111,6 +113,7 @@ class MissionReader:
     """Of a fence polygon of which more corners follow."""
     _polygon: int = 0
     """The command of its corners."""
+    _first_corner: str = ""
     _notes: dict[tuple[Severity, str, str], list[str]] = field(default_factory=dict)
 
     def add(self, item: MissionItem) -> None:
@@ -139,6 +142,7 @@ class MissionReader:
             case Treatment.LEFT_OUT:
                 self._warn(label, f"{command.title} is left out", command.remedy)
             case Treatment.BEGIN if not self._places:
+                self._is_up = bool(item.params[6])
                 self._warn(label, f"{command.title} is left out", command.remedy)
             case _:
                 message = f"{command.title} cannot be flown as part of a route"
@@ -178,16 +182,18 @@ class MissionReader:
         place, frame = None, _frame(item)
         if latitude or longitude:
             place = coordinate(latitude, longitude, altitude, item.where)
-            if altitude == 0 and frame != "amsl" and self._places and self._places[-1][2]:
+            if altitude == 0 and frame != "amsl" and self._is_up:
                 what = "is at 0 m, which to a copter of ArduPilot is the altitude that it has"
                 self._warn(str(item.number), what, "give it the altitude that is meant")
         elif self._places:  # "here": the place before, at an altitude of its own if it has one
             before, its_frame = self._places[-1], self._frames[-1]
             place, frame = ((*before[:2], altitude), frame) if altitude else (before, its_frame)
             place = None if (place, frame) == (before, its_frame) else place
-        else:
+        if place is None and (command.treatment is Treatment.WAYPOINT or not self._places):
             what = "is where the vehicle is then, which is no waypoint, and is left out"
-            self._warn(str(item.number), what, "a task `change_altitude` before the route")
+            remedy = "" if self._places else "a task `change_altitude` before the route"
+            self._warn(str(item.number), what, remedy)
+        self._is_up = self._is_up or bool(altitude)
         if place is not None:
             self._places.append(place)
             self._frames.append(frame)
@@ -234,6 +240,8 @@ class MissionReader:
         if item.command != self._polygon:
             self._end_polygon()
             self._polygon = item.command
+        if not self._corners:
+            self._first_corner = item.where
         if item.command in POLYGONS:
             self._corners.append(place[:2])
             if len(self._corners) == item.params[0]:
@@ -247,8 +255,10 @@ class MissionReader:
 
     def _end_polygon(self) -> None:
         if self._corners:
-            message = f"has {len(self._corners)} corners, and parameter 1 says another number"
-            self.contents.note(FileProblem(Severity.ERROR, "a fence", message, kind="area"))
+            message = f"a fence of {len(self._corners)} corners, where parameter 1 says another"
+            self.contents.note(
+                FileProblem(Severity.ERROR, self._first_corner, message, kind="area")
+            )
             self._corners.clear()
 
     def _warn(self, label: str, message: str, remedy: str) -> None:

@@ -84,6 +84,12 @@ def read_plan(content: bytes, contents: Contents) -> None:
     if plan.get("fileType") != "Plan":
         raise GeometryError("is not a QGroundControl plan: 'fileType' is not 'Plan'")
     mission = _mapping(plan.get("mission"))
+    versions = plan.get("version", 1), mission.get("version", 2)
+    if versions != (1, 2):
+        raise FeatureProblemError(
+            f"has the versions {versions} of the plan and its mission; (1, 2) are known",
+            "open it in QGroundControl and save it again",
+        )
     items = mission.get("items")
     reader = MissionReader(contents, zero_is_north=mission.get("firmwareType") == _PX4)
     with contents.feature("mission", "route"):
@@ -124,7 +130,7 @@ def _simple_item_of(item: Mapping[str, Any], number: int, where: str) -> Mission
 def _read_complex(
     item: Mapping[str, Any], number: int, contents: Contents, reader: MissionReader
 ) -> None:
-    kind = str(item.get("complexItemType") or item.get("type"))[:40]
+    kind = str(item.get("complexItemType") or item.get("type") or "no 'type'")[:40]
     where = f"item {number} ({kind})"
     reader.add_pattern(number, f"a {kind}", "do that by a task")
     with contents.feature(where):

@@ -135,6 +135,8 @@ def _warn_of_commands(folder: Element, where: str, contents: Contents) -> None:
         turn = _first(placemark, "waypointTurnMode", turns)
         heading = _first(placemark, _HEADING, headings)
         commands = {f"action {each.text}" for each in placemark.iter("{*}actionActuatorFunc")}
+        pitch = _first(placemark, "waypointGimbalPitchAngle", "0")
+        commands |= set() if pitch in ("", "0") else {f"gimbal pitch {pitch}"}
         commands |= set() if turn in _STRAIGHT else {f"turn mode {turn}"}
         commands |= set() if heading in _AS_ROUTES else {f"heading mode {heading}"}
         for command in commands:

@@ -34,6 +34,13 @@ def read(*lines: str) -> GeometryFile:
         ("height above ground [m]", 1.0, "terrain"),
         ("altitude_above_seaLevel(feet)", FT, "amsl"),
         ("alt_amsl_m", 1.0, "amsl"),
+        ("Altitude (AMSL)", 1.0, "amsl"),
+        ("Height (m a.s.l.)", 1.0, "amsl"),
+        ("altitude [m AMSL]", 1.0, "amsl"),
+        ("alt (ft AGL)", FT, "terrain"),
+        ("Alt(m) AGL", 1.0, "terrain"),
+        ("altitude_ft_agl", FT, "terrain"),
+        ("ALT_FT_MSL", FT, "amsl"),
     ],
 )
 def test_units_and_frames_of_heights_in_headers(header: str, metres: float, frame: str) -> None:
@@ -70,8 +77,14 @@ def test_units_of_speeds_in_headers(header: str, scale: float) -> None:
     ("header", "right"),
     [
         ("alt_furlong", "write alt_m or alt_ft, and in a column altitude_frame one of"),
-        ("Height above ellipsoid (m)", "write alt_m or alt_ft"),
-        ("hae_m", "write alt_m or alt_ft"),
+        ("altitude (fathoms)", "write alt_m or alt_ft"),
+        ("WaypointAltitude", "write alt_m or alt_ft"),
+        ("depth_m", "write alt_m or alt_ft"),
+        ("Flughöhe (m)", "write alt_m or alt_ft"),
+        ("Geschwindigkeit", "write speed_m_s"),
+        ("vel", "write speed_m_s"),
+        ("MAV_FRAME", "write in a column altitude_frame"),
+        ("epsg", "positions are WGS 84; convert them"),
         ("height_above_ground_at_drone_location(feet)", "write alt_m or alt_ft"),
         ("altitude_reference", "write alt_m or alt_ft, and in a column altitude_frame"),
         ("speed", "write speed_m_s or speed_km_h"),
@@ -88,6 +101,47 @@ def test_a_height_speed_or_mode_that_cannot_be_read_stops_the_import(
     (problem,) = map(str, file.problems)
     assert problem.startswith(f"line 1: column {header!r} cannot be read; ")
     assert right in problem
+
+
+@pytest.mark.parametrize("header", ["Height above ellipsoid (m)", "hae_m", "ellipsoid height [m]"])
+def test_heights_above_the_ellipsoid_become_altitudes_above_mean_sea_level(header: str) -> None:
+    (point,) = read(f"lat,lon,{header}", "38.1075,-77.3192,100").geometries
+    assert isinstance(point.geometry, Point)
+    assert point.geometry.altitude_frame == "amsl"
+    assert point.geometry.position[2] == pytest.approx(133.97, abs=0.05)
+
+
+@pytest.mark.parametrize(
+    "header", ["Latitude (dms),Longitude (dms)", "lat_rad,lon_rad", "Latitude (N),Longitude (W)"]
+)
+def test_positions_of_another_unit_or_sign_are_refused(header: str) -> None:
+    file = read(header, "53,7")
+    assert file.geometries == ()
+    assert "there is no column" in str(file.problems[0])
+
+
+@pytest.mark.parametrize(
+    ("header", "text"),
+    [
+        ("command", "LAND"),
+        ("MAV_CMD", "21"),
+        ("cmd", "NAV_LOITER_TIME"),
+        ("action", "Takeoff"),
+        ("Task", "rtl"),
+    ],
+)
+def test_a_row_that_is_no_waypoint_stops_the_import(header: str, text: str) -> None:
+    file = read(f"lat,lon,alt_m,{header}", "53,7,10,", f"54,8,0,{text}")
+    assert file.geometries == ()
+    assert str(file.problems[-1]) == (
+        f"line 3: {header} {text!r} is no waypoint; leave its row out, and draw it as a task of "
+        "the mission"
+    )
+
+
+def test_commands_that_are_waypoints_are_a_route() -> None:
+    file = read("lat,lon,alt_m,command", "53,7,10,16", "54,8,10,MAV_CMD_NAV_WAYPOINT", "54,9,10,")
+    assert len(file.geometries) == 1
 
 
 @pytest.mark.parametrize(

@@ -178,6 +178,20 @@ def test_no_place_at_the_beginning_is_where_the_vehicle_is() -> None:
     )
 
 
+def test_no_place_behind_the_last_waypoint_is_left_out_with_its_number() -> None:
+    file = read(A, B, "3 16 0 0 0 0 0 0 0")
+    assert route(file) == Route(PLACES)
+    (warning,) = said(file, Severity.WARNING)
+    assert warning.startswith("item 3: is where the vehicle is then")
+
+
+def test_an_altitude_of_0_behind_a_take_off_is_doubtful() -> None:
+    file = read("3 22 0 0 0 0 0 0 20", A.replace("30", "0"), B.replace("40", "0"))
+    assert said(file, Severity.WARNING)[1].startswith("items 2, 3: is at 0 m, which to a copter")
+    rover = read(A.replace("30", "0"), B.replace("40", "0"))
+    assert said(rover, Severity.WARNING) == []
+
+
 def test_an_altitude_of_0_below_others_is_doubtful() -> None:
     # ArduCopter 4.7 (mode_auto.cpp, loc_from_cmd) keeps its altitude there; PX4 descends.
     file = read(A, B.replace("40", "0"), "3 16 0 0 0 0 38.1 -77.3 30")
@@ -278,7 +292,7 @@ def test_a_circle_is_an_area_that_errs_to_the_safe_side(
 def test_a_polygon_with_another_number_of_corners_is_refused() -> None:
     square = polygon(5001, "38.10 -77.32", "38.12 -77.32", "38.12 -77.30", "38.10 -77.30")
     (error,) = said(read(*square[:3]), Severity.ERROR)
-    assert error == "a fence: has 3 corners, and parameter 1 says another number"
+    assert error == "item 1 (line 3): a fence of 3 corners, where parameter 1 says another"
 
 
 def test_corners_of_two_polygons_are_not_mixed() -> None:
@@ -286,7 +300,7 @@ def test_corners_of_two_polygons_are_not_mixed() -> None:
     outer = polygon(5002, "38.110 -77.311", "38.112 -77.311", "38.111 -77.310")
     file = read(*inner[:2], *outer)
     assert said(file, Severity.ERROR) == [
-        "a fence: has 2 corners, and parameter 1 says another number"
+        "item 1 (line 3): a fence of 2 corners, where parameter 1 says another"
     ]
     assert [each.name for each in file.geometries] == ["keep_out"]
 

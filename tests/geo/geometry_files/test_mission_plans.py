@@ -267,3 +267,18 @@ def test_a_waypoint_file_that_cannot_be_read_names_the_line(text: str, message: 
     file = waypoints(text)
     assert file.geometries == ()
     assert message in str(file.problems[0])
+
+
+@pytest.mark.parametrize(("of_plan", "of_mission"), [(1, 7), (42, 2), ("1", 2)])
+def test_a_version_that_is_not_known_is_refused(of_plan: object, of_mission: int) -> None:
+    """As QGroundControl does: MAVSDK's tests have such plans."""
+    value = plan(item(16, 38.5, -77.5, 20.0), version=of_plan)
+    value["mission"]["version"] = of_mission
+    ((_, error),) = said(read(value))
+    assert f"has the versions {(of_plan, of_mission)} of the plan and its mission" in error
+
+
+def test_an_item_without_a_type_is_named_by_what_is_missing() -> None:
+    untyped = item(16, 38.5, -77.5, 20.0)
+    del untyped["type"]
+    assert said(read(plan(untyped)))[0][1].startswith("item 1 (no 'type'): is not read")

@@ -260,9 +260,20 @@ def test_space_around_commas_is_read_and_a_megabyte_of_it_is_no_burden() -> None
 
 
 def test_of_many_problems_the_first_are_told() -> None:
-    file = read("a.kml", kml("<Placemark/>" * 5_000))
+    file = read("a.kml", kml("<Placemark/>\n" * 5_000))
     assert len(file.problems) == MAX_PROBLEMS + 1
     assert str(file.problems[-1]) == "has 4,900 problems more; mend these first"
+
+
+@pytest.mark.parametrize("root", ["GroundOverlay", "NetworkLink", "gx:Tour"])
+def test_a_document_may_be_one_feature_of_any_kind(root: str) -> None:
+    problem = read("a.kml", f"<{root}/>").problems[0]
+    assert problem.feature == root.removeprefix("gx:")
+
+
+def test_a_problem_that_repeats_is_told_once() -> None:
+    (problem, _) = read("a.kml", kml("<Update/>\n" * 200)).problems
+    assert str(problem).startswith("Update: its changes of other features are not made")
 
 
 # --- CSV ----------------------------------------------------------------------------------------

@@ -136,6 +136,15 @@ def test_several_waylines_are_several_routes() -> None:
     assert [each.name for each in file.geometries] == ["wayline_0", "wayline_1"]
 
 
+def test_a_gimbal_that_is_turned_on_the_way_is_left_out_with_a_warning() -> None:
+    gimbal = "<wpml:waypointGimbalPitchAngle>{}</wpml:waypointGimbalPitchAngle>"
+    down, level = (height(30) + gimbal.format(each) for each in ("-90", "0"))
+    file = read(wpml(wayline(waypoint(0, "7,53", level) + waypoint(1, "8,54", down))))
+    assert str(file.problems[0]).startswith(
+        "wayline 0: gimbal pitch -90 is not read: of waypoint 1"
+    )
+
+
 def test_what_else_is_commanded_is_left_out_with_the_numbers_of_its_waypoints() -> None:
     action = "<wpml:actionGroup><wpml:action><wpml:actionActuatorFunc>{}"
     action += "</wpml:actionActuatorFunc></wpml:action></wpml:actionGroup>"
