@@ -19,6 +19,8 @@ from m2pem.geo.csv_waypoints import (
 from m2pem.geo.file_text import decoded
 from m2pem.geo.geojson import (
     FILE_FRAMES,
+    FRAMES,
+    SPEEDS,
     GeometryError,
     checked,
     kind_of,
@@ -261,6 +263,20 @@ def _columns(header: Sequence[str], where: str, contents: Contents) -> dict[int,
         what = f"columns that command more than a place are not read: {names[:400]}"
         contents.warn(where, what, "draw it in the mission")
     return dict(columns.values())
+
+
+def warn_of_fields(names: Iterable[str], where: str, contents: Contents) -> None:
+    """Warn of fields beside geometries that say how to fly, and are not read."""
+    known = (SPEEDS, FRAMES, "altitude_frame", "alt_frame", "altitude_f")
+    found = [
+        name
+        for name in dict.fromkeys(names)
+        if name.lower() not in known
+        and any(sign.match("_".join(_words(name[:200]))) for sign in (_COMMANDS, *_OF_FLIGHT))
+    ]
+    if found:
+        what = f"fields that say how to fly are not read: {', '.join(found)[:200]}"
+        contents.warn(where, what, "give the geometry its heights, or draw it in the mission")
 
 
 @dataclass(frozen=True, slots=True)

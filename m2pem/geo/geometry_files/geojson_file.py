@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from m2pem.geo.file_text import decoded, parsed_json
 from m2pem.geo.geojson import FRAMES, GeometryError, as_geojson, check_crs, is_wgs84, parse_geojson
 from m2pem.geo.geometry_files.contents import MAX_POSITIONS, Contents, NamedGeometry
+from m2pem.geo.geometry_files.csv_file import warn_of_fields
 
 if TYPE_CHECKING:
     from m2pem.geo.geometry_files.reference_system import ReferenceSystem
@@ -55,6 +56,9 @@ def _read_features(
     features = value.get("features")
     if not isinstance(features, list):
         raise GeometryError("features: a list of features is expected")
+    given = [each.get("properties") for each in features if isinstance(each, Mapping)]
+    names = (str(key) for each in given if isinstance(each, Mapping) for key in each)
+    warn_of_fields(names, "", contents)
     for index, feature in enumerate(features):
         where = f"features[{index}]"
         name = _name(feature)

@@ -30,6 +30,7 @@ from m2pem.geo.geometry_files.contents import (
     FeatureProblemError,
     NamedGeometry,
 )
+from m2pem.geo.geometry_files.csv_file import warn_of_fields
 from m2pem.geo.geometry_files.kml_elements import (
     POSITION,
     Element,
@@ -100,6 +101,8 @@ def _read(content: bytes, contents: Contents, members: Sequence[str], base: str)
     if has_waylines(root):
         read_waylines(root, contents)
         return []
+    fields = (str(each.get("name", "")) for each in root.iter("{*}Data", "{*}SimpleData"))
+    warn_of_fields(fields, base, contents)
     for element in root.iter(*(f"{{*}}{name}" for name in ("Placemark", *_NOT_READ))):
         local = local_name(element)
         if any(True for _ in element.iterancestors("{*}Update")):

@@ -11,6 +11,7 @@ import shapefile
 from m2pem.geo.geojson import GeometryError
 from m2pem.geo.geometry_files.archive import Archive, archive_of, member
 from m2pem.geo.geometry_files.contents import MAX_FEATURES, Contents, FeatureProblemError
+from m2pem.geo.geometry_files.csv_file import warn_of_fields
 from m2pem.geo.geometry_files.geojson_file import read_feature
 from m2pem.geo.geometry_files.reference_system import ReferenceSystem, system_named, system_of_wkt
 
@@ -25,8 +26,9 @@ _POLYGONS = frozenset({shapefile.POLYGON, shapefile.POLYGONM, shapefile.POLYGONZ
 _WITH_Z = frozenset(
     {shapefile.POINTZ, shapefile.POLYLINEZ, shapefile.POLYGONZ, shapefile.MULTIPOINTZ}
 )
-_NO_DATA = -1e38
-"""A Z value below it is none, as a measure is (Esri's white paper of 1998, page 2)."""
+_NO_DATA = -9999.0
+"""A Z value of it or below is none: Esri's is below -1e38 (white paper of 1998, page 2), other
+programs write -9999, -32768 or -99999."""
 
 
 def read_shapefiles(content: bytes, contents: Contents) -> None:
@@ -61,7 +63,9 @@ def _read_layer(archive: Archive, name: str, contents: Contents) -> None:
     encoding = (parts[".cpg"] or b"").decode("ascii", "replace").strip() or "utf-8"
     try:
         with shapefile.Reader(**streams, encoding=encoding, encodingErrors="replace") as layer:
-            _read_shapes(layer, name, system, contents)
+            if parts[".dbf"] is not None:
+                warn_of_fields((field[0] for field in layer.fields), name, contents)
+            _read_shapes(layer, name, system, contents, parts[".dbf"] is not None)
     except GeometryError:
         raise
     except Exception as error:  # of damaged files, pyshp raises what struct, codecs and it raise
@@ -70,14 +74,18 @@ def _read_layer(archive: Archive, name: str, contents: Contents) -> None:
 
 
 def _read_shapes(
-    layer: "shapefile.Reader", name: str, system: ReferenceSystem, contents: Contents
+    layer: "shapefile.Reader",
+    name: str,
+    system: ReferenceSystem,
+    contents: Contents,
+    has_records: bool,
 ) -> None:
     warned = False
     for index in range(len(layer)):
         if index > MAX_FEATURES:
             raise FeatureProblemError(f"has more than {MAX_FEATURES} shapes", "split the layer")
         shape = layer.shape(index)
-        values = layer.record(index).as_dict() if layer.dbf is not None else {}
+        values = layer.record(index).as_dict() if has_records else {}
         lower = {str(key).lower(): value for key, value in values.items()}
         title = next(
             (str(lower[key]).strip() for key in _NAME_FIELDS if lower.get(key) not in (None, "")),

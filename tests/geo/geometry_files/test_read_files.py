@@ -271,6 +271,29 @@ def test_a_document_may_be_one_feature_of_any_kind(root: str) -> None:
     assert problem.feature == root.removeprefix("gx:")
 
 
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        (
+            "a.geojson",
+            '{"type": "FeatureCollection", "features": [{"type": "Feature", "geometry": {"type":'
+            ' "Point", "coordinates": [7, 53]}, "properties": {"speed_kn": 5, "hold": 3}}]}',
+        ),
+        (
+            "a.kml",
+            kml(
+                "<Placemark><ExtendedData><Data name='speed_kn'/><SchemaData>"
+                "<SimpleData name='hold'/></SchemaData></ExtendedData>"
+                "<Point><coordinates>7,53</coordinates></Point></Placemark>"
+            ),
+        ),
+    ],
+)
+def test_fields_that_say_how_to_fly_are_named(name: str, content: str) -> None:
+    (problem,) = read(name, content).problems
+    assert str(problem).startswith("fields that say how to fly are not read: speed_kn, hold;")
+
+
 def test_a_problem_that_repeats_is_told_once() -> None:
     (problem, _) = read("a.kml", kml("<Update/>\n" * 200)).problems
     assert str(problem).startswith("Update: its changes of other features are not made")

@@ -126,3 +126,40 @@ def test_a_layer_beyond_the_limit_of_positions_is_refused_before_it_is_read() ->
         archive.writestr("a.prj", WGS84)
     (problem,) = read_geometry_file("a.zip", content.getvalue()).problems
     assert str(problem) == "a.shp: the file has more than 200,000 positions; simplify its lines"
+
+
+def test_fields_that_say_how_to_fly_are_named() -> None:
+    shp, shx, dbf = BytesIO(), BytesIO(), BytesIO()
+    with shapefile.Writer(shp=shp, shx=shx, dbf=dbf) as out:
+        for field in ("NAME", "ALT_M", "SPEED", "COLOUR"):
+            out.field(field, "C")
+        out.point(7, 53)
+        out.record("a", "120", "5", "red")
+    content = BytesIO()
+    with zipfile.ZipFile(content, "w") as archive:
+        for suffix, part in (("shp", shp), ("shx", shx), ("dbf", dbf)):
+            archive.writestr(f"a.{suffix}", part.getvalue())
+        archive.writestr("a.prj", WGS84)
+    (problem,) = read_geometry_file("a.zip", content.getvalue()).problems
+    assert "a.shp: fields that say how to fly are not read: ALT_M, SPEED;" in str(problem)
+
+
+def test_a_layer_without_a_table_has_shapes_without_names() -> None:
+    # pyshp 3.1.6 raises where `Reader.dbf` is asked for and there is none.
+    shp, content = BytesIO(), BytesIO()
+    with shapefile.Writer(shp=shp, shx=BytesIO(), dbf=BytesIO()) as out:
+        out.field("NAME", "C")
+        out.point(7, 53)
+        out.record("a")
+    with zipfile.ZipFile(content, "w") as archive:
+        archive.writestr("a.shp", shp.getvalue())
+        archive.writestr("a.prj", WGS84)
+    (point,) = read_geometry_file("b.zip", content.getvalue()).geometries
+    assert (point.name, point.geometry) == ("b", Point((53.0, 7.0, None)))
+
+
+@pytest.mark.parametrize("none", [-9999.0, -32768.0, -1.5e38])
+def test_what_is_written_for_no_height_is_none(none: float) -> None:
+    file = read(shapefile.POLYLINEZ, lambda out: out.linez([[[7, 53, none], [7.1, 53, 40]]]))
+    assert file.geometries[0].geometry == Route(((53.0, 7.0, None), (53.0, 7.1, 40.0)), "amsl")
+    assert "has no height at position 1" in str(file.problems[-1])
