@@ -70,10 +70,15 @@ def parse_csv(text: str, kind: str) -> Point | Route | Area:
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """A column's name ("lat", "lon", "alt" or "altitude_frame") and what makes its values SI."""
+    """A column's name ("lat", "lon", "alt" or "altitude_frame") and what makes its values SI.
+
+    `frame`: what heights are above, and `unit`: their unit, where the header says so.
+    """
 
     name: str
     scale: float = 1.0
+    frame: str = ""
+    unit: str = ""
 
 
 def csv_rows(text: str, delimiter: str = ",") -> Iterator[tuple[int, list[str]]]:

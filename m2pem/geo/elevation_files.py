@@ -13,12 +13,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from m2pem.errors import M2pemError
-from m2pem.geo.local_frame import SEMI_MAJOR_M
-from m2pem.geo.vertical_datums import DatumError, heights_of
+from m2pem.geo.datums import DatumError, heights_of, to_wgs84
 from m2pem.units import LENGTHS_IN_FILES
 
 if TYPE_CHECKING:
-    from pyproj import CRS, Transformer
     from rasterio.io import DatasetReader
 
 _TILE = re.compile(r"([NS])(\d{2})([EW])(\d{3})", re.IGNORECASE)
@@ -115,9 +113,10 @@ class Raster:
             crs = CRS.from_wkt(self._data.crs.to_wkt(version="WKT2_2019"))
             unit_m, self._to_sea_level = heights_of(crs)
             level = crs.sub_crs_list[0] if crs.is_compound else crs.to_2d()
-            self._system = _from_wgs84(level)
+            self._system = to_wgs84(level)
         except (ProjError, DatumError) as error:
-            raise TerrainError(f"{path}: {error}") from None
+            remedy = "gdalwarp -t_srs EPSG:4326+5773 converts it"
+            raise TerrainError(f"{path}: {error}; {remedy}") from None
         if unit and unit not in LENGTHS_IN_FILES:
             raise TerrainError(
                 f"{path}: its heights are in '{unit}'; known are metres, feet and US survey feet"
@@ -133,7 +132,7 @@ class Raster:
 
         `beside`: the same by other files, for samples next to the file's edge.
         """
-        x, y = self._system.transform(longitude_deg, latitude_deg)
+        x, y = self._system.transform(longitude_deg, latitude_deg, direction="INVERSE")
         if not (math.isfinite(x) and math.isfinite(y)):
             return None
         for turn in self._turns:
@@ -157,7 +156,7 @@ class Raster:
             if 0 <= at_row < rows and 0 <= at_column < columns:
                 return self._sample(at_row, at_column)
             x, y = self._data.transform @ (at_column + 0.5, at_row + 0.5)
-            longitude_deg, latitude_deg = self._system.transform(x, y, direction="INVERSE")
+            longitude_deg, latitude_deg = self._system.transform(x, y)
             altitude_m = beside(latitude_deg, longitude_deg)
             if altitude_m is None:
                 return None
@@ -175,26 +174,6 @@ class Raster:
             raise TerrainError(f"{self._data.name}: is damaged: {error}") from None
         height_m: float = (float(values.data[0, 0]) * self._scale + self._offset) * self._unit_m
         return None if values.mask.any() or not _LOWEST_M < height_m < _HIGHEST_M else height_m
-
-
-def _from_wgs84(crs: "CRS") -> "Transformer":
-    """Return the conversion from WGS-84 longitude and latitude to a system's x and y.
-
-    Raises:
-        DatumError: it is not known how the system lies on the Earth.
-    """
-    from pyproj import Transformer  # noqa: PLC0415
-    from pyproj.exceptions import ProjError  # noqa: PLC0415
-
-    try:
-        return Transformer.from_crs("EPSG:4326", crs, always_xy=True, allow_ballpark=False)
-    except ProjError:
-        # Of a datum without a known conversion, which on this ellipsoid is near to WGS 84.
-        if crs.ellipsoid is not None and crs.ellipsoid.semi_major_metre == SEMI_MAJOR_M:
-            return Transformer.from_crs("EPSG:4326", crs, always_xy=True)
-    raise DatumError(
-        f"its coordinate system '{crs.name}' cannot be converted from WGS 84; warp it to EPSG:4326"
-    )
 
 
 def _between(row: float, column: float, sample: _Sample) -> float | None:

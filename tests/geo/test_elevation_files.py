@@ -87,15 +87,24 @@ def test_heights_near_mean_sea_level_are_taken_in_the_unit_of_their_system(
     assert height(tmp_path) == pytest.approx(60.0 * unit_m, abs=1e-4)
 
 
+# GDAL 3.12.4 writes the parameters of a system without a name into the name of its datum.
+DATUM_NAMED_BY_GDAL = (
+    'GEOGCS["unknown",DATUM["Unknown based on WGS 84 ellipsoid using_towgs84_-87_-98_-121",'
+    'SPHEROID["WGS 84",6378137,298.257223563]],PRIMEM["Greenwich",0],'
+    'UNIT["degree",0.0174532925199433]]'
+)
+
+
 @pytest.mark.parametrize(
     ("crs", "says"),
     [
-        ("EPSG:4326+5798", r"dem\.tif: its heights are of 'EGM84 height', of which .* EGM96"),
+        ("EPSG:4326+5798", r"dem\.tif: its heights are of 'EGM84 height', of which .*4326.5773"),
         ("EPSG:4326+5710", "its heights are of 'Ostend height'"),  # low water, 2.3 m lower
         ("EPSG:4326+5829", "its heights are of 'Instantaneous Water Level height'"),
         ("EPSG:4326+5861", "its heights are of 'LAT depth'"),
         ("EPSG:4978", "has no heights"),
-        ("+proj=utm +zone=18 +ellps=bessel", "cannot be converted from WGS 84"),
+        (DATUM_NAMED_BY_GDAL, "using_towgs84_-87_-98_-121' no transformation to WGS 84 is known"),
+        ("+proj=utm +zone=18 +ellps=bessel", "no transformation to WGS 84 is known; gdalwarp"),
     ],
 )
 def test_heights_whose_distance_to_mean_sea_level_is_not_known_are_refused(

@@ -3,7 +3,6 @@
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from csv import writer
-from dataclasses import dataclass
 from io import StringIO
 from itertools import islice, zip_longest
 from typing import TypeAlias
@@ -81,13 +80,10 @@ _SPEEDS = {
     **dict.fromkeys(("kt", "kts", "knot", "knots"), UNITS[Dimension.SPEED]["kn"]),
     "fps": LENGTHS_IN_FILES["ft"],
 }
-_DEGREES = dict.fromkeys(
-    (
-        *("deg", "degree", "degrees", "°", "decimal_degrees", "decimal", "dd", "wgs84"),
-        *("n", "e", "degrees_north", "degrees_east"),
-    ),
-    1.0,
-)
+_DEGREES = {
+    **dict.fromkeys(("deg", "degree", "degrees", "°", "dd", "decimal", "decimal_degrees"), 1.0),
+    **dict.fromkeys(("wgs84", "n", "e", "degrees_north", "degrees_east"), 1.0),
+}
 _UNITS = {"lat": _DEGREES, "lon": _DEGREES, "alt": LENGTHS_IN_FILES, _SPEED: _SPEEDS}
 _FRAMES = f"in a column altitude_frame one of {', '.join(FILE_FRAMES)}; or leave it out"
 _OF_FLIGHT = {
@@ -108,7 +104,7 @@ _COMMANDS = re.compile(
     r"(poi|gimbal|action|photo|camera|curve|rotation|heading|yaw|turn|hover|stay|wait|delay|loiter"
     r"|hold|(mav_)?command|(mav_)?cmd|trigger|task)"
 )
-_COMMAND = re.compile(r"(mav_)?(command|cmd)")
+_COMMAND = re.compile(r"(mav[_ ])?(command|cmd)", re.I)
 _NO_WAYPOINT = re.compile(
     r"(?:mav_cmd_)?(?:nav_)?(?:vtol_)?(land|take_?off|rtl|return|spline)", re.I
 )
@@ -134,12 +130,7 @@ def read_csv(content: bytes, contents: Contents) -> None:
         contents.expect(sum(1 for _ in islice(csv_rows(text, delimiter), MAX_POSITIONS + 2)) - 1)
     rows = csv_rows(text, delimiter)
     line, header = next(rows, (1, [""]))
-    columns = _columns(header, f"line {line}", contents)
-    commands = {
-        index: _COMMAND.match(words) is not None
-        for index, text in enumerate(header)
-        if index not in columns and _COMMANDS.match(words := _column(text)[1])
-    }
+    columns, commands = _columns(header, f"line {line}", contents)
     index_of_name = next((at for at, each in columns.items() if each.name == "name"), None)
     groups: dict[str, list[tuple[int, list[str]]]] = {}
     for number, row in rows:
@@ -147,8 +138,8 @@ def read_csv(content: bytes, contents: Contents) -> None:
             raise GeometryError(
                 f"line {number}: has {len(row)} columns where the header has {len(header)}"
             )
-        for index, is_command in commands.items():
-            text = row[index]
+        for index in commands:
+            text, is_command = row[index], _COMMAND.match(header[index])
             if _NO_WAYPOINT.match(text) or (is_command and text.lower() not in _WAYPOINTS):
                 raise FeatureProblemError(
                     f"line {number}: {header[index]} {text[:40]!r} is no waypoint",
@@ -165,12 +156,11 @@ def read_csv(content: bytes, contents: Contents) -> None:
             contents.add(name, _geometry(rows_of_it))
 
 
-def _cells(row: Sequence[str], columns: Mapping[int, "_Named"], is_litchi: bool) -> _Cells:
+def _cells(row: Sequence[str], columns: Mapping[int, Column], is_litchi: bool) -> _Cells:
     """Return the cells of a row by what they hold."""
     cells: _Cells = {column.name: (row[index], column) for index, column in columns.items()}
-    height = cells.get("alt")
-    if height is not None and isinstance(height[1], _Named) and height[1].frame:
-        cells["altitude_frame"] = (height[1].frame, height[1])
+    if "alt" in cells and cells["alt"][1].frame:
+        cells["altitude_frame"] = (cells["alt"][1].frame, cells["alt"][1])
     elif "altitude_frame" in cells:
         text, column = cells["altitude_frame"]
         word = "".join(_words(text))
@@ -217,16 +207,18 @@ def _delimiter(text: str) -> str:
     return max(",;\t", key=first.count)
 
 
-def _columns(header: Sequence[str], where: str, contents: Contents) -> dict[int, "_Named"]:
-    """Return the columns that are read, by their index."""
-    columns: dict[str, tuple[int, _Named]] = {}
+def _columns(
+    header: Sequence[str], where: str, contents: Contents
+) -> tuple[dict[int, Column], list[int]]:
+    """Return the columns that are read, by their index, and the indices of those that command."""
+    columns: dict[str, tuple[int, Column]] = {}
     left, commands, stops = [], [], []
     for index, text in enumerate(header):
         column, words = _column(text)
         if column is None:
             hint = next((hint for sign, hint in _OF_FLIGHT.items() if sign.match(words)), "")
             if _COMMANDS.match(words):
-                commands.append(text)
+                commands.append(index)
             elif hint:
                 stops.append((f"{where}: column {text[:60]!r} cannot be read", hint))
             else:
@@ -259,10 +251,10 @@ def _columns(header: Sequence[str], where: str, contents: Contents) -> dict[int,
     if left:
         contents.warn(where, f"columns that are not read: {', '.join(left)[:200]}")
     if commands:
-        names = ", ".join(dict.fromkeys(each.rstrip("0123456789") for each in commands))
+        names = ", ".join(dict.fromkeys(header[each].rstrip("0123456789") for each in commands))
         what = f"columns that command more than a place are not read: {names[:400]}"
         contents.warn(where, what, "draw it in the mission")
-    return dict(columns.values())
+    return dict(columns.values()), commands
 
 
 def warn_of_fields(names: Iterable[str], where: str, contents: Contents) -> None:
@@ -279,15 +271,7 @@ def warn_of_fields(names: Iterable[str], where: str, contents: Contents) -> None
         contents.warn(where, what, "give the geometry its heights, or draw it in the mission")
 
 
-@dataclass(frozen=True, slots=True)
-class _Named(Column):
-    """A column, with what heights are above (`frame`) and their unit, where its name says so."""
-
-    frame: str = ""
-    unit: str = ""
-
-
-def _column(text: str) -> tuple[_Named | None, str]:
+def _column(text: str) -> tuple[Column | None, str]:
     """Return what a column holds, if it can be read, and the words of its name joined by `_`."""
     words = _words(text[:200])
     spans = [(at, at + size) for size in (3, 2, 1) for at in range(1, len(words) - size + 1)]
@@ -297,7 +281,7 @@ def _column(text: str) -> tuple[_Named | None, str]:
         scales = _UNITS.get(name, {})
         if name and (unit in scales or (not unit and name != _SPEED)):
             frame = _HEIGHTS[key] if name == "alt" else ""
-            return _Named(name, scales.get(unit, 1.0), frame, unit), "_".join(words)
+            return Column(name, scales.get(unit, 1.0), frame, unit), "_".join(words)
     return None, "_".join(words)
 
 

@@ -10,26 +10,22 @@ from collections.abc import Sequence
 from functools import cached_property
 from math import isfinite
 
-from pyproj import CRS, Transformer
+from pyproj import CRS
 from pyproj.exceptions import CRSError, ProjError
 
-from m2pem.geo.geojson import GeometryError, crs_name
+from m2pem.geo.datums import DatumError, ToSeaLevel, heights_of, to_wgs84, unbound
+from m2pem.geo.geojson import crs_name
 from m2pem.geo.geometry_files.contents import Contents, FeatureProblemError
-from m2pem.geo.vertical_datums import DatumError, ToSeaLevel, heights_of, unbound
 
 MAX_WKT_CHARACTERS = 20_000
 _EXPORT = "export it as WGS 84 (EPSG:4326), with heights in metres"
+_EXPORT_HEIGHTS = "export it with EGM96 heights (EPSG:4326+5773)"
 _NAMES_A_FILE = re.compile(r"PROJ4_GRIDS|PARAMETERFILE|grids=(?!@null)", re.IGNORECASE)
 """A system that names a file: PROJ would open whatever file of this computer that is."""
 
 _AUTHORITY = re.compile(
     r"(?:.*def[:/]crs[:/])?(EPSG|ESRI|IAU|IGNF|OGC)(?:[:/][\w.]*)?[:/](\w+)", re.I
 )
-_ALIGNED_WITH_WGS84 = frozenset({"China 2000"})
-"""Datums that are within a decimetre of WGS 84 by their definition (CGCS2000: ITRF97 at the epoch
-2000.0), of which PROJ 9.5 knows no transformation."""
-
-_WGS84 = re.compile(r"WGS[ _]?(19)?84")
 _ANGLE = re.compile(r"deg|grad|gon|rad", re.I)
 
 
@@ -52,20 +48,11 @@ class ReferenceSystem:
         self._is_3d = len(own.axis_info) == 3
         self.has_heights = self._is_3d or crs.is_compound
         self._axis = own.axis_info[0]
-        self._transformer = self._of(horizontal, own.datum.name if own.datum else "")
-        self._accuracies_m: dict[str, float] = {}
-
-    def _of(self, crs: CRS, datum: str) -> Transformer:
-        target = CRS.from_epsg(4979 if self._is_3d else 4326)
-        # What GDAL writes of a system that says of its datum only the ellipsoid of WGS 84.
-        unnamed = re.match(r"(?!.*towgs84).*unknown", datum, re.I) is not None
-        ellipsoid = crs.ellipsoid.name if crs.ellipsoid else ""
-        aligned = (unnamed and _WGS84.fullmatch(ellipsoid)) or datum in _ALIGNED_WITH_WGS84
         try:
-            return Transformer.from_crs(crs, target, always_xy=True, allow_ballpark=bool(aligned))
-        except ProjError:
-            why = f"of its datum {datum[:80]!r} no transformation to WGS 84 is known"
-            raise self._refused(why) from None
+            self._transformer = to_wgs84(horizontal)
+        except DatumError as error:
+            raise self._refused(str(error)) from None
+        self._accuracies_m: dict[str, float] = {}
 
     def to_wgs84(self, positions: Sequence[Sequence[float]], frame: str = "") -> list[list[float]]:
         """Return positions as [longitude, latitude], and the height in metres where one is given.
@@ -104,7 +91,7 @@ class ReferenceSystem:
         try:
             return heights_of(self._crs)
         except DatumError as error:
-            raise GeometryError(str(error)) from None
+            raise FeatureProblemError(str(error), _EXPORT_HEIGHTS) from None
 
     def _unit_m(self, height: float) -> float:
         is_metre = self._axis.unit_conversion_factor == 1.0 or _ANGLE.match(self._axis.unit_name)

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from pyproj import CRS
 
-from m2pem.geo.vertical_datums import NEAR, heights_of
+from m2pem.geo.datums import NEAR, heights_of
 
 
 @pytest.mark.parametrize("code", sorted(NEAR))
@@ -40,7 +40,7 @@ def test_a_datum_is_known_by_its_name_whatever_the_unit_and_the_name_of_the_syst
 
 CONVERTS = """
 import sys, pyproj
-from m2pem.geo.vertical_datums import heights_of
+from m2pem.geo.datums import heights_of
 pyproj.datadir.append_data_dir(sys.argv[1])
 _, to_sea_level = heights_of(pyproj.CRS("EPSG:4326+3855"))
 print(to_sea_level(38.1075, -77.3192, 60.0))

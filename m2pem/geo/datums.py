@@ -1,4 +1,4 @@
-"""What the heights of a coordinate reference system count from, and what makes them altitudes above
+"""How the positions of a coordinate reference system become WGS 84, and its heights altitudes above
 mean sea level (EGM96).
 
 Those of a system that says nothing of heights are taken as they are. Heights above the ellipsoid
@@ -13,9 +13,10 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 from m2pem.geo.geoid import mean_sea_level_m
+from m2pem.geo.local_frame import SEMI_MAJOR_M
 
 if TYPE_CHECKING:
-    from pyproj import CRS
+    from pyproj import CRS, Transformer
 
 ToSeaLevel = Callable[[float, float, float], float]
 """Makes latitude, longitude and a height in metres an altitude above mean sea level; NaN or
@@ -42,6 +43,30 @@ class DatumError(ValueError):
     """Heights cannot be converted; the text says which, and what would be right."""
 
 
+def to_wgs84(crs: "CRS") -> "Transformer":
+    """Return the conversion of a system's x (east), y (north), and height if it is
+    three-dimensional, to WGS-84 longitude, latitude and height.
+
+    Raises:
+        DatumError: it is not known how the system lies on the Earth.
+    """
+    from pyproj import Transformer  # noqa: PLC0415
+    from pyproj.exceptions import ProjError  # noqa: PLC0415
+
+    own = unbound(crs)
+    target = "EPSG:4979" if len(own.axis_info) > 2 else "EPSG:4326"
+    datum = own.datum.name if own.datum else ""
+    try:
+        return Transformer.from_crs(crs, target, always_xy=True, allow_ballpark=False)
+    except ProjError:
+        # Of a datum without a known conversion, which on this ellipsoid is near to WGS 84, if it
+        # does not name one: GDAL 3.12 writes parameters into the name of the datum.
+        near = own.ellipsoid is not None and own.ellipsoid.semi_major_metre == SEMI_MAJOR_M
+        if near and "towgs84" not in datum.lower():
+            return Transformer.from_crs(crs, target, always_xy=True)
+    raise DatumError(f"of its datum {datum[:80]!r} no transformation to WGS 84 is known")
+
+
 def heights_of(crs: "CRS") -> tuple[float, ToSeaLevel]:
     """Return the unit of a system's heights, in metres (1 if it has none, negative: they count
     downwards), and what makes heights in metres altitudes above mean sea level.
@@ -64,7 +89,7 @@ def heights_of(crs: "CRS") -> tuple[float, ToSeaLevel]:
     if convert is None:
         raise DatumError(
             f"its heights are of '{vertical[0].name}', of which the distance to mean sea level is"
-            " not known; convert it to EGM96 heights (EPSG:4326+5773)"
+            " not known"
         )
     return unit_m, convert
 
