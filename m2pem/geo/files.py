@@ -4,7 +4,6 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from m2pem.findings import Severity, unreadable_remedy
-from m2pem.geo.csv_waypoints import parse_csv
 from m2pem.geo.file_text import decoded, parsed_json
 from m2pem.geo.geojson import GeometryError, is_wgs84, kind_of, parse_geojson
 from m2pem.geo.geometry_files import KEEP_OUT, FileProblem, read_geometry_file
@@ -17,10 +16,10 @@ MAX_BYTES = 5_000_000
 _SHOWN = 3
 """Errors of a file that a message has; of more, it has the number."""
 
-_OF_MANY = (".plan", ".waypoints", ".mission", ".txt", ".kml", ".kmz", ".wpml", ".zip")
+_OF_MANY = (*(".csv", ".plan", ".waypoints", ".mission", ".txt", ".kml", ".kmz", ".wpml", ".zip"),)
 """Files of any number of geometries: one of the kind that is asked for is expected."""
 
-_SUFFIXES = (".geojson", ".json", ".csv", *_OF_MANY)
+_SUFFIXES = (".geojson", ".json", *_OF_MANY)
 
 
 def read_geometry(
@@ -59,13 +58,10 @@ def _read(
         raise GeometryError(f"is larger than {MAX_BYTES:,} bytes")
     if path.suffix.lower() in _OF_MANY:
         return _only_one(path, content, kind, warn)
-    text = decoded(content)
-    if path.suffix.lower() == ".csv":
-        return parse_csv(text, kind)
-    value = parsed_json(text)
+    value = parsed_json(decoded(content))
     if not isinstance(value, Mapping):
         raise GeometryError("a JSON object is expected")
-    if path.suffix.lower() in (".geojson", ".json") and not is_wgs84(value.get("crs")):
+    if not is_wgs84(value.get("crs")):
         return _only_one(path, content, kind, warn)
     return parse_geojson(value)
 
@@ -73,7 +69,7 @@ def _read(
 def _only_one(
     path: Path, content: bytes, kind: str, warn: Callable[[FileProblem], object] | None
 ) -> Point | Route | Area:
-    file = read_geometry_file(path.name, content)
+    file = read_geometry_file(path.name, content, kind)
     problems = [each for each in file.problems if each.kind in ("", kind)]
     if errors := [str(each) for each in problems if each.severity is Severity.ERROR]:
         more = f" (and {len(errors) - _SHOWN} more)" if len(errors) > _SHOWN else ""

@@ -4,7 +4,12 @@ import pytest
 
 from m2pem.geo import files as geofiles
 from m2pem.geo.files import GeometryError, read_geometry
-from m2pem.geo.geometry_files import FileProblem
+from m2pem.geo.geometry_files import (
+    FileFormat,
+    FileProblem,
+    NamedGeometry,
+    write_geometry_file,
+)
 from m2pem.mission.geometry import Area, Point, Route
 
 from ..fleet.fleets import LINE, POINT, SQUARE, write_json
@@ -20,6 +25,20 @@ def test_the_suffix_says_how_to_read(tmp_path: Path) -> None:
     assert isinstance(read_geometry(write_json(tmp_path / "a.json", SQUARE), "area"), Area)
     (tmp_path / "a.csv").write_text("lat_deg,lon_deg\n1,2\n")
     assert isinstance(read_geometry(tmp_path / "a.csv", "point"), Point)
+
+
+def test_a_table_that_m2pem_has_written_is_read(tmp_path: Path) -> None:
+    route = Route(((38.1, -77.3, 2.0), (38.2, -77.3, 3.0)), "amsl", (2.5, None))
+    table = write_geometry_file(FileFormat.CSV, [NamedGeometry("road", route)])
+    (tmp_path / "a.csv").write_bytes(table)
+    assert read_geometry(tmp_path / "a.csv", "route") == route
+
+
+def test_a_height_without_a_unit_is_a_warning(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("lat_deg,lon_deg,alt\n1,2,3\n")
+    warnings: list[FileProblem] = []
+    read_geometry(tmp_path / "a.csv", "point", warnings.append)
+    assert "column 'alt' has no unit: taken as metres" in str(warnings[0])
 
 
 def test_geojson_of_another_reference_system_is_converted(tmp_path: Path) -> None:

@@ -65,9 +65,11 @@ class FeatureProblemError(GeometryError):
 
 
 class Contents:
-    """Collects the geometries and problems of one file. `stem`: the file's name without suffix."""
+    """Collects the geometries and problems of one file. `stem`: the file's name without suffix;
+    `kind`: that of geometries of which the file does not say it ("": not known)."""
 
-    def __init__(self, stem: str) -> None:
+    def __init__(self, stem: str, kind: str = "") -> None:
+        self.kind = kind
         self._stem = stem
         self._geometries: list[NamedGeometry] = []
         self._names: set[str] = set()

@@ -1,20 +1,13 @@
 """Tables of positions: columns are found by their names, rows of one name are one geometry."""
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
-from csv import writer
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from csv import Error, reader, writer
+from dataclasses import dataclass
 from io import StringIO
 from itertools import islice, zip_longest
 from typing import TypeAlias
 
-from m2pem.geo.csv_waypoints import (
-    OTHER_NAMES,
-    Column,
-    csv_frame,
-    csv_position,
-    csv_rows,
-    positions_as,
-)
 from m2pem.geo.file_text import decoded
 from m2pem.geo.geojson import (
     FILE_FRAMES,
@@ -22,6 +15,7 @@ from m2pem.geo.geojson import (
     SPEEDS,
     GeometryError,
     checked,
+    coordinate,
     kind_of,
     with_frames,
     with_speeds,
@@ -33,15 +27,15 @@ from m2pem.geo.geometry_files.contents import (
     NamedGeometry,
 )
 from m2pem.mission.geometry import Area, Coordinate, Point, Route
+from m2pem.suggestions import suggest
 from m2pem.units import LENGTHS_IN_FILES, UNITS, Dimension
 
 _SPEED = "speed_m_s"
 _HEADER = ("name", "kind", "ring", "lat_deg", "lon_deg", "alt_m", "altitude_frame")
 _NAMES = {
     **{name: name for name in ("lat", "lon", "alt", "name", "kind", "ring")},
-    **OTHER_NAMES,
-    **dict.fromkeys(("y", "breitengrad"), "lat"),
-    **dict.fromkeys(("x", "längengrad"), "lon"),
+    **dict.fromkeys(("latitude", "y", "breitengrad"), "lat"),
+    **dict.fromkeys(("longitude", "lng", "long", "x", "längengrad"), "lon"),
     **dict.fromkeys(("route", "title", "label", "id"), "name"),
     "type": "kind",
     **dict.fromkeys(("frame", "altitudeframe", "altitudemode", "altmode"), "altitude_frame"),
@@ -111,15 +105,29 @@ _NO_WAYPOINT = re.compile(
 _WAYPOINTS = frozenset({"", "16", "16.0", "wp", "waypoint", "nav_waypoint", "mav_cmd_nav_waypoint"})
 _KINDS = ("route", "area", "point")
 
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """A column's name ("lat", "lon", "alt" or "altitude_frame") and what makes its values SI.
+
+    `frame`: what heights are above, and `unit`: their unit, where the header says so.
+    """
+
+    name: str
+    scale: float = 1.0
+    frame: str = ""
+    unit: str = ""
+
+
 _Cells: TypeAlias = dict[str, tuple[str, Column]]
 
 
 def read_csv(content: bytes, contents: Contents) -> None:
     """Collect the geometries of a table.
 
-    Rows of the same `name` make one geometry of its `kind`; without a kind, several make a route
-    and one a point. `ring` counts the rings of an area: 0 is the outer one. `speed_m_s`: from a
-    waypoint of a route on; empty: as fast as before.
+    Rows of the same `name` make one geometry of its `kind`; without a kind, that of the contents,
+    or several make a route and one a point. `ring` counts the rings of an area: 0 is the outer one.
+    `speed_m_s`: from a waypoint of a route on; empty: as fast as before.
 
     Raises:
         GeometryError: it is not CSV, or has no columns of positions.
@@ -127,8 +135,8 @@ def read_csv(content: bytes, contents: Contents) -> None:
     text = decoded(content)
     delimiter = _delimiter(text)
     if text.count("\n") > MAX_POSITIONS:
-        contents.expect(sum(1 for _ in islice(csv_rows(text, delimiter), MAX_POSITIONS + 2)) - 1)
-    rows = csv_rows(text, delimiter)
+        contents.expect(sum(1 for _ in islice(_rows(text, delimiter), MAX_POSITIONS + 2)) - 1)
+    rows = _rows(text, delimiter)
     line, header = next(rows, (1, [""]))
     columns, commands = _columns(header, f"line {line}", contents)
     index_of_name = next((at for at, each in columns.items() if each.name == "name"), None)
@@ -147,13 +155,15 @@ def read_csv(content: bytes, contents: Contents) -> None:
                 )
         name = "" if index_of_name is None else row[index_of_name]
         groups.setdefault(name, []).append((number, row))
+    if not groups:
+        raise GeometryError("has no row below its header")
     is_litchi = any(each.lower().startswith("curvesize") for each in header)
     for name, group in groups.items():
-        where = f"line {group[0][0]}"
-        with contents.feature(f"{where} {name!r}" if name else where):
+        # What is wrong with a row says its line.
+        with contents.feature(f"line {group[0][0]} {name!r}" if name else ""):
             # One after the other: with all rows as mappings a table takes three times the memory.
             rows_of_it = ((number, _cells(row, columns, is_litchi)) for number, row in group)
-            contents.add(name, _geometry(rows_of_it))
+            contents.add(name, _geometry(rows_of_it, contents.kind))
 
 
 def _cells(row: Sequence[str], columns: Mapping[int, Column], is_litchi: bool) -> _Cells:
@@ -200,6 +210,22 @@ def _rings(geometry: Point | Route | Area) -> Sequence[Sequence[Coordinate]]:
     if isinstance(geometry, Area):
         return geometry.rings
     return ((geometry.position,),) if isinstance(geometry, Point) else (geometry.waypoints,)
+
+
+def _rows(text: str, delimiter: str) -> Iterator[tuple[int, list[str]]]:
+    """Yield the rows with their lines, without spaces around their cells.
+
+    Raises:
+        GeometryError: it is not CSV.
+    """
+    lines = reader(StringIO(text), strict=True, skipinitialspace=True, delimiter=delimiter)
+    try:
+        for row in lines:
+            cells = [cell.strip() for cell in row]
+            if any(cells) and not cells[0].startswith("#"):
+                yield lines.line_num, cells
+    except Error as error:
+        raise GeometryError(f"line {lines.line_num}: is not CSV: {error}") from None
 
 
 def _delimiter(text: str) -> str:
@@ -290,7 +316,7 @@ def _words(text: str) -> list[str]:
     return [each for each in re.split(r"[\s_/.,()\[\]-]+", spaced) if each]
 
 
-def _geometry(rows: Iterable[tuple[int, _Cells]]) -> Point | Route | Area:
+def _geometry(rows: Iterable[tuple[int, _Cells]], default: str) -> Point | Route | Area:
     kind = ""
     frames: list[str] = []
     rings: dict[str, list[Coordinate]] = {}
@@ -302,24 +328,24 @@ def _geometry(rows: Iterable[tuple[int, _Cells]]) -> Point | Route | Area:
             raise FeatureProblemError(
                 f"{where}: kind {given!r} is not known", f"one of {', '.join(_KINDS)}"
             )
-        frames.append(csv_frame(cells, where))
-        is_mixed = frames[-1] != frames[0] and given in ("area", "point")
+        frames.append(_frame(cells, where))
+        is_mixed = frames[-1] != frames[0] and (given or default) in ("area", "point")
         if (kind and given != kind) or is_mixed:
             raise FeatureProblemError(
                 f"{where}: kind or altitude_frame differs from the rows before",
                 "rows of one name have the same ones, but the altitude_frame of a route",
             )
         kind = given
-        rings.setdefault(_cell(cells, "ring"), []).append(csv_position(cells, where))
+        rings.setdefault(_cell(cells, "ring"), []).append(_position(cells, where))
         speeds.append(_speed(cells, where))
-    frame = frames[0]
+    kind, frame = kind or default, frames[0]
     if kind == "area" and len(rings) > 1:
-        areas = [positions_as(ring, frame, "area") for ring in rings.values()]
+        areas = [_positions_as(ring, frame, "area") for ring in rings.values()]
         return Area(
             checked(tuple(area.rings[0] for area in areas if isinstance(area, Area))), frame
         )
     positions = [position for ring in rings.values() for position in ring]
-    geometry = positions_as(positions, frame, kind or ("route" if len(positions) > 1 else "point"))
+    geometry = _positions_as(positions, frame, kind or ("route" if len(positions) > 1 else "point"))
     geometry = with_frames(geometry, frames) if isinstance(geometry, Route) else geometry
     return with_speeds(geometry, speeds) if any(each is not None for each in speeds) else geometry
 
@@ -336,3 +362,53 @@ def _speed(cells: _Cells, where: str) -> float | None:
 
 def _cell(cells: _Cells, name: str) -> str:
     return cells[name][0] if name in cells else ""
+
+
+def _position(cells: _Cells, where: str) -> Coordinate:
+    """Return the position of a row. `cells`: by the names of their columns.
+
+    Raises:
+        GeometryError: latitude, longitude or altitude is not a number, or is out of range.
+    """
+    numbers: dict[str, float | None] = {"alt": None}
+    for name in ("lat", "lon", "alt"):
+        text, column = cells.get(name, ("", None))
+        if column is None or (name == "alt" and not text):
+            continue
+        try:
+            numbers[name] = float(text) * column.scale
+        except ValueError:
+            hint = "; decimals are written with a point" if "," in text else ""
+            raise GeometryError(f"{where}: {name} {text!r} is not a number{hint}") from None
+    return coordinate(numbers["lat"], numbers["lon"], numbers["alt"], where)
+
+
+def _frame(cells: _Cells, where: str) -> str:
+    """Return the altitude frame of a row; "relative" if it names none.
+
+    Raises:
+        GeometryError: the frame is not known.
+    """
+    frame = cells["altitude_frame"][0] if "altitude_frame" in cells else ""
+    if frame and frame not in FILE_FRAMES:
+        hint = suggest(frame, FILE_FRAMES, "frames")
+        raise GeometryError(f"{where}: altitude_frame {frame!r} is not known; {hint}")
+    return frame or "relative"
+
+
+def _positions_as(positions: Sequence[Coordinate], frame: str, kind: str) -> Point | Route | Area:
+    """Return positions as a geometry of `kind`: "route", "area" or "point".
+
+    Raises:
+        GeometryError: there are too many for a point, or the ring bounds no area.
+    """
+    if kind == "point":
+        if len(positions) > 1:
+            raise GeometryError(f"has {len(positions)} positions; a point is one")
+        return Point(positions[0], frame)
+    if kind == "area":
+        ring = positions if positions[0][:2] == positions[-1][:2] else [*positions, positions[0]]
+        if len({corner[:2] for corner in ring}) < 3:
+            raise GeometryError("an area has at least three different corners")
+        return Area(checked((tuple(ring),)), frame)
+    return Route(tuple(positions), frame)

@@ -66,14 +66,15 @@ _HINTS = {
 }
 
 
-def read_geometry_file(name: str, content: bytes) -> GeometryFile:
+def read_geometry_file(name: str, content: bytes, kind: str = "") -> GeometryFile:
     """Read all routes, areas and points of a file. `name`: of the file; its suffix says what it is.
+    `kind`: of rows of a table that does not say it, "route", "area" or "point".
 
     A feature that cannot be read is left out whole, and is a problem. Nothing is raised for bad
     input.
     """
     path = PurePath(name)
-    contents = Contents(path.stem)
+    contents = Contents(path.stem, kind)
     with contents.feature(""):
         suffix = path.suffix.lower()
         reader = _READERS.get(suffix)

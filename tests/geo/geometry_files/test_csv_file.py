@@ -5,7 +5,7 @@ import pytest
 from m2pem.findings import Severity
 from m2pem.geo.geometry_files import GeometryFile, read_geometry_file
 from m2pem.geo.geometry_files.contents import MAX_POSITIONS
-from m2pem.mission.geometry import Point, Route
+from m2pem.mission.geometry import Area, Point, Route
 
 FT, FT_US = 0.3048, 1200 / 3937
 MPH, KN = 1609.344 / 3600, 1852 / 3600
@@ -219,3 +219,54 @@ def test_rows_are_counted_before_they_are_read(beyond: int) -> None:
 def test_commas_are_no_rows() -> None:
     lines = ["lat,lon,note", *['53,7,"a\nb\n\nc"'] * 70_000]
     assert len(read(*lines).geometries) == 1
+
+
+def read_as(kind: str, text: str) -> GeometryFile:
+    return read_geometry_file("a.csv", text.encode(), kind)
+
+
+def test_rows_that_do_not_say_what_they_are_become_what_is_asked_for() -> None:
+    places = ((1.0, 2.0, None), (1.0, 3.0, None), (2.0, 3.0, None))
+    text = "lat_deg,lon_deg\n1,2\n1,3\n2,3\n"
+    for ring in (text, f"{text}1,2\n"):
+        (area,) = read_as("area", ring).geometries
+        assert area.geometry == Area(((*places, places[0]),))
+    (route,) = read_as("route", text[:20]).geometries
+    assert route.geometry == Route(places[:1])
+
+
+def test_spaces_quotes_comments_and_empty_lines_are_no_positions() -> None:
+    text = '# spring\n\nalt_m, "lon_deg", lat_deg\r\n# a gate\n 2, -77.3, "38.1"\r\n,,\n\n'
+    (point,) = read(text).geometries
+    assert point.geometry == Point((38.1, -77.3, 2.0))
+
+
+@pytest.mark.parametrize(
+    ("text", "kind", "message"),
+    [
+        ("", "", "line 1: there is no column 'lat' among ''; the header is, for example, name,"),
+        ("lat_deg,alt_m\n1,2", "", "line 1: there is no column 'lon'"),
+        ("lat_deg,lon_deg\n", "", "has no row below its header"),
+        ("lat_deg,lon_deg\n1\n", "", "line 2: has 1 columns where the header has 2"),
+        ("lat_deg,lon_deg\n1,2\n1,x\n", "", "line 3: lon 'x' is not a number"),
+        ("lat_deg,lon_deg\n,2\n", "", "line 2: lat '' is not a number"),
+        ('lat_deg,lon_deg\n"1,5",2\n', "", "decimals are written with a point"),
+        ("lat_deg,lon_deg\n91,2\n", "", "line 2: latitude 91 is not within -90..90"),
+        ("lat_deg,lon_deg\nnan,2\n", "", "line 2: latitude nan is not finite"),
+        ('lat_deg,lon_deg\n"1,2\n', "", "line 2: is not CSV"),
+        ("lat,lon,altitude_frame\n1,2,ellipse", "", "'ellipse' is not known; did you mean 'elli"),
+        (
+            "lat,lon,altitude_frame\n1,2,amsl\n1,3,terrain\n2,3,amsl",
+            "area",
+            "line 3: kind or altitude_frame differs from the rows before",
+        ),
+        ("lat_deg,lon_deg\n1,2\n3,4\n", "point", "has 2 positions; a point is one"),
+        ("lat_deg,lon_deg\n1,2\n3,4\n1,2\n", "area", "at least three different corners"),
+    ],
+)
+def test_rows_that_cannot_be_read_are_refused_with_their_line(
+    text: str, kind: str, message: str
+) -> None:
+    file = read_as(kind, text)
+    assert file.geometries == ()
+    assert message in str(file.problems[-1])
