@@ -73,7 +73,7 @@ class Contents:
         self._stem = stem
         self._geometries: list[NamedGeometry] = []
         self._names: set[str] = set()
-        self._problems: list[FileProblem] = []
+        self._problems: dict[FileProblem, None] = {}
         self._untold = 0
         self._has_error = False
         self._positions = 0
@@ -126,24 +126,19 @@ class Contents:
             return
         self._has_error = self._has_error or problem.severity is Severity.ERROR
         if len(self._problems) < MAX_PROBLEMS:
-            self._problems.append(problem)
+            self._problems[problem] = None
         else:
             self._untold += 1
 
     def whole(self) -> GeometryFile:
         """Return what was collected. A file of which nothing could be read has an error."""
         if not self._geometries and not self._has_error:
-            self._problems.append(
-                FileProblem(
-                    Severity.ERROR,
-                    "",
-                    "has no route, area or point",
-                    "" if self._problems else "export the features, not links to them or styles",
-                )
-            )
+            remedy = "" if self._problems else "export the features, not links to them or styles"
+            nothing = FileProblem(Severity.ERROR, "", "has no route, area or point", remedy)
+            self._problems[nothing] = None
         if self._untold:
             message = f"has {self._untold:,} problems more"
-            self._problems.append(FileProblem(Severity.ERROR, "", message, "mend these first"))
+            self._problems[FileProblem(Severity.ERROR, "", message, "mend these first")] = None
         return GeometryFile(tuple(self._geometries), tuple(self._problems))
 
     def _unique(self, name: str, geometry: Point | Route | Area) -> str:

@@ -94,6 +94,10 @@ _OF_FLIGHT = {
 }
 """Columns that say how to fly: the import stops if it cannot be read, and says what would be."""
 
+MAX_COLUMNS = 1_000
+_MOST_WORDS = 12
+"""Of a header: what holds a unit or a height has less."""
+
 _COMMANDS = re.compile(
     r"(poi|gimbal|action|photo|camera|curve|rotation|heading|yaw|turn|hover|stay|wait|delay|loiter"
     r"|hold|(mav_)?command|(mav_)?cmd|trigger|task)"
@@ -237,6 +241,8 @@ def _columns(
     header: Sequence[str], where: str, contents: Contents
 ) -> tuple[dict[int, Column], list[int]]:
     """Return the columns that are read, by their index, and the indices of those that command."""
+    if len(header) > MAX_COLUMNS:
+        raise FeatureProblemError(f"{where}: has more than {MAX_COLUMNS} columns", "leave some out")
     columns: dict[str, tuple[int, Column]] = {}
     left, commands, stops = [], [], []
     for index, text in enumerate(header):
@@ -299,7 +305,7 @@ def warn_of_fields(names: Iterable[str], where: str, contents: Contents) -> None
 
 def _column(text: str) -> tuple[Column | None, str]:
     """Return what a column holds, if it can be read, and the words of its name joined by `_`."""
-    words = _words(text[:200])
+    words = _words(text[:200])[:_MOST_WORDS]
     spans = [(at, at + size) for size in (3, 2, 1) for at in range(1, len(words) - size + 1)]
     for start, end in (*spans, (len(words), len(words))):
         key, unit = "".join(words[:start] + words[end:]), "_".join(words[start:end])

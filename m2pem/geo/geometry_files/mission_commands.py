@@ -38,8 +38,8 @@ class Command(NamedTuple):
 
     def said(self, params: Sequence[float | None]) -> str:
         """Return what of its parameters a person needs; "": nothing."""
-        is_here = self.value.startswith("at ") and not (params[4] or params[5])
-        return "" if is_here else self.value.format(*(each or 0.0 for each in params))
+        value = self.value if params[4] or params[5] else self.value.split("at {")[0]
+        return value.format(*(each or 0.0 for each in params)).rstrip()
 
 
 _TABLE = """
@@ -58,11 +58,12 @@ END a task `goto` to its place, then `land`
 END a task `return_to_launch`
   20 NAV_RETURN_TO_LAUNCH
 END a task `change_altitude` at its place
-  31 NAV_LOITER_TO_ALT = to {6:g} m
+  31 NAV_LOITER_TO_ALT = to {6:g} m at {4:.7f}, {5:.7f}
 END no task does it: altitudes count from the vehicle's own home
   179 DO_SET_HOME
 END a task `run_onboard_mission` (arbiter mavlink) does the file as it is
-  94 NAV_PAYLOAD_PLACE; 185 DO_FLIGHTTERMINATION; 193 DO_PAUSE_CONTINUE; 194 DO_SET_REVERSE
+  94 NAV_PAYLOAD_PLACE = at {4:.7f}, {5:.7f}
+  185 DO_FLIGHTTERMINATION; 193 DO_PAUSE_CONTINUE; 194 DO_SET_REVERSE
   210 DO_INVERTED_FLIGHT
 REFUSED draw the curve as waypoints
   34 DO_ORBIT; 35 DO_FIGURE_EIGHT; 36 NAV_ARC_WAYPOINT; 82 NAV_SPLINE_WAYPOINT

@@ -5,6 +5,7 @@ import pytest
 from m2pem.findings import Severity
 from m2pem.geo.geometry_files import GeometryFile, read_geometry_file
 from m2pem.geo.geometry_files.contents import MAX_POSITIONS
+from m2pem.geo.geometry_files.csv_file import MAX_COLUMNS
 from m2pem.mission.geometry import Area, Point, Route
 
 FT, FT_US = 0.3048, 1200 / 3937
@@ -270,3 +271,8 @@ def test_rows_that_cannot_be_read_are_refused_with_their_line(
     file = read_as(kind, text)
     assert file.geometries == ()
     assert message in str(file.problems[-1])
+
+
+def test_a_table_of_too_many_columns_is_refused_before_they_are_read() -> None:
+    (problem,) = read("lat,lon" + ",x" * MAX_COLUMNS, "1,2").problems
+    assert str(problem) == "line 1: has more than 1000 columns; leave some out"

@@ -132,8 +132,14 @@ def test_a_place_to_stay_at_the_end_is_a_waypoint() -> None:
         ("2 20 0 0 0 0 0 0 0", "item 2: MAV_CMD_NAV_RETURN_TO_LAUNCH, with waypoints behind it"),
         ("3 17 0 0 0 0 38 -77 9", "item 2: MAV_CMD_NAV_LOITER_UNLIM, with waypoints behind it"),
         ("3 18 2 0 9 0 38 -77 9", "item 2 (2 turns, radius 9 m): MAV_CMD_NAV_LOITER_TURNS, with"),
-        ("3 31 0 0 0 0 38 -77 9", "item 2 (to 9 m): MAV_CMD_NAV_LOITER_TO_ALT, with waypoints"),
-        ("3 94 0 0 0 0 38 -77 9", "item 2: MAV_CMD_NAV_PAYLOAD_PLACE, with waypoints behind it"),
+        (
+            "3 31 0 0 0 0 38 -77 9",
+            "item 2 (to 9 m at 38.0000000, -77.0000000): MAV_CMD_NAV_LOITER_TO_ALT, with waypoints",
+        ),
+        (
+            "3 94 0 0 0 0 38 -77 9",
+            "item 2 (at 38.0000000, -77.0000000): MAV_CMD_NAV_PAYLOAD_PLACE, with",
+        ),
         ("2 179 1 0 0 0 0 0 0", "item 2: MAV_CMD_DO_SET_HOME, with waypoints behind it"),
         ("3 22 0 0 0 0 0 0 20", "item 2 (to 20 m): MAV_CMD_NAV_TAKEOFF cannot be flown as part"),
         ("3 82 0 0 0 0 38 -77 9", "item 2: MAV_CMD_NAV_SPLINE_WAYPOINT cannot be flown as part"),

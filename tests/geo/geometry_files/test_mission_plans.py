@@ -7,6 +7,7 @@ import pytest
 
 from m2pem.findings import Severity
 from m2pem.geo.geometry_files import GeometryFile, read_geometry_file
+from m2pem.geo.geometry_files.contents import MAX_POSITIONS
 from m2pem.geo.local_frame import LocalFrame
 from m2pem.mission.geometry import Area, Point, Route
 
@@ -282,3 +283,10 @@ def test_an_item_without_a_type_is_named_by_what_is_missing() -> None:
     untyped = item(16, 38.5, -77.5, 20.0)
     del untyped["type"]
     assert said(read(plan(untyped)))[0][1].startswith("item 1 (no 'type'): is not read")
+
+
+def test_rows_are_counted_before_they_are_read() -> None:
+    """A bad row at the end: of a file that is too long it is never reached."""
+    rows = "1 0 3 16 0 0 0 0 38 -77 20 1\n" * MAX_POSITIONS
+    (problem,) = read_geometry_file("a.waypoints", f"QGC WPL 110\n{rows}bad\n".encode()).problems
+    assert str(problem).startswith("the file has more than 200,000 positions")
