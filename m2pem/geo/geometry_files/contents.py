@@ -65,11 +65,15 @@ class FeatureProblemError(GeometryError):
 
 
 class Contents:
-    """Collects the geometries and problems of one file. `stem`: the file's name without suffix;
-    `kind`: that of geometries of which the file does not say it ("": not known)."""
+    """Collects the geometries and problems of one file.
+
+    `stem`: the file's name without suffix; `kind`: that of geometries of which the file does not
+    say it, "": not known; `is_full`: a feature was beyond the limit, the rest need not be read.
+    """
 
     def __init__(self, stem: str, kind: str = "") -> None:
         self.kind = kind
+        self.is_full = False
         self._stem = stem
         self._geometries: list[NamedGeometry] = []
         self._names: set[str] = set()
@@ -95,6 +99,7 @@ class Contents:
             GeometryError: the file has too many features or positions.
         """
         if len(self._geometries) >= MAX_FEATURES:
+            self.is_full = True
             raise FeatureProblemError(
                 f"is beyond the first {MAX_FEATURES} features", "split the file"
             )

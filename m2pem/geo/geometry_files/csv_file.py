@@ -163,6 +163,8 @@ def read_csv(content: bytes, contents: Contents) -> None:
         raise GeometryError("has no row below its header")
     is_litchi = any(each.lower().startswith("curvesize") for each in header)
     for name, group in groups.items():
+        if contents.is_full:
+            break
         # What is wrong with a row says its line.
         with contents.feature(f"line {group[0][0]} {name!r}" if name else ""):
             # One after the other: with all rows as mappings a table takes three times the memory.

@@ -60,6 +60,8 @@ def _read_features(
     names = (str(key) for each in given if isinstance(each, Mapping) for key in each)
     warn_of_fields(names, "", contents)
     for index, feature in enumerate(features):
+        if contents.is_full:
+            break
         where = f"features[{index}]"
         name = _name(feature)
         read_feature(feature, f"{where} {name!r}" if name else where, contents, system)

@@ -105,6 +105,8 @@ def _read(content: bytes, contents: Contents, members: Sequence[str], base: str)
     warn_of_fields(fields, base, contents)
     for element in root.iter(*(f"{{*}}{name}" for name in ("Placemark", *_NOT_READ))):
         local = local_name(element)
+        if contents.is_full:
+            break
         if any(True for _ in element.iterancestors("{*}Update")):
             continue
         if local == "Placemark":

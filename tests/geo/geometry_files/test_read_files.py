@@ -16,7 +16,7 @@ from pyproj import CRS
 
 from m2pem.findings import Severity
 from m2pem.geo.geometry_files import GeometryFile, read_geometry_file
-from m2pem.geo.geometry_files.contents import MAX_PROBLEMS
+from m2pem.geo.geometry_files.contents import MAX_FEATURES, MAX_PROBLEMS
 from m2pem.mission.geometry import Area, Point, Route
 
 WGS84 = CRS("EPSG:4326").to_wkt("WKT1_ESRI")
@@ -292,6 +292,16 @@ def test_a_document_may_be_one_feature_of_any_kind(root: str) -> None:
 def test_fields_that_say_how_to_fly_are_named(name: str, content: str) -> None:
     (problem,) = read(name, content).problems
     assert str(problem).startswith("fields that say how to fly are not read: speed_kn, hold;")
+
+
+def test_nothing_is_read_behind_the_first_feature_beyond_the_limit() -> None:
+    point = '{"type": "Feature", "geometry": {"type": "Point", "coordinates": [7, 53]}}'
+    features = ",".join([point] * (MAX_FEATURES + 3))
+    file = read("a.geojson", f'{{"type": "FeatureCollection", "features": [{features}]}}')
+    assert len(file.geometries) == MAX_FEATURES
+    assert [str(each) for each in file.problems] == [
+        "features[1000]: is beyond the first 1000 features; split the file"
+    ]
 
 
 def test_a_problem_that_repeats_is_told_once() -> None:
