@@ -353,7 +353,8 @@ def _geometry(rows: Iterable[tuple[int, _Cells]], default: str) -> Point | Route
             checked(tuple(area.rings[0] for area in areas if isinstance(area, Area))), frame
         )
     positions = [position for ring in rings.values() for position in ring]
-    geometry = _positions_as(positions, frame, kind or ("route" if len(positions) > 1 else "point"))
+    is_route = len(positions) > 1 or any(speeds)
+    geometry = _positions_as(positions, frame, kind or ("route" if is_route else "point"))
     geometry = with_frames(geometry, frames) if isinstance(geometry, Route) else geometry
     return with_speeds(geometry, speeds) if any(each is not None for each in speeds) else geometry
 

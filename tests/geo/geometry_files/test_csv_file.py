@@ -276,3 +276,8 @@ def test_rows_that_cannot_be_read_are_refused_with_their_line(
 def test_a_table_of_too_many_columns_is_refused_before_they_are_read() -> None:
     (problem,) = read("lat,lon" + ",x" * MAX_COLUMNS, "1,2").problems
     assert str(problem) == "line 1: has more than 1000 columns; leave some out"
+
+
+def test_a_single_row_with_a_speed_is_a_route() -> None:
+    (route,) = read("lat,lon,alt_m,speed_m_s", "53,7,10,5").geometries
+    assert route.geometry == Route(((53.0, 7.0, 10.0),), "relative", (5.0,))
