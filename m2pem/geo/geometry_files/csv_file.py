@@ -104,7 +104,9 @@ _COMMANDS = re.compile(
 )
 _COMMAND = re.compile(r"(mav[_ ])?(command|cmd)", re.I)
 _NO_WAYPOINT = re.compile(
-    r"(?:mav_cmd_)?(?:nav_)?(?:vtol_)?(land|take_?off|rtl|return|spline)", re.I
+    r"(mav_cmd_)?(nav_)?(vtol_)?"
+    r"(land(ing)?|take[ _-]?off|rt[lh]|return([ _]to)?([ _]\w+)?|spline\w*)",
+    re.I,
 )
 _WAYPOINTS = frozenset({"", "16", "16.0", "wp", "waypoint", "nav_waypoint", "mav_cmd_nav_waypoint"})
 _KINDS = ("route", "area", "point")
@@ -151,8 +153,8 @@ def read_csv(content: bytes, contents: Contents) -> None:
                 f"line {number}: has {len(row)} columns where the header has {len(header)}"
             )
         for index in commands:
-            text, is_command = row[index], _COMMAND.match(header[index])
-            if _NO_WAYPOINT.match(text) or (is_command and text.lower() not in _WAYPOINTS):
+            text, is_command = row[index], _COMMAND.fullmatch(header[index])
+            if _NO_WAYPOINT.fullmatch(text) or (is_command and text.lower() not in _WAYPOINTS):
                 raise FeatureProblemError(
                     f"line {number}: {header[index]} {text[:40]!r} is no waypoint",
                     "leave its row out, and draw it as a task of the mission",

@@ -129,6 +129,8 @@ def test_positions_of_another_unit_or_sign_are_refused(header: str) -> None:
         ("cmd", "NAV_LOITER_TIME"),
         ("action", "Takeoff"),
         ("Task", "rtl"),
+        ("action", "Return to home"),
+        ("command", "MAV_CMD_NAV_VTOL_LAND"),
     ],
 )
 def test_a_row_that_is_no_waypoint_stops_the_import(header: str, text: str) -> None:
@@ -142,6 +144,8 @@ def test_a_row_that_is_no_waypoint_stops_the_import(header: str, text: str) -> N
 
 def test_commands_that_are_waypoints_are_a_route() -> None:
     file = read("lat,lon,alt_m,command", "53,7,10,16", "54,8,10,MAV_CMD_NAV_WAYPOINT", "54,9,10,")
+    assert len(file.geometries) == 1
+    file = read("lat,lon,alt_m,action,cmd_id", "53,7,10,landscape,77", "54,8,10,take a photo,78")
     assert len(file.geometries) == 1
 
 
