@@ -23,6 +23,16 @@ ALTITUDE_FRAMES = ("relative", "amsl", "terrain")
 FILE_FRAMES = (*ALTITUDE_FRAMES, "ellipsoid")
 """What a file may say; `above_sea_level` makes the last of it "amsl"."""
 
+KML_FRAMES = {"relativeToGround": "terrain", "absolute": "amsl"}
+"""By the `altitudeMode` of KML."""
+
+KML_CLAMPED = ("clampToGround", "clampToSeaFloor")
+"""The modes of KML in which altitudes do not count."""
+
+_FRAME_KEYS = ("altitude_frame", "alt_frame", "altitude_f", "altitudemode", "altitudemo")
+"""The properties with a frame. The fields of shapefiles have ten characters; the last two are what
+GDAL makes of KML."""
+
 SPEEDS = "speeds_m_s"
 FRAMES = "altitude_frames"
 """The property, and the extended data of KML, with the speeds of a route's waypoints."""
@@ -120,7 +130,12 @@ def _parse(value: object, altitude_frame: str, depth: int) -> Point | Route | Ar
     if kind == "Feature" and depth <= 1:
         given = value.get("properties")
         properties: Mapping[str, Any] = given if isinstance(given, Mapping) else {}
-        geometry = _parse(value.get("geometry"), _frame(properties), depth=2)
+        frame, member = stated_frame(properties), value.get("geometry")
+        if frame in KML_CLAMPED:
+            frame = ""
+            if isinstance(member, Mapping):
+                member = {**member, "coordinates": _level(member.get("coordinates"))}
+        geometry = _parse(member, checked_frame(frame or "relative"), depth=2)
         geometry = with_frames(geometry, properties.get(FRAMES))
         return with_speeds(geometry, properties.get(SPEEDS))
     coordinates = value.get("coordinates")
@@ -204,9 +219,20 @@ def with_speeds(geometry: Point | Route | Area, value: object) -> Point | Route 
     return replace(geometry, speeds_m_s=speeds if is_given else ())
 
 
-def _frame(properties: Mapping[str, Any]) -> str:
-    frame = properties.get("altitude_frame")
-    return "relative" if frame is None else checked_frame(frame)
+def stated_frame(properties: Mapping[Any, Any]) -> str:
+    """Return the frame that a feature's properties say; "": none."""
+    lower = {str(key).lower(): value for key, value in properties.items()}
+    said = next((str(lower[key]) for key in _FRAME_KEYS if lower.get(key)), "")
+    return KML_FRAMES.get(said, said)
+
+
+def _level(coordinates: Any) -> Any:
+    """Return coordinates without their altitudes."""
+    if not isinstance(coordinates, list):
+        return coordinates
+    if coordinates and not isinstance(coordinates[0], list):
+        return coordinates[:2]
+    return [_level(each) for each in coordinates]
 
 
 def checked_frame(frame: object) -> str:

@@ -211,6 +211,29 @@ def with_frames(frames: object, geometry: object = LANE) -> dict[str, object]:
     return {"type": "Feature", "properties": {"altitude_frames": frames}, "geometry": geometry}
 
 
+@pytest.mark.parametrize(
+    ("mode", "height_m", "frame"),
+    [
+        ("absolute", 500.0, "amsl"),
+        ("relativeToGround", 500.0, "terrain"),
+        ("clampToGround", None, "relative"),
+        (None, 500.0, "relative"),
+    ],
+)
+def test_the_altitude_mode_that_gdal_hands_over_from_kml_is_the_frame(
+    mode: str | None, height_m: float | None, frame: str
+) -> None:
+    # GDAL 3.12.4 (its driver LIBKML) makes it a field of that name.
+    feature = {
+        "type": "Feature",
+        "properties": {"Name": "way", "altitudeMode": mode},
+        "geometry": {"type": "LineString", "coordinates": [[8, 47, 500], [8.1, 47, 500]]},
+    }
+    route = parse_geojson(feature)
+    assert isinstance(route, Route)
+    assert route == Route(((47, 8, height_m), (47, 8.1, height_m)), frame)
+
+
 def test_each_position_of_a_route_may_have_an_altitude_frame() -> None:
     route = parse_geojson(with_frames(["relative", "amsl", "terrain"]))
     assert isinstance(route, Route)

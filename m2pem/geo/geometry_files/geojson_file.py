@@ -7,7 +7,15 @@ from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 from m2pem.geo.file_text import decoded, parsed_json
-from m2pem.geo.geojson import FRAMES, GeometryError, as_geojson, check_crs, is_wgs84, parse_geojson
+from m2pem.geo.geojson import (
+    FRAMES,
+    GeometryError,
+    as_geojson,
+    check_crs,
+    is_wgs84,
+    parse_geojson,
+    stated_frame,
+)
 from m2pem.geo.geometry_files.contents import MAX_POSITIONS, Contents, NamedGeometry
 from m2pem.geo.geometry_files.csv_file import warn_of_fields
 
@@ -86,7 +94,7 @@ def read_feature(
         parts = _parts(geometry)
         if system is not None:
             given = properties if isinstance(properties, Mapping) else {}
-            frame = str(given.get("altitude_frame") or given.get(FRAMES) or "")
+            frame = stated_frame(given) or str(given.get(FRAMES) or "")
             parts = [
                 {**each, "coordinates": _in_wgs84(each.get("coordinates"), system, frame)}
                 if isinstance(each, Mapping)

@@ -17,6 +17,8 @@ from m2pem.geo.file_text import parsed_json
 from m2pem.geo.geojson import (
     FILE_FRAMES,
     FRAMES,
+    KML_CLAMPED,
+    KML_FRAMES,
     SPEEDS,
     GeometryError,
     checked,
@@ -44,8 +46,6 @@ from m2pem.geo.geometry_files.wpml import has_waylines, read_waylines
 from m2pem.mission.geometry import Area, Coordinate, Point, Route
 
 _KML = "http://www.opengis.net/kml/2.2"
-_FRAME_OF = {"relativeToGround": "terrain", "absolute": "amsl"}
-_CLAMPED = frozenset({"", "clampToGround", "clampToSeaFloor"})
 _MODE_OF = {"relative": "relativeToGround", "terrain": "relativeToGround", "amsl": "absolute"}
 _PARTS = ("MultiGeometry", "MultiTrack")
 _SINGLE = ("Point", "LineString", "LinearRing", "Polygon", "Track", "Model", *_PARTS)
@@ -170,13 +170,13 @@ def _geometry(
     mode = _mode(element)
     if local == "Model":
         raise FeatureProblemError("a Model is not read", "give its place as a Point")
-    if not own_frame and mode not in _CLAMPED and mode not in _FRAME_OF:
+    if not own_frame and mode not in ("", *KML_CLAMPED, *KML_FRAMES):
         is_known = "is above the sea floor" if mode == "relativeToSeaFloor" else "is not known"
         raise FeatureProblemError(
-            f"altitudeMode {mode!r} {is_known}", f"one of clampToGround, {', '.join(_FRAME_OF)}"
+            f"altitudeMode {mode!r} {is_known}", f"one of clampToGround, {', '.join(KML_FRAMES)}"
         )
-    keeps = bool(own_frame) or mode in _FRAME_OF
-    frame = own_frame or _FRAME_OF.get(mode, "relative")
+    keeps = bool(own_frame) or mode in KML_FRAMES
+    frame = own_frame or KML_FRAMES.get(mode, "relative")
     if local == "Polygon":
         rings = [
             _raised(element, coordinates(ring, keeps))

@@ -8,7 +8,7 @@ from typing import Any
 
 import shapefile
 
-from m2pem.geo.geojson import GeometryError
+from m2pem.geo.geojson import GeometryError, stated_frame
 from m2pem.geo.geometry_files.archive import Archive, archive_of, member
 from m2pem.geo.geometry_files.contents import MAX_FEATURES, Contents, FeatureProblemError
 from m2pem.geo.geometry_files.csv_file import warn_of_fields
@@ -16,8 +16,6 @@ from m2pem.geo.geometry_files.geojson_file import read_feature
 from m2pem.geo.geometry_files.reference_system import ReferenceSystem, system_named, system_of_wkt
 
 _NAME_FIELDS = ("name", "title", "label", "id")
-_FRAME_FIELDS = ("altitude_frame", "alt_frame", "altitude_f")
-"""Names of fields have at most ten characters."""
 
 _POINTS = frozenset({shapefile.POINT, shapefile.POINTM, shapefile.POINTZ})
 _MULTIPOINTS = frozenset({shapefile.MULTIPOINT, shapefile.MULTIPOINTM, shapefile.MULTIPOINTZ})
@@ -95,7 +93,7 @@ def _read_shapes(
         if shape.shapeType == shapefile.NULL:
             contents.warn(where, "has no geometry")
             continue
-        frame = next((str(lower[key]) for key in _FRAME_FIELDS if lower.get(key)), "")
+        frame = stated_frame(values)
         if not frame and shape.shapeType in _WITH_Z and not warned:
             warned = True
             of = f" of {system.name!r} are converted to" if system.has_heights else " are taken as"

@@ -17,11 +17,17 @@ WGS84 = CRS("EPSG:4326").to_wkt("WKT1_ESRI")
 Draw = Callable[[shapefile.Writer], object]
 
 
-def read(shape_type: int, *shapes: Draw, frame: str = "", projection: str = WGS84) -> GeometryFile:
-    """Read an archive with a layer of these shapes, all with this `alt_frame`."""
+def read(
+    shape_type: int,
+    *shapes: Draw,
+    frame: str = "",
+    projection: str = WGS84,
+    field: str = "ALT_FRAME",
+) -> GeometryFile:
+    """Read an archive with a layer of these shapes, all with this `frame` in this field."""
     shp, shx, dbf = BytesIO(), BytesIO(), BytesIO()
     with shapefile.Writer(shp=shp, shx=shx, dbf=dbf, shapeType=shape_type) as out:
-        out.field("ALT_FRAME", "C")
+        out.field(field, "C")
         for draw in shapes:
             draw(out)
             out.record(frame)
@@ -113,6 +119,18 @@ def test_a_layer_of_a_projection_is_converted_with_its_heights_in_feet() -> None
     assert point.position == pytest.approx((0.0, 3.0, 30.48))
     assert point.altitude_frame == "amsl"
     assert "are converted to altitudes above mean sea level" in str(file.problems[0])
+
+
+def test_the_altitude_mode_that_gdal_hands_over_from_kml_is_the_frame() -> None:
+    # GDAL 3.12.4 cuts the name of the field `altitudeMode` of its driver LIBKML to ten characters.
+    def draw(out: shapefile.Writer) -> None:
+        out.pointz(7, 53, 50)
+
+    file = read(shapefile.POINTZ, draw, frame="relativeToGround", field="altitudeMo")
+    assert file.problems == ()
+    assert file.geometries[0].geometry == Point((53.0, 7.0, 50.0), "terrain")
+    file = read(shapefile.POINTZ, draw, frame="clampToGround", field="altitudeMo")
+    assert file.geometries[0].geometry == Point((53.0, 7.0, None))
 
 
 def test_a_layer_beyond_the_limit_of_positions_is_refused_before_it_is_read() -> None:
