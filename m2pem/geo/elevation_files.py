@@ -25,8 +25,11 @@ _SIDES = {2 * side * side: side for side in (1201, 3601)}
 
 _SPACES = str.maketrans(" -", "__")
 _VOID = -32768
+_VOIDS = (_VOID, -32767, -9999)
+"""Samples without a value in files that do not say so."""
+
 _LOWEST_M, _HIGHEST_M = -12_000, 9_000
-"""No ground is beyond: files whose voids are -32768 do not always say so."""
+"""No ground is beyond."""
 
 _DIGITS = 6
 """Of a place between samples: what is nearer to one of them is at it, whatever rounding did."""
@@ -105,8 +108,8 @@ class Raster:
             self._scale, self._offset = self._data.scales[0], self._data.offsets[0]
         except (RasterioError, OSError) as error:
             raise TerrainError(f"{path}: cannot be read as GeoTIFF: {error}") from None
-        if self._data.crs is None:
-            raise TerrainError(f"{path}: does not say its projection; georeference it")
+        if self._data.crs is None or self._data.transform.is_identity:
+            raise TerrainError(f"{path}: does not say its projection or place; georeference it")
         if self._data.colorinterp[0].name not in ("gray", "undefined"):
             raise TerrainError(f"{path}: is a picture: its first band holds colors, not heights")
         try:
@@ -172,8 +175,10 @@ class Raster:
             values = self._data.read(1, window=((row, row + 1), (column, column + 1)), masked=True)
         except (RasterioError, OSError) as error:
             raise TerrainError(f"{self._data.name}: is damaged: {error}") from None
-        height_m: float = (float(values.data[0, 0]) * self._scale + self._offset) * self._unit_m
-        return None if values.mask.any() or not _LOWEST_M < height_m < _HIGHEST_M else height_m
+        value = float(values.data[0, 0])
+        height_m: float = (value * self._scale + self._offset) * self._unit_m
+        known = value not in _VOIDS and _LOWEST_M < height_m < _HIGHEST_M and not values.mask.any()
+        return height_m if known else None
 
 
 def _between(row: float, column: float, sample: _Sample) -> float | None:

@@ -6,6 +6,7 @@ files need the extra `terrain`.
 """
 
 import math
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
@@ -25,6 +26,10 @@ MOST_SAMPLES = 2_000
 """Of a profile: over a longer route they are farther apart."""
 
 _TIFF = (".tif", ".tiff")
+_BESIDE_HEIGHTS = re.compile(
+    r"\.|ASTGTM.*_num\.|ALPSML.*_(MSK|STK|LST)\.|.*_(EDM|FLM|HEM|WBM)\.", re.I
+)
+"""Hidden files, and what Copernicus, ASTER and ALOS have beside heights: masks, counts, errors."""
 _FILES_BESIDE = 2
 """At a corner, files beside the file beside may be needed: where spacings differ."""
 
@@ -49,6 +54,8 @@ class Terrain:
             remedy = unreadable_remedy(error)
             raise TerrainError(f"{folder}: cannot be read: {error.strerror}; {remedy}") from None
         for file in files:
+            if _BESIDE_HEIGHTS.match(file.name):
+                continue
             corner = corner_of(file)
             if corner is not None:
                 self._tiles[corner] = file

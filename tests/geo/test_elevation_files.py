@@ -159,17 +159,24 @@ def test_what_is_no_data_is_found_before_the_scale(tmp_path: Path) -> None:
     assert height(tmp_path) is None
 
 
-@pytest.mark.parametrize("void", [-32768, -32767, -9999 * 3, 32767])
+@pytest.mark.parametrize("void", [-32768, -32767, -9999, -9999 * 3, 32767])
+@pytest.mark.parametrize("said", [{}, {"scale": 0.9}])
 def test_what_no_ground_can_be_is_not_known_even_if_the_file_does_not_say_so(
-    tmp_path: Path, void: int
+    tmp_path: Path, void: int, said: dict[str, Any]
 ) -> None:
-    write(tmp_path / "dem.tif", void, dtype="int16")
+    write(tmp_path / "dem.tif", void, dtype="int16", **said)
     assert height(tmp_path) is None
 
 
 def test_a_unit_that_is_not_known_is_refused(tmp_path: Path) -> None:
     write(tmp_path / "dem.tif", 20, unit="fathom")
     with pytest.raises(TerrainError, match="its heights are in 'fathom'; known are metres, feet"):
+        height(tmp_path)
+
+
+def test_a_file_that_does_not_say_where_it_is_is_refused(tmp_path: Path) -> None:
+    write(tmp_path / "dem.tif", transform=Affine.identity())
+    with pytest.raises(TerrainError, match="does not say its projection or place"):
         height(tmp_path)
 
 
@@ -267,6 +274,28 @@ def test_a_file_of_the_whole_world_meets_itself_at_the_date_line(tmp_path: Path)
     assert height(tmp_path, (10, 179.9)) == pytest.approx(179.5)
     assert height(tmp_path, (10, -179.9)) == pytest.approx(179.5)
     assert height(tmp_path, (10, -170)) == pytest.approx(170)
+
+
+@pytest.mark.parametrize(
+    ("heights", "beside"),
+    [
+        (
+            "Copernicus_DSM_COG_10_N38_00_W078_00_DEM.tif",
+            "Copernicus_DSM_COG_10_N38_00_W078_00_EDM.tif",
+        ),
+        ("ASTGTMV003_N38W078_dem.tif", "ASTGTMV003_N38W078_num.tif"),
+        ("ALPSMLC30_N038W078_DSM.tif", "ALPSMLC30_N038W078_MSK.tif"),
+    ],
+)
+def test_masks_and_counts_beside_the_heights_are_not_heights(
+    tmp_path: Path, heights: str, beside: str
+) -> None:
+    write(tmp_path / heights, -9999, nodata=-9999)
+    write(tmp_path / beside, 3, dtype="uint8")
+    (tmp_path / f"._{heights}").write_bytes(b"AppleDouble")
+    assert height(tmp_path) is None
+    write(tmp_path / heights, 60)
+    assert height(tmp_path) == 60
 
 
 def test_where_a_file_has_no_value_one_that_overlaps_it_has(tmp_path: Path) -> None:
