@@ -235,15 +235,15 @@ def _level(coordinates: Any) -> Any:
     return [_level(each) for each in coordinates]
 
 
-def checked_frame(frame: object) -> str:
-    """Return an altitude frame.
+def checked_frame(frame: object, where: str = "") -> str:
+    """Return an altitude frame; `where` is for the error.
 
     Raises:
         GeometryError: there is none of that name.
     """
     if frame not in FILE_FRAMES:
         hint = suggest(str(frame), FILE_FRAMES, "frames")
-        raise GeometryError(f"altitude_frame {frame!r} is not known; {hint}")
+        raise GeometryError(f"{where}altitude_frame {frame!r} is not known; {hint}")
     return str(frame)
 
 

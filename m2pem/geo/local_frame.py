@@ -102,8 +102,7 @@ class LocalFrame:
     @property
     def geocentric(self) -> tuple[float, float, float]:
         """The origin as x, y and z from the Earth's centre, in metres (ECEF, EPSG:4978)."""
-        latitude_deg, longitude_deg, _ = self.origin
-        return _geocentric(latitude_deg, longitude_deg, ellipsoidal_m(*self.origin))
+        return _geocentric(*self.origin[:2], ellipsoidal_m(*self.origin))
 
     def _ground_up_m(self, east_m: float, north_m: float) -> float:
         """Return how high the ground is there: below 0, as the Earth is round.

@@ -15,13 +15,13 @@ from lxml import etree
 
 from m2pem.geo.file_text import parsed_json
 from m2pem.geo.geojson import (
-    FILE_FRAMES,
     FRAMES,
     KML_CLAMPED,
     KML_FRAMES,
     SPEEDS,
     GeometryError,
     checked,
+    checked_frame,
     with_frames,
     with_speeds,
 )
@@ -140,9 +140,8 @@ def _read_placemark(placemark: Element, contents: Contents) -> None:
     where = f"placemark {name!r}" if name else f"placemark in line {line}"
     with contents.feature(where):
         frame = _data(placemark, "altitude_frame")
-        if frame and frame not in FILE_FRAMES:
-            known = ", ".join(FILE_FRAMES)
-            raise FeatureProblemError(f"altitude_frame {frame!r} is not known", f"one of {known}")
+        if frame:
+            checked_frame(frame)
         parts = [part for child in placemark for part in _parts(child)]
         read = [_geometry(part, frame, where, contents) for part in parts]
         if not read:

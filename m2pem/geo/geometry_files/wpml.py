@@ -8,17 +8,15 @@ planned. What a wayline commands besides is left out, with a warning that names 
 from collections import defaultdict
 from math import isfinite, nan
 
-from m2pem.geo.geoid import mean_sea_level_m
 from m2pem.geo.geojson import GeometryError
 from m2pem.geo.geometry_files.contents import Contents, FeatureProblemError
 from m2pem.geo.geometry_files.kml_elements import Element, child_text, coordinates
 from m2pem.mission.geometry import Coordinate, Route
 
-_ELLIPSOID = "WGS84"
 _FRAME_OF = {
     "relativeToStartPoint": "relative",
     "EGM96": "amsl",
-    _ELLIPSOID: "amsl",
+    "WGS84": "ellipsoid",
     "aboveGroundLevel": "terrain",
     "realTimeFollowSurface": "terrain",
 }
@@ -80,8 +78,6 @@ def _route(folder: Element) -> Route:
         if len(found) != 1:
             raise GeometryError(f"waypoint {number}: has {len(found)} positions")
         latitude, longitude, _ = found[0]
-        if mode == _ELLIPSOID:
-            height_m = mean_sea_level_m(latitude, longitude, height_m)
         waypoints.append((latitude, longitude, height_m))
         speed = child_text(placemark, "waypointSpeed")
         if not speed or child_text(placemark, "useGlobalSpeed") == "1":
@@ -110,7 +106,7 @@ def _height(placemark: Element, folder: Element, mode: str) -> str:
     # Of the two heights of a template only the one for all is above the start point in each mode.
     if mode == "relativeToStartPoint" and child_text(placemark, "useGlobalHeight") == "1":
         return child_text(folder, "globalHeight")
-    return child_text(placemark, "ellipsoidHeight" if mode == _ELLIPSOID else "height")
+    return child_text(placemark, "ellipsoidHeight" if mode == "WGS84" else "height")
 
 
 def _number(text: str, what: str, waypoint: int) -> float:
