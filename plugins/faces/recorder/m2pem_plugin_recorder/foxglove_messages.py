@@ -37,6 +37,7 @@ from m2pem_plugin_recorder.channels import (
     Schema,
 )
 
+_Enu = tuple[float, float, float]
 MAP = "map"
 LINE_PX = 2.0
 LABEL_PX = 14.0
@@ -115,8 +116,10 @@ def vehicle_messages(state: VehicleState, frame: LocalFrame) -> Iterator[Channel
 def footprint_messages(state: PayloadState, frame: LocalFrame) -> Iterator[ChannelMessage]:
     """Yield what a payload sees of the ground, as a part of the scene."""
     if state.footprint:
-        corners = [(p.latitude_deg, p.longitude_deg, p.altitude_m) for p in state.footprint]
-        line = _line(corners, frame, _BLUE, closed=True)
+        corners = [
+            frame.to_enu(p.latitude_deg, p.longitude_deg, p.altitude_m) for p in state.footprint
+        ]
+        line = _line(corners, _BLUE, closed=True)
         yield _scene(f"footprint {state.resource}", state.time_us, [line], [])
 
 
@@ -151,18 +154,20 @@ def scene_message(
     colour = _RED if is_fence else _GREEN if isinstance(geometry, Area) else _ORANGE
     match geometry:
         case Route(waypoints=waypoints):
-            lines = [_line(waypoints, frame, colour, closed=False)]
-            corner = waypoints[0]
-        case Area(rings=rings):
-            lines = [_line(ring[:-1], frame, colour, closed=True) for ring in rings]
-            corner = rings[0][0]
-        case Point(position=position):
-            lines, corner = [], position
+            frames = geometry.frames
+            way = [_enu(*each, frame) for each in zip(waypoints, frames, strict=True)]
+            lines, corner = [_line(way, colour, closed=False)], way[0]
+        case Area(rings, above):
+            outlines = [[_enu(each, above, frame) for each in ring[:-1]] for ring in rings]
+            lines, corner = [_line(each, colour, closed=True) for each in outlines], outlines[0][0]
+        case Point(position, above):
+            lines, corner = [], _enu(position, above, frame)
         case _:
             return None
+    x, y, z = corner
     label = fg.TextPrimitive(
         pose=fg.Pose(
-            position=_vector(corner, frame), orientation=fg.Quaternion(x=0, y=0, z=0, w=1)
+            position=fg.Vector3(x=x, y=y, z=z), orientation=fg.Quaternion(x=0, y=0, z=0, w=1)
         ),
         billboard=True,
         font_size=LABEL_PX,
@@ -227,7 +232,7 @@ def _scene(name: str, time_us: int, lines: list[Any], texts: list[Any]) -> Chann
     return ChannelMessage(foxglove_channel(SCENE, fg.SceneUpdate), time_us, update.encode())
 
 
-def _line(places: Any, frame: LocalFrame, colour: fg.Color, *, closed: bool) -> fg.LinePrimitive:
+def _line(corners: Iterable[_Enu], colour: fg.Color, *, closed: bool) -> fg.LinePrimitive:
     kinds = fg.LinePrimitiveLineType
     return fg.LinePrimitive(
         type=kinds.LineLoop if closed else kinds.LineStrip,
@@ -236,21 +241,14 @@ def _line(places: Any, frame: LocalFrame, colour: fg.Color, *, closed: bool) -> 
         ),
         thickness=LINE_PX,
         scale_invariant=True,
-        points=[_point(place, frame) for place in places],
+        points=[fg.Point3(x=x, y=y, z=z) for x, y, z in corners],
         color=colour,
     )
 
 
-def _point(place: Any, frame: LocalFrame) -> fg.Point3:
-    east, north, up = _enu(place, frame)
-    return fg.Point3(x=east, y=north, z=up)
-
-
-def _vector(place: Any, frame: LocalFrame) -> fg.Vector3:
-    east, north, up = _enu(place, frame)
-    return fg.Vector3(x=east, y=north, z=up)
-
-
-def _enu(place: Any, frame: LocalFrame) -> tuple[float, float, float]:
-    """Return a place on the ground of the origin: the altitudes of geometries count from home."""
-    return frame.to_enu(place[0], place[1], frame.origin[2])
+def _enu(place: tuple[float, float, float | None], altitude_frame: str, frame: LocalFrame) -> _Enu:
+    """Return a place in `map`; altitudes from home or the ground are drawn above the origin."""
+    latitude_deg, longitude_deg, altitude_m = place
+    is_above_sea = altitude_m is not None and altitude_frame == "amsl"
+    base_m = 0.0 if is_above_sea else frame.origin[2]
+    return frame.to_enu(latitude_deg, longitude_deg, base_m + (altitude_m or 0.0))
