@@ -283,10 +283,8 @@ def write_kml(geometries: Sequence[NamedGeometry]) -> bytes:
 
 
 def _write_geometry(placemark: Element, geometry: Point | Route | Area) -> None:
-    mode = _MODE_OF[geometry.altitude_frame]
-    if isinstance(geometry, Route) and geometry.altitude_frames:
-        mode = "clampToGround"  # one mode holds for all of a line
     if isinstance(geometry, Area):
+        mode = _mode_of(geometry.rings[0], geometry.altitude_frame)
         polygon = _child(placemark, "Polygon")
         _child(polygon, "altitudeMode", mode)
         for index, ring in enumerate(geometry.rings):
@@ -296,8 +294,18 @@ def _write_geometry(placemark: Element, geometry: Point | Route | Area) -> None:
     point = isinstance(geometry, Point)
     positions = (geometry.position,) if isinstance(geometry, Point) else geometry.waypoints
     element = _child(placemark, "Point" if point else "LineString")
+    if not point:
+        _child(element, "tessellate", "1")  # where it is clamped to the ground
+    # One mode holds for all of a line.
+    mixed = isinstance(geometry, Route) and geometry.altitude_frames
+    mode = _mode_of(() if mixed else positions, geometry.altitude_frame)
     _child(element, "altitudeMode", mode)
     _child(element, "coordinates", _written(positions))
+
+
+def _mode_of(positions: Sequence[Coordinate], frame: str) -> str:
+    has_altitude = any(altitude_m is not None for _, _, altitude_m in positions)
+    return _MODE_OF[frame] if has_altitude else "clampToGround"
 
 
 def _written(positions: Sequence[Coordinate]) -> str:

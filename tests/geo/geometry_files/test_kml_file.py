@@ -8,9 +8,15 @@ from io import BytesIO
 import pytest
 
 from m2pem.findings import Severity
-from m2pem.geo.geometry_files import GeometryFile, read_geometry_file
+from m2pem.geo.geometry_files import (
+    FileFormat,
+    GeometryFile,
+    NamedGeometry,
+    read_geometry_file,
+    write_geometry_file,
+)
 from m2pem.geo.geometry_files.contents import MAX_POSITIONS
-from m2pem.mission.geometry import Geometry, Point, Route
+from m2pem.mission.geometry import Area, Geometry, Point, Route
 
 LINE = "<Placemark><name>{}</name><LineString>{}<coordinates>7,53,5 8,54,6</coordinates>"
 LINE += "</LineString></Placemark>"
@@ -180,6 +186,15 @@ def test_documents_of_old_versions_and_without_a_namespace_are_read(version: str
     declared = f'xmlns="{version}"' if version else ""
     body = LINE.format("a", "<altitudeMode>absolute</altitudeMode>")
     assert found(read(f"<kml {declared}><Folder>{body}</Folder></kml>")) == {"a": line("amsl")}
+
+
+def test_a_geometry_without_altitudes_is_written_as_clamped_to_the_ground() -> None:
+    way = ((53.0, 7.0, None), (54.0, 8.0, None))
+    area = Area(((*way, (53.0, 8.0, None), way[0]),))
+    for geometry in (Point(way[0]), Route(way), area):
+        text = write_geometry_file(FileFormat.KML, [NamedGeometry("a", geometry)])
+        assert b"<altitudeMode>clampToGround</altitudeMode>" in text
+        assert found(read(text.decode())) == {"a": geometry}
 
 
 # --- links within an archive --------------------------------------------------------------------

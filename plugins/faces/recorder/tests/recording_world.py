@@ -18,6 +18,9 @@ from m2pem.api import Area, FaceSettings, Fleet, MissionControl, Point, Route, a
 from m2pem.testing.scenarios import fleet, one_after_another
 
 GATE = (38.1080, -77.3190, None)
+MAST = Point((38.1075, -77.3192, 60.0), "ellipsoid")
+"""Above mean sea level it is 33.97 m higher: the undulation by PROJ 9.5.1 with egm96_15.gtx."""
+
 HOME = (38.1075, -77.3192, None)
 ROAD = Route((HOME, GATE))
 _CORNERS = ((38.105, -77.322), (38.110, -77.322), (38.110, -77.316), (38.105, -77.316))
@@ -65,6 +68,7 @@ vehicles:
 points:
   gate: gate.geojson
   home: home.geojson
+  mast: mast.geojson
 """
 
 
@@ -72,8 +76,8 @@ def write_fleet(folder: Path) -> None:
     """Write the fleet file and the mission into a folder."""
     (folder / "fleet.yaml").write_text(FLEET)
     (folder / "drive.bpmn").write_bytes(DRIVE)
-    for name, place in (("gate", GATE), ("home", HOME)):
-        (folder / f"{name}.geojson").write_bytes(msgspec.json.encode(as_geojson(Point(place))))
+    for name, point in (("gate", Point(GATE)), ("home", Point(HOME)), ("mast", MAST)):
+        (folder / f"{name}.geojson").write_bytes(msgspec.json.encode(as_geojson(point)))
 
 
 @contextmanager

@@ -14,6 +14,7 @@ import pyarrow.parquet
 import pytest
 import shapely
 import shapely.geometry
+from fastkml.enums import AltitudeMode
 from m2pem_plugin_recorder.export.xes import XesExporter
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
@@ -276,8 +277,11 @@ def test_kml_has_tracks_and_places(folder: Path) -> None:
     document = fastkml.KML.parse(folder / "runs.kml").features[0]
     assert [each.name for each in document.features] == ["r1 drive.bpmn", "r2 drive.bpmn"]
     placemarks = {each.name: each for each in document.features[0].features}
-    assert set(placemarks) == {"gate", "home", "ugv1", "ugv2"}
+    assert set(placemarks) == {"gate", "home", "mast", "ugv1", "ugv2"}
     assert placemarks["gate"].geometry.coords[0][:2] == (GATE[1], GATE[0])
+    assert placemarks["gate"].kml_geometry.altitude_mode == AltitudeMode.clamp_to_ground
+    assert placemarks["mast"].geometry.coords[0][2] == pytest.approx(93.97, abs=0.01)
+    assert placemarks["mast"].kml_geometry.altitude_mode == AltitudeMode.absolute
     times = [item.when.dt for item in placemarks["ugv1"].kml_geometry.track_items]
     assert times == sorted(times)
     assert len(times) > 10

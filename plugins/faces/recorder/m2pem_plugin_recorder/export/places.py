@@ -13,13 +13,16 @@ from m2pem.api import (
     Detection,
     ExportedRun,
     ExportOptions,
+    FileFormat,
     GeoPosition,
+    NamedGeometry,
     PayloadState,
     Point,
     Route,
     VehicleState,
     as_geojson,
     parse_geojson,
+    write_geometry_file,
 )
 from m2pem.api import records as r
 from m2pem.errors import M2pemError
@@ -154,8 +157,10 @@ class KmlExporter:
         places = places_of(run, self._states)
         folder = _kml(self._document, "Folder")
         _kml(folder, "name", f"{run.summary.run} {run.summary.mission}".strip())
-        for name, geometry in places.geometries.items():
-            _add_geometry(_placemark(folder, name), geometry)
+        named = [NamedGeometry(xml_text(name), each) for name, each in places.geometries.items()]
+        if named:
+            drawn = etree.fromstring(write_geometry_file(FileFormat.KML, named))
+            folder.extend(drawn.iter(f"{{{_KML}}}Placemark"))
         for vehicle, track in places.tracks.items():
             element = etree.SubElement(_placemark(folder, vehicle), f"{{{_GX}}}Track")
             _kml(element, "altitudeMode", "absolute")  # above mean sea level
@@ -176,27 +181,6 @@ class KmlExporter:
         tree = etree.ElementTree(self._kml)
         tree.write(self._output, encoding="UTF-8", xml_declaration=True, pretty_print=True)
         return self._states.remarks
-
-
-def _add_geometry(placemark: etree._Element, geometry: Point | Route | Area) -> None:
-    """Add a geometry on the ground: altitudes of geometries count from home."""
-    match geometry:
-        case Point(position=position):
-            _kml(_kml(placemark, "Point"), "coordinates", _ground([position]))
-        case Route(waypoints=waypoints):
-            line = _kml(placemark, "LineString")
-            _kml(line, "tessellate", "1")
-            # A line needs two places.
-            _kml(line, "coordinates", _ground(waypoints if len(waypoints) > 1 else waypoints * 2))
-        case Area(rings=rings):
-            polygon = _kml(placemark, "Polygon")
-            for index, ring in enumerate(rings):
-                boundary = _kml(polygon, "innerBoundaryIs" if index else "outerBoundaryIs")
-                _kml(_kml(boundary, "LinearRing"), "coordinates", _ground(ring))
-
-
-def _ground(places: Sequence[Sequence[float | None]]) -> str:
-    return " ".join(f"{place[1]},{place[0]}" for place in places)
 
 
 def _placemark(folder: etree._Element, name: str) -> etree._Element:
