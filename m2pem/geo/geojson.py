@@ -63,27 +63,21 @@ def parse_geojson(value: Mapping[str, Any]) -> Point | Route | Area:
 def above_sea_level(geometry: Point | Route | Area) -> Point | Route | Area:
     """Return a geometry whose altitudes count from the ellipsoid with those above mean sea level;
     any other one as it is."""
-    frames = geometry.frames if isinstance(geometry, Route) else (geometry.altitude_frame,)
-    if "ellipsoid" not in frames:
-        return geometry
     match geometry:
-        case Point(position):
-            return replace(geometry, position=_lowered(position), altitude_frame="amsl")
-        case Route(waypoints):
-            places = [
-                _lowered(each) if frame == "ellipsoid" else each
-                for each, frame in zip(waypoints, frames, strict=True)
-            ]
-            named = ["amsl" if each == "ellipsoid" else each for each in frames]
-            return Route.of(places, named, geometry.speeds_m_s)
-        case Area(rings):
-            lowered = tuple(tuple(map(_lowered, ring)) for ring in rings)
-            return replace(geometry, rings=lowered, altitude_frame="amsl")
+        case Point(position, "ellipsoid"):
+            return Point(_lowered(position), "amsl")
+        case Area(rings, "ellipsoid"):
+            return Area(tuple(tuple(map(_lowered, ring)) for ring in rings), "amsl")
+        case Route(waypoints) if "ellipsoid" in geometry.frames:
+            frames = ["amsl" if each == "ellipsoid" else each for each in geometry.frames]
+            places = map(_lowered, waypoints, geometry.frames)
+            return Route.of(places, frames, geometry.speeds_m_s)
+    return geometry
 
 
-def _lowered(place: Coordinate) -> Coordinate:
+def _lowered(place: Coordinate, frame: str = "ellipsoid") -> Coordinate:
     latitude_deg, longitude_deg, height_m = place
-    if height_m is None:
+    if height_m is None or frame != "ellipsoid":
         return place
     return latitude_deg, longitude_deg, mean_sea_level_m(latitude_deg, longitude_deg, height_m)
 
