@@ -29,7 +29,7 @@ KML_FRAMES = {"relativeToGround": "terrain", "absolute": "amsl"}
 KML_CLAMPED = ("clampToGround", "clampToSeaFloor")
 """The modes of KML in which altitudes do not count."""
 
-_FRAME_KEYS = ("altitude_frame", "alt_frame", "altitude_f", "altitudemode", "altitudemo")
+FRAME_KEYS = ("altitude_frame", "alt_frame", "altitude_f", "altitudemode", "altitudemo")
 """The properties with a frame. The fields of shapefiles have ten characters; the last two are what
 GDAL makes of KML."""
 
@@ -216,7 +216,7 @@ def with_speeds(geometry: Point | Route | Area, value: object) -> Point | Route 
 def stated_frame(properties: Mapping[Any, Any]) -> str:
     """Return the frame that a feature's properties say; "": none."""
     lower = {str(key).lower(): value for key, value in properties.items()}
-    said = next((str(lower[key]) for key in _FRAME_KEYS if lower.get(key)), "")
+    said = next((str(lower[key]) for key in FRAME_KEYS if lower.get(key)), "")
     return KML_FRAMES.get(said, said)
 
 
