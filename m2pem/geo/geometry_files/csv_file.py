@@ -11,6 +11,7 @@ from typing import TypeAlias
 from m2pem.geo.file_text import decoded
 from m2pem.geo.geojson import (
     FILE_FRAMES,
+    FRAME_KEYS,
     FRAMES,
     SPEEDS,
     GeometryError,
@@ -295,7 +296,7 @@ def _columns(
 
 def warn_of_fields(names: Iterable[str], where: str, contents: Contents) -> None:
     """Warn of fields beside geometries that say how to fly, and are not read."""
-    known = (SPEEDS, FRAMES, "altitude_frame", "alt_frame", "altitude_f")
+    known = (SPEEDS, FRAMES, *FRAME_KEYS)
     found = [
         name
         for name in dict.fromkeys(names)
