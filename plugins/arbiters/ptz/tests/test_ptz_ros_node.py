@@ -101,6 +101,7 @@ async def test_a_payload_that_is_not_there_is_lost_and_is_not_commanded(
     ros_domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("m2pem_plugin_ros.arbiter.FIRST_CONTACT_WITHIN_S", 0.5)
+    monkeypatch.setattr("m2pem_plugin_ros.vehicle.FOUND_WITHIN_S", 0.5)
     clock = SystemClock(10.0)
     arbiter = RosArbiter({CAMERA: connection(CAMERA, ros_domain)}, context(clock))
     async with ArbiterHarness(arbiter, clock) as bench:
@@ -113,7 +114,7 @@ async def test_a_payload_that_is_not_there_is_lost_and_is_not_commanded(
         await bench.start("r1.b1", "zoom", CAMERA, level=2.0)
         report = await bench.ended("r1.b1", AMPLE_S)
         assert report.state is BehaviorState.REJECTED
-        assert "no message ever" in report.reason
+        assert "not discovered within 0.5 s: /ugv1/ptz/vehicle_status" in report.reason
 
 
 def test_a_mission_gets_the_pictures_that_a_payload_with_a_node_took(
