@@ -5,7 +5,8 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from pymavlink import mavwp
+from pymavlink import mavutil, mavwp
+from pymavlink.dialects.v20 import ardupilotmega
 
 from m2pem.findings import Severity
 from m2pem.geo.geometry_files import GeometryFile, read_geometry_file
@@ -231,7 +232,11 @@ def test_a_waypoint_of_another_frame_is_refused(frame: str) -> None:
     result="the same places and frames",
     package="pymavlink",
 )
-def test_places_and_frames_are_those_that_pymavlink_reads(tmp_path: Path) -> None:
+def test_places_and_frames_are_those_that_pymavlink_reads(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MAVLINK20", "1")  # another test of the process may have set it
+    monkeypatch.setattr(mavutil, "mavlink", ardupilotmega)
     rows = ["# planned by hand", "", f"1 0 {A} 1", f"2 0 0{B[1:]} 1", f"3 0 10{A[1:]} 1"]
     path = tmp_path / "m.txt"
     path.write_text("\n".join(["QGC WPL 110", HOME, *rows, ""]))
