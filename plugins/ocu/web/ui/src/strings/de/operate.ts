@@ -137,7 +137,12 @@ export const operate: Translation<typeof english.operate> = {
     altitude: "Höhe m",
     speed: "Tempo ab hier m/s",
     above: "Höhen über",
-    frames: { relative: "dem Startpunkt", amsl: "dem Meeresspiegel", terrain: "dem Gelände" },
+    frames: {
+      relative: "dem Startpunkt",
+      amsl: "dem Meeresspiegel",
+      terrain: "dem Gelände",
+      ellipsoid: "dem Ellipsoid",
+    },
     addCentre: "Kartenmitte hinzufügen",
     vertex: "Stützpunkt {number}",
     removeVertex: "Stützpunkt {number} entfernen",
