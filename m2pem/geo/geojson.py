@@ -33,9 +33,8 @@ FRAME_KEYS = ("altitude_frame", "alt_frame", "altitude_f", "altitudemode", "alti
 """The properties with a frame. The fields of shapefiles have ten characters; the last two are what
 GDAL makes of KML."""
 
-SPEEDS = "speeds_m_s"
-FRAMES = "altitude_frames"
-"""The property, and the extended data of KML, with the speeds of a route's waypoints."""
+SPEEDS, FRAMES = "speeds_m_s", "altitude_frames"
+"""The properties, and the extended data of KML, with a value for each waypoint of a route."""
 
 _ROUNDING_DEG = 1e-9
 """Within it a longitude beyond 180 degrees is 180: that of Natural Earth is 180.00000000000014."""
