@@ -141,6 +141,11 @@ def test_one_of_a_service_is(place):
     assert warned(around(f'<{place} id="T" camunda:type="external" camunda:topic="t"/>')) == []
 
 
+def test_the_work_that_an_element_template_of_a_fleet_names_is_done():
+    own = WORKER.replace("mail", "m2pem:routing")
+    assert warned(around(f'<scriptTask id="T">{own}</scriptTask>')) == []
+
+
 def looping(expression):
     """Camunda 8 counts instances from 1 (8.7, "Multi-instance")."""
     return around(

@@ -169,6 +169,8 @@ def _say_effect(tree: Tree, element: etree._Element, owner: etree._Element) -> b
     elif name == "adHoc" and element.get("outputCollection"):
         effect, beside = AD_HOC_OUTPUT, " outputCollection"
     elif name == "taskDefinition" and owner.tag not in SERVING:
+        if element.get("type", "").startswith("m2pem:"):  # by the element templates of a fleet
+            return True
         effect = NOT_SERVING
     elif name == "loopCharacteristics" and b"loopCounter" in etree.tostring(parent(owner)):
         effect = COUNTED
