@@ -1,14 +1,11 @@
 """Operations on alerts and incidents."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 from m2pem.api.alerts import OperatorAlert
 from m2pem.api.runs import IncidentPreview, OpenIncident, RunId
 from m2pem.mission.values import Value
-
-if TYPE_CHECKING:
-    pass
 
 
 class AlertControl(Protocol):

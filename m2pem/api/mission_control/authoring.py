@@ -1,7 +1,7 @@
 """Operations on missions that are written: check, verify, rehearse, estimate and approve them."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 from m2pem.api.approval import MissionApproval
 from m2pem.api.authoring import (
@@ -17,9 +17,6 @@ from m2pem.api.estimates import MissionEstimate
 from m2pem.api.runs import SimulationResult
 from m2pem.findings import Finding
 from m2pem.mission.values import Value
-
-if TYPE_CHECKING:
-    pass
 
 
 class AuthoringControl(Protocol):

@@ -1,13 +1,10 @@
 """Operations between operators: who is present, and who asks whom for a vehicle or payload."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 from m2pem.api.people import OpenControlRequest, OperatorPresence
 from m2pem.api.runs import RunId
-
-if TYPE_CHECKING:
-    pass
 
 
 class OperatorControl(Protocol):

@@ -1,13 +1,10 @@
 """Operations on vehicles and payloads: who has them, and who waits for them."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 from m2pem.api.allocation import SharedSpaceState, TakeEffect, WaitingTask
 from m2pem.mission.catalogue import ResourceId
-
-if TYPE_CHECKING:
-    pass
 
 
 class ResourceControl(Protocol):

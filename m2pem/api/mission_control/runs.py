@@ -1,15 +1,12 @@
 """Operations on runs: begin them, steer them, answer them, end them."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 from m2pem.api.allocation import StartPreview
 from m2pem.api.authoring import MissionSource
 from m2pem.api.runs import RunId
 from m2pem.mission.values import Value
-
-if TYPE_CHECKING:
-    pass
 
 
 class RunControl(Protocol):

@@ -1,15 +1,12 @@
 """Operations on the schedule of missions."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 from m2pem.api.authoring import MissionSource
 from m2pem.api.runs import RunId
 from m2pem.api.schedule import WHEN_FREE, EntryId, Schedule, When
 from m2pem.mission.values import Value
-
-if TYPE_CHECKING:
-    pass
 
 
 class ScheduleControl(Protocol):
