@@ -46,6 +46,8 @@ class _Token(msgspec.Struct, array_like=True):
 
 
 class _Snapshot(msgspec.Struct, array_like=True):
+    """A view: its attributes of these names. The last four have another form there."""
+
     summary: RunSummary
     seq: int
     t_s: float
@@ -53,28 +55,30 @@ class _Snapshot(msgspec.Struct, array_like=True):
     breakpoints: r.BreakpointsSet | None
     reached: r.BreakpointReached | None
     stepping: bool
-    paused_us: int
-    paused_at_us: int
-    elements: list[tuple[Place, ElementState]]
+    _paused_us: int
+    _paused_at_us: int
+    elements: dict[Place, ElementState]
     scopes: dict[int, Scope]
+    behaviors: dict[str, Behavior]
+    allocations: dict[str, Allocation]
+    services: dict[str, Service]
+    prompts: dict[str, r.PromptOpened]
+    incidents: dict[str, r.IncidentOpened]
+    waits: dict[int, Wait]
+    kept: dict[str, r.ResourceKept]
+    holders: dict[str, str]
+    _ended_behaviors: dict[str, Behavior]
+    _ended_allocations: dict[str, Allocation]
+    _closed_prompts: dict[str, r.PromptOpened]
+    _past_waits: dict[int, Wait]
+    version: str
     tokens: list[_Token]
     finished: list[FinishedToken]
     completed: list[str]
-    behaviors: list[Behavior]
-    allocations: list[Allocation]
-    services: list[Service]
-    prompts: list[r.PromptOpened]
-    incidents: list[r.IncidentOpened]
-    waits: dict[int, Wait]
-    kept: list[r.ResourceKept]
-    holders: dict[str, str]
-    ended_behaviors: list[Behavior]
-    ended_allocations: list[Allocation]
-    closed_prompts: list[r.PromptOpened]
-    past_waits: list[tuple[int, Wait]]
-    requirements: list[RequirementState]
-    version: str
+    requirements: dict[str, RequirementState]
 
+
+_ATTRIBUTES = _Snapshot.__struct_fields__[:-4]
 
 _encode = msgspec.msgpack.Encoder().encode
 _decoder = msgspec.msgpack.Decoder(_Snapshot)
@@ -82,36 +86,14 @@ _decoder = msgspec.msgpack.Decoder(_Snapshot)
 
 def snapshot_of(view: RunView) -> bytes:
     """Return a view as bytes, without its mission and its newest records."""
+    attributes = {name: getattr(view, name) for name in _ATTRIBUTES}
     return _encode(
         _Snapshot(
-            view.summary,
-            view.seq,
-            view.t_s,
-            view.paused_by,
-            view.breakpoints,
-            view.reached,
-            view.stepping,
-            view._paused_us,
-            view._paused_at_us,
-            list(view.elements.items()),
-            view.scopes,
-            [_token_of(each) for each in view.tokens.values()],
-            list(view.finished),
-            sorted(view.completed),
-            list(view.behaviors.values()),
-            list(view.allocations.values()),
-            list(view.services.values()),
-            list(view.prompts.values()),
-            list(view.incidents.values()),
-            view.waits,
-            list(view.kept.values()),
-            view.holders,
-            list(view._ended_behaviors.values()),
-            list(view._ended_allocations.values()),
-            list(view._closed_prompts.values()),
-            list(view._past_waits.items()),
-            list(view.requirements.values()),
-            view.version,
+            **attributes,
+            tokens=[_token_of(each) for each in view.tokens.values()],
+            finished=list(view.finished),
+            completed=sorted(view.completed),  # the same view has the same bytes
+            requirements=view.requirements,
         )
     )
 
@@ -127,29 +109,11 @@ def view_of(
     """
     read = _decoder.decode(snapshot)
     view = RunView(read.summary, mission, names)
-    view.seq, view.t_s = read.seq, read.t_s
-    view.paused_by = read.paused_by
-    view.breakpoints, view.reached = read.breakpoints, read.reached
-    view.stepping = read.stepping
-    view._paused_us, view._paused_at_us = read.paused_us, read.paused_at_us
-    view.elements = dict(read.elements)
-    view.scopes = read.scopes
+    for name in _ATTRIBUTES:
+        setattr(view, name, getattr(read, name))
     view.finished.extend(read.finished)
     view.completed = set(read.completed)
-    view.behaviors = {each.id: each for each in read.behaviors}
-    view.allocations = {each.id: each for each in read.allocations}
-    view.services = {each.id: each for each in read.services}
-    view.prompts = {each.prompt: each for each in read.prompts}
-    view.incidents = {each.incident: each for each in read.incidents}
-    view.waits = read.waits
-    view.kept = {each.keeping: each for each in read.kept}
-    view.holders = read.holders
-    view._ended_behaviors = {each.id: each for each in read.ended_behaviors}
-    view._ended_allocations = {each.id: each for each in read.ended_allocations}
-    view._closed_prompts = {each.prompt: each for each in read.closed_prompts}
-    view._past_waits = dict(read.past_waits)
-    view.requirements = RequirementStates({each.id: each for each in read.requirements})
-    view.version = read.version
+    view.requirements = RequirementStates(read.requirements)
     work: dict[str, Behavior | Service | Allocation] = {
         **view.behaviors,
         **view.allocations,

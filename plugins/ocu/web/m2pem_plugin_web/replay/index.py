@@ -33,7 +33,7 @@ NOTABLE = 6
 STOPS = 500
 """Stops at breakpoints that are kept, the last ones."""
 
-FORMAT = f"5 of m2pem {m2pem.__version__}"
+FORMAT = f"6 of m2pem {m2pem.__version__}"
 
 LEVEL = 1
 """Of zlib: the executive waits while a snapshot of a run that goes on is compressed."""
