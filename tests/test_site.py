@@ -1,5 +1,6 @@
 """The documentation builds without a warning, and its reference has all that plugins import."""
 
+import ast
 import importlib
 import os
 import re
@@ -88,6 +89,18 @@ def test_names_that_are_loaded_when_asked_for_are_all_there() -> None:
             assert getattr(package, name) is not None
         with pytest.raises(AttributeError, match="no attribute 'nothing'"):
             _ = package.nothing
+
+
+def test_type_checkers_find_every_name_of_the_api_where_it_is_loaded_from() -> None:
+    source = Path(m2pem.api.__file__).read_text(encoding="utf-8")
+    imports = next(each for each in ast.parse(source).body if isinstance(each, ast.If))
+    found = {
+        name.asname: each.module
+        for each in imports.body
+        if isinstance(each, ast.ImportFrom)
+        for name in each.names
+    }
+    assert found == m2pem.api._LAZY
 
 
 @pytest.mark.long
