@@ -1,6 +1,7 @@
 """The keys of alerts: the list, what is done about one, and the bell."""
 
 from rich.text import Text
+from textual import work
 
 from m2pem.api import OperatorAlert
 from m2pem.errors import M2pemError
@@ -12,16 +13,14 @@ from m2pem_plugin_terminal.dialogs import Choose, Read
 class Alerting(Deciding):
     """The executive's alerts, with who has seen them and who takes care."""
 
-    def action_alerts(self) -> None:
-        """List the alerts; the one that is chosen can be acknowledged and owned."""
-        self.run_worker(self._list_alerts(), exit_on_error=False)
-
     def action_toggle_bell(self) -> None:
         """Switch the bell on or off."""
         self.alarm_bell.on = not self.alarm_bell.on
         self.say("The bell rings" if self.alarm_bell.on else "The bell is off")
 
-    async def _list_alerts(self) -> None:
+    @work(exit_on_error=False)
+    async def action_alerts(self) -> None:
+        """List the alerts; the one that is chosen can be acknowledged and owned."""
         try:
             found = {each.alert: each for each in await self.control.alerts(over=True)}
             listed = alert_choices(list(found.values()), self.clock_us())

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from rich.text import Text
+from textual import work
 
 from m2pem.api import (
     Area,
@@ -99,11 +100,9 @@ def parameters(values: Mapping[str, str]) -> dict[str, str]:
 class DirectCommands(Taking):
     """The key that commands a behavior."""
 
-    def action_command(self) -> None:
+    @work(exit_on_error=False)
+    async def action_command(self) -> None:
         """Choose a vehicle or payload, a behavior and its parameters; `y` commands it."""
-        self.run_worker(self._command(), exit_on_error=False)
-
-    async def _command(self) -> None:
         try:
             holders = await self.control.holders()
             labels = await self.control.holder_labels()

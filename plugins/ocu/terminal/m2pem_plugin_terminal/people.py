@@ -2,6 +2,8 @@
 
 from collections.abc import Sequence
 
+from textual import work
+
 from m2pem.api import OpenControlRequest, OperatorPresence, person_of
 from m2pem.errors import M2pemError
 from m2pem_plugin_terminal.actions import Actions
@@ -45,11 +47,9 @@ def answers(request: OpenControlRequest, by: str) -> list[Choice]:
 class People(Actions):
     """Requests for control, presence and notes."""
 
-    def action_operators(self) -> None:
+    @work(exit_on_error=False)
+    async def action_operators(self) -> None:
         """Show who is present and who asks for what; answer a request."""
-        self.run_worker(self._operators(), exit_on_error=False)
-
-    async def _operators(self) -> None:
         try:
             requests = list(await self.control.control_requests())
             listed = operator_choices(requests, await self.control.operators(), self.by)
@@ -72,11 +72,9 @@ class People(Actions):
         if answer is not None:
             await self.control.answer_control(request.resource, give=answer == GIVE, by=self.by)
 
-    def action_note(self) -> None:
+    @work(exit_on_error=False)
+    async def action_note(self) -> None:
         """Write a note into the log of the run that is shown."""
-        self.run_worker(self._note(), exit_on_error=False)
-
-    async def _note(self) -> None:
         view = self.view
         if view is None or view.status.ended:
             self.say("No mission is running here")

@@ -4,6 +4,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from rich.text import Text
+from textual import work
 
 from m2pem.api import WHEN_FREE, RunId, ScheduledMission, ScheduledStatus, When
 from m2pem.errors import BusyError, M2pemError
@@ -112,10 +113,6 @@ class Starting(Actions):
         await self.push_screen(Choose(TITLE_RUNS, run_choices(runs, schedule)), look)
         self.show()
 
-    def action_look(self, run: RunId) -> None:
-        """Show a run."""
-        self.run_worker(self._load_and_look(run), exit_on_error=False)
-
     def action_next_run(self, step: int) -> None:
         """Show the next run of those that go on, or the one before."""
         going_on = [run for run, view in self.follower.views.items() if not view.status.ended]
@@ -123,7 +120,9 @@ class Starting(Actions):
         if run is not None:
             self.look_at(run)
 
-    async def _load_and_look(self, run: RunId) -> None:
+    @work(exit_on_error=False)
+    async def action_look(self, run: RunId) -> None:
+        """Show a run."""
         try:
             await self.follower.load(run)
         except M2pemError as error:
