@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Generic, TypeVar
 
+from m2pem.api import Finding
 from m2pem.errors import FindingsError, M2pemError
 from m2pem_plugin_web.missions.names import PathNames
 from m2pem_plugin_web.problems import ProblemError
@@ -42,7 +43,7 @@ class Job(Generic[T]):
     state: JobState = JobState.RUNNING
     result: T | None = None
     problem: str = ""
-    findings: tuple[object, ...] = ()
+    findings: tuple[Finding, ...] = ()
     task: "asyncio.Task[None] | None" = field(default=None, repr=False)
 
 

@@ -1,18 +1,17 @@
 """/api/alerts: what operators must know now, who has seen it, and who takes care."""
 
-from dataclasses import asdict
 from typing import Annotated
 
 from fastapi import APIRouter
-from pydantic import BaseModel, Field
+from pydantic import Field
 
 from m2pem.api import MAX_NAME_CHARACTERS, MissionControl
 from m2pem_plugin_web.access.permissions import Operator, Viewer
 from m2pem_plugin_web.problems import RESPONSES, ProblemError
-from m2pem_plugin_web.rest.models import Body
+from m2pem_plugin_web.rest.models import Answer, Body
 
 
-class AlertModel(BaseModel):
+class AlertModel(Answer):
     """An alert (docs/operating.md#alerts). Times are microseconds since the Unix epoch, by the
     executive's clock; null: there is none.
 
@@ -57,9 +56,7 @@ def router(control: MissionControl) -> APIRouter:
     async def alerts(_: Viewer, over: bool = False) -> list[AlertModel]:
         """The alerts that are open, the most severe first; with `over`, then those that are
         over."""
-        return [
-            AlertModel(**asdict(each), calls=each.calls) for each in await control.alerts(over=over)
-        ]
+        return [AlertModel.of(each) for each in await control.alerts(over=over)]
 
     async def known(alert: str) -> None:
         if alert not in {each.alert for each in await control.alerts(over=True)}:

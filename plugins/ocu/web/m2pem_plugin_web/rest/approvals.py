@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 
 from fastapi import APIRouter
-from pydantic import BaseModel
 
 from m2pem.api import Draft, MissionApproval, MissionControl
 from m2pem_plugin_web.access.permissions import Operator, Viewer
@@ -11,10 +10,10 @@ from m2pem_plugin_web.missions.folder import MissionFolder
 from m2pem_plugin_web.missions.versions import VERSION_LENGTH
 from m2pem_plugin_web.problems import RESPONSES
 from m2pem_plugin_web.rest.drafts import MissionName, of_folder
-from m2pem_plugin_web.rest.models import Body, Name
+from m2pem_plugin_web.rest.models import Answer, Body, Name
 
 
-class GivenApprovalModel(BaseModel):
+class GivenApprovalModel(Answer):
     """A person has approved it, at microseconds since the Unix epoch."""
 
     by: str
@@ -29,7 +28,7 @@ class EarlierApprovalModel(GivenApprovalModel):
     version: int | None
 
 
-class ApprovalModel(BaseModel):
+class ApprovalModel(Answer):
     """`MissionApproval`. `digest`: of the content of its files and drawings. `persons`: how many
     the fleet asks for, 0: none; `needed`: how many approvals must count; `missing`: how many more.
     `who`: who must approve it, in words."""
@@ -88,27 +87,10 @@ def router(control: MissionControl, folder: MissionFolder) -> APIRouter:
 
 
 def _model(state: MissionApproval, versions: Mapping[str, int]) -> ApprovalModel:
-    return ApprovalModel(
-        mission=state.mission,
-        digest=state.digest,
-        persons=state.persons,
-        role=state.role,
-        needed=state.needed,
-        missing=state.missing,
-        who=state.who() if state.missing else "",
-        editors=list(state.editors),
-        editor_unknown=state.editor_unknown,
-        approvals=[GivenApprovalModel(by=each.by, at_us=each.at_us) for each in state.approvals],
-        not_counted=[
-            GivenApprovalModel(by=each.by, at_us=each.at_us) for each in state.not_counted
-        ],
-        earlier=[
-            EarlierApprovalModel(
-                by=each.by,
-                at_us=each.at_us,
-                changed=list(each.changed),
-                version=versions.get(each.file[:VERSION_LENGTH]) if each.file else None,
-            )
-            for each in state.earlier
-        ],
-    )
+    earlier = [
+        EarlierApprovalModel.of(
+            each, version=versions.get(each.file[:VERSION_LENGTH]) if each.file else None
+        )
+        for each in state.earlier
+    ]
+    return ApprovalModel.of(state, who=state.who() if state.missing else "", earlier=earlier)

@@ -13,12 +13,12 @@ from m2pem.api import (
     Fleet,
     MissionControl,
     ParameterKind,
-    ParameterSpec,
     ResourceId,
     as_geojson,
 )
 from m2pem_plugin_web.access.permissions import Viewer
 from m2pem_plugin_web.problems import RESPONSES
+from m2pem_plugin_web.rest.models import Answer
 
 _UNITS = {
     ParameterKind.DURATION: "s",
@@ -39,7 +39,7 @@ class OriginModel(BaseModel):
     alt: float
 
 
-class VehicleModel(BaseModel):
+class VehicleModel(Answer):
     """A vehicle. `host`: of its arbiter, "" for the executive's own. `failsafe`: what the fleet
     file says that the vehicle does by itself when its link is lost; "": nothing."""
 
@@ -52,7 +52,7 @@ class VehicleModel(BaseModel):
     payloads: list[str]
 
 
-class VideoModel(BaseModel):
+class VideoModel(Answer):
     """Where a camera's pictures come from: `kind` is hls, webrtc (WHEP), mjpeg or image, of which
     one is fetched every `every_s` seconds."""
 
@@ -61,7 +61,7 @@ class VideoModel(BaseModel):
     every_s: float
 
 
-class PayloadModel(BaseModel):
+class PayloadModel(Answer):
     """What is mounted on a vehicle; `video`: null for none."""
 
     id: str
@@ -71,7 +71,7 @@ class PayloadModel(BaseModel):
     video: VideoModel | None
 
 
-class TeamModel(BaseModel):
+class TeamModel(Answer):
     """Vehicles that are commanded together."""
 
     name: str
@@ -79,7 +79,7 @@ class TeamModel(BaseModel):
     lead: str
 
 
-class FleetModel(BaseModel):
+class FleetModel(Answer):
     """The fleet in use; `fence`: the area (GeoJSON) that no vehicle may leave, null for none.
     `approval_persons`: how many persons must approve a mission before it starts; 0 for none.
     `may_be_debugged`: whether its runs may: all of it is simulated, or its file allows that."""
@@ -94,7 +94,7 @@ class FleetModel(BaseModel):
     may_be_debugged: bool
 
 
-class ParameterModel(BaseModel):
+class ParameterModel(Answer):
     """A parameter; bounds and default are in `unit`."""
 
     name: str
@@ -108,7 +108,7 @@ class ParameterModel(BaseModel):
     doc: str
 
 
-class BehaviorModel(BaseModel):
+class BehaviorModel(Answer):
     """A behavior with its parameters, and the vehicles, payloads or teams that can do it."""
 
     name: str
@@ -157,46 +157,17 @@ def router(control: MissionControl) -> APIRouter:
 def _fleet(fleet: Fleet) -> FleetModel:
     lat, lon, alt = fleet.origin
     fence = fleet.geometries.get(fleet.fence)
-    return FleetModel(
-        name=fleet.name,
+    return FleetModel.of(
+        fleet,
         origin=OriginModel(lat=lat, lon=lon, alt=alt),
-        vehicles=[
-            VehicleModel(
-                id=each.id,
-                domain=each.domain.value,
-                manned=each.manned,
-                arbiter=each.arbiter,
-                host=each.host,
-                failsafe=each.failsafe,
-                payloads=list(each.payloads),
-            )
-            for each in fleet.vehicles.values()
-        ],
+        vehicles=list(fleet.vehicles.values()),
         payloads=[
-            PayloadModel(
-                id=each.id,
-                vehicle=each.vehicle,
-                detector=each.detector,
-                arbiter=each.arbiter,
-                video=_video(fleet, each.id),
-            )
+            PayloadModel.of(each, video=fleet.videos.get(each.id))
             for each in fleet.payloads.values()
         ],
-        teams=[
-            TeamModel(name=each.name, members=list(each.members), lead=each.lead)
-            for each in fleet.teams.values()
-        ],
+        teams=list(fleet.teams.values()),
         fence=as_geojson(fence)["geometry"] if isinstance(fence, Area) else None,
-        approval_persons=fleet.approval_persons,
-        may_be_debugged=fleet.may_be_debugged,
     )
-
-
-def _video(fleet: Fleet, payload: ResourceId) -> VideoModel | None:
-    video = fleet.videos.get(payload)
-    if video is None:
-        return None
-    return VideoModel(url=video.url, kind=video.kind.value, every_s=video.every_s)
 
 
 def behaviors_of(
@@ -234,28 +205,7 @@ def _team_behaviors(specs: Iterable[BehaviorSpec]) -> dict[str, BehaviorSpec]:
 
 
 def _behavior(spec: BehaviorSpec, resources: list[str], teams: list[str]) -> BehaviorModel:
-    return BehaviorModel(
-        name=spec.name,
-        type=spec.type,
-        doc=spec.doc,
-        ends=spec.ends,
-        writes=list(spec.writes),
-        required_one_of=[list(each) for each in spec.required_one_of],
-        parameters=[_parameter(each) for each in spec.parameters],
-        resources=resources,
-        teams=teams,
-    )
-
-
-def _parameter(spec: ParameterSpec) -> ParameterModel:
-    return ParameterModel(
-        name=spec.name,
-        kind=spec.kind,
-        unit=_UNITS.get(spec.kind, ""),
-        required=spec.required,
-        minimum=spec.minimum,
-        maximum=spec.maximum,
-        choices=list(spec.choices),
-        default=spec.default,
-        doc=spec.doc,
-    )
+    parameters = [
+        ParameterModel.of(each, unit=_UNITS.get(each.kind, "")) for each in spec.parameters
+    ]
+    return BehaviorModel.of(spec, parameters=parameters, resources=resources, teams=teams)

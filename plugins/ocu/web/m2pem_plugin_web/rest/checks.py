@@ -1,9 +1,9 @@
 """/api/checks, /api/editable: what is wrong with a drawing, and drawings for the editor."""
 
 from fastapi import APIRouter
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, Field
 
-from m2pem.api import Draft, MissionControl, Outline
+from m2pem.api import Draft, MissionControl
 from m2pem.errors import MissionError
 from m2pem_plugin_web.access.permissions import Viewer
 from m2pem_plugin_web.missions.folder import MissionFolder
@@ -11,13 +11,13 @@ from m2pem_plugin_web.missions.names import PathNames
 from m2pem_plugin_web.problems import RESPONSES
 from m2pem_plugin_web.rest.bounded_threads import BoundedThreads
 from m2pem_plugin_web.rest.drafts import DraftModel, draft_of, source_of
-from m2pem_plugin_web.rest.models import Body, FindingModel, finding_models
+from m2pem_plugin_web.rest.models import Answer, Body, FindingModel
 
 AT_ONCE = 2
 """Files that are checked at the same time, in threads."""
 
 
-class ProcessModel(BaseModel):
+class ProcessModel(Answer):
     """A process; `starts`: a run begins with it, unless another is named."""
 
     id: str
@@ -26,7 +26,7 @@ class ProcessModel(BaseModel):
     starts: bool
 
 
-class ElementModel(BaseModel):
+class ElementModel(Answer):
     """Something drawn, or a flow; `parent`: what it is in, a subprocess or its process."""
 
     id: str
@@ -36,7 +36,7 @@ class ElementModel(BaseModel):
     parent: str
 
 
-class TriggerModel(BaseModel):
+class TriggerModel(Answer):
     """A signal or message; `operators`: whether they are expected to send it."""
 
     id: str
@@ -44,16 +44,14 @@ class TriggerModel(BaseModel):
     operators: bool
 
 
-class DataNameModel(BaseModel):
+class DataNameModel(Answer):
     """A name of the data store; `from`: the id of what writes it, "" if nothing does."""
 
-    model_config = ConfigDict(populate_by_name=True)
-
     name: str
-    source: str = Field(validation_alias="from", serialization_alias="from")
+    source: str = Field(serialization_alias="from")
 
 
-class OutlineModel(BaseModel):
+class OutlineModel(Answer):
     """What a file has, as far as it can be read."""
 
     processes: list[ProcessModel]
@@ -77,7 +75,7 @@ class EditModel(Body):
     layout: bool = False
 
 
-class EditableModel(BaseModel):
+class EditableModel(Answer):
     """The same mission as the editor takes it; `notes`: what it does not keep."""
 
     xml: str
@@ -97,15 +95,17 @@ def router(control: MissionControl, folder: MissionFolder) -> APIRouter:
         findings = await threads.run(
             control.check, draft, process=wanted.process, data=wanted.data or ()
         )
-        outline = await threads.run(_outline, control, draft)
-        return CheckModel(findings=finding_models(called.findings(findings)), outline=outline)
+        return CheckModel(
+            findings=[FindingModel.of(each) for each in called.findings(findings)],
+            outline=await threads.run(_outline, control, draft),
+        )
 
     @routes.post("/editable")
     async def editable(_: Viewer, wanted: EditModel) -> EditableModel:
         """A file for the editor: with a diagram of everything in it."""
         source = source_of(wanted.xml)
         found = await threads.run(control.editable, source, anew=wanted.layout)
-        return EditableModel(xml=found.source.decode(), notes=list(found.notes))
+        return EditableModel.of(found, xml=found.source.decode())
 
     return routes
 
@@ -115,25 +115,4 @@ def _outline(control: MissionControl, draft: Draft) -> OutlineModel | None:
         found = control.outline(draft)
     except MissionError:
         return None
-    return outline_model(found)
-
-
-def outline_model(outline: Outline) -> OutlineModel:
-    """An outline as JSON."""
-    return OutlineModel(
-        processes=[
-            ProcessModel(id=p.id, name=p.name, executable=p.executable, starts=p.starts)
-            for p in outline.processes
-        ],
-        elements=[
-            ElementModel(id=e.id, name=e.name, type=e.type, process=e.process, parent=e.parent)
-            for e in outline.elements
-        ],
-        names=[DataNameModel(name=n.name, source=n.source) for n in outline.names],
-        signals=[
-            TriggerModel(id=s.id, name=s.name, operators=s.operators) for s in outline.signals
-        ],
-        messages=[
-            TriggerModel(id=m.id, name=m.name, operators=m.operators) for m in outline.messages
-        ],
-    )
+    return OutlineModel.of(found)

@@ -5,17 +5,17 @@ from typing import Annotated, ParamSpec, TypeVar
 
 from fastapi import APIRouter
 from fastapi import Path as InPath
-from pydantic import BaseModel, Field
+from pydantic import Field
 
 from m2pem.api import MAX_NOTE_CHARACTERS
 from m2pem_plugin_web.access.permissions import Operator, Viewer
 from m2pem_plugin_web.access.roles import Role
 from m2pem_plugin_web.live.hub import Hub
-from m2pem_plugin_web.missions.comments import Comment, CommentError, Comments
+from m2pem_plugin_web.missions.comments import CommentError, Comments
 from m2pem_plugin_web.missions.folder import MissionFolder
 from m2pem_plugin_web.problems import RESPONSES, ProblemError
 from m2pem_plugin_web.rest.drafts import MissionName, of_folder
-from m2pem_plugin_web.rest.models import Body
+from m2pem_plugin_web.rest.models import Answer, Body
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -24,7 +24,7 @@ Number = Annotated[int, InPath(ge=1, le=10**9)]
 Words = Annotated[str, Field(min_length=1, max_length=MAX_NOTE_CHARACTERS, pattern=r"\S")]
 
 
-class CommentModel(BaseModel):
+class CommentModel(Answer):
     """A comment, or an answer to the comment `parent` (0: it answers none). `element`: the id of
     the element, "" for the mission as a whole; `label`: what that was called. `version`: of the
     mission's file then. `resolved_by`: who has settled it, "": it is open."""
@@ -64,7 +64,7 @@ def router(folder: MissionFolder, hub: Hub) -> APIRouter:
     @routes.get("/{name}/comments")
     async def listed(_: Viewer, name: MissionName) -> list[CommentModel]:
         """All comments of a mission, the oldest first."""
-        return [_model(each) for each in await of_folder(comments.all, name)]
+        return [CommentModel.of(each) for each in await of_folder(comments.all, name)]
 
     @routes.post("/{name}/comments")
     async def add(person: Operator, name: MissionName, wanted: NewCommentModel) -> CommentModel:
@@ -79,7 +79,7 @@ def router(folder: MissionFolder, hub: Hub) -> APIRouter:
             parent=wanted.parent,
         )
         hub.comments_changed(name)
-        return _model(made)
+        return CommentModel.of(made)
 
     @routes.post("/{name}/comments/{number}/resolve")
     async def resolve(
@@ -90,7 +90,7 @@ def router(folder: MissionFolder, hub: Hub) -> APIRouter:
             comments.resolve, name, number, person.name, resolved=wanted.resolved
         )
         hub.comments_changed(name)
-        return _model(made)
+        return CommentModel.of(made)
 
     @routes.delete("/{name}/comments/{number}", status_code=204)
     async def delete(person: Operator, name: MissionName, number: Number) -> None:
@@ -107,7 +107,3 @@ async def _of_comments(call: Callable[P, T], *args: P.args, **kwargs: P.kwargs) 
         return await of_folder(call, *args, **kwargs)
     except CommentError as error:
         raise ProblemError(404 if error.missing else 409, str(error)) from error
-
-
-def _model(comment: Comment) -> CommentModel:
-    return CommentModel.model_validate(comment, from_attributes=True)

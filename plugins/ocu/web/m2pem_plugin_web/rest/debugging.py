@@ -3,12 +3,12 @@
 from typing import Annotated, Any
 
 from fastapi import APIRouter
-from pydantic import BaseModel, Field, StringConstraints
+from pydantic import Field, StringConstraints
 
 from m2pem.api import MissionControl
 from m2pem_plugin_web.access.permissions import Operator, Viewer
 from m2pem_plugin_web.problems import RESPONSES
-from m2pem_plugin_web.rest.models import Body, Data, Name, known_run
+from m2pem_plugin_web.rest.models import Answer, Body, Data, Name, known_run
 
 MAX_SCOPE = 2**31 - 1
 Condition = Annotated[str, StringConstraints(min_length=1, max_length=2_000)]
@@ -28,7 +28,7 @@ class DataModel(Body):
     scope: Annotated[int, Field(ge=0, le=MAX_SCOPE)] = 0
 
 
-class ScopeDataModel(BaseModel):
+class ScopeDataModel(Answer):
     """Data of a process, subprocess or task; both ids "": of the data stores. `scope`: the number
     with which it is changed, null: it cannot be. `instance`: of a loop or multi-instance activity,
     from 0. `token`: on the activity whose own data it is."""
@@ -69,6 +69,6 @@ def router(control: MissionControl) -> APIRouter:
         and of subprocesses and tasks that have some."""
         async with known_run(control, run):
             found = await control.data(run)
-        return [ScopeDataModel.model_validate(each, from_attributes=True) for each in found]
+        return [ScopeDataModel.of(each) for each in found]
 
     return routes

@@ -3,7 +3,6 @@
 import math
 
 from fastapi import APIRouter
-from pydantic import BaseModel
 
 from m2pem.api import MissionControl
 from m2pem_plugin_web.access.permissions import Viewer
@@ -11,9 +10,10 @@ from m2pem_plugin_web.missions.folder import MissionFolder
 from m2pem_plugin_web.problems import RESPONSES
 from m2pem_plugin_web.rest.bounded_threads import BoundedThreads
 from m2pem_plugin_web.rest.drafts import DraftModel, draft_of
+from m2pem_plugin_web.rest.models import Answer
 
 
-class TaskEstimateModel(BaseModel):
+class TaskEstimateModel(Answer):
     """A task of a vehicle. `battery_left`: after it; below 0 if the battery does not last."""
 
     element: str
@@ -25,7 +25,7 @@ class TaskEstimateModel(BaseModel):
     battery_left: float
 
 
-class VehicleEstimateModel(BaseModel):
+class VehicleEstimateModel(Answer):
     """A vehicle. `battery_left`: at the mission's end; `stated`: whether the fleet file says its
     endurance, or the simulation assumes it."""
 
@@ -37,7 +37,7 @@ class VehicleEstimateModel(BaseModel):
     stated: bool
 
 
-class LeftOutModel(BaseModel):
+class LeftOutModel(Answer):
     """An element that is not estimated, or in part, and why."""
 
     element: str
@@ -45,7 +45,7 @@ class LeftOutModel(BaseModel):
     reason: str
 
 
-class MissionEstimateModel(BaseModel):
+class MissionEstimateModel(Answer):
     """A mission. `reserve`: the part of a full battery that plans leave unused."""
 
     time_s: float
@@ -65,36 +65,12 @@ def router(control: MissionControl, folder: MissionFolder) -> APIRouter:
         """Distance, time and battery of each vehicle, and what could not be estimated."""
         draft = await draft_of(wanted, folder)
         found = await threads.run(control.estimate, draft, process=wanted.process)
-        return MissionEstimateModel(
-            time_s=found.time_s,
-            reserve=found.reserve,
-            vehicles=[
-                VehicleEstimateModel(
-                    vehicle=each.vehicle,
-                    distance_m=each.distance_m,
-                    time_s=each.time_s,
-                    battery_left=each.battery_left,
-                    endurance_s=None if math.isinf(each.endurance_s) else each.endurance_s,
-                    stated=each.stated,
-                )
-                for each in found.vehicles
-            ],
-            tasks=[
-                TaskEstimateModel(
-                    element=each.element,
-                    label=each.label,
-                    vehicle=each.vehicle,
-                    begins_s=each.begins_s,
-                    distance_m=each.distance_m,
-                    time_s=each.time_s,
-                    battery_left=each.battery_left,
-                )
-                for each in found.tasks
-            ],
-            left_out=[
-                LeftOutModel(element=each.element, label=each.label, reason=each.reason)
-                for each in found.left_out
-            ],
-        )
+        vehicles = [
+            VehicleEstimateModel.of(
+                each, endurance_s=None if math.isinf(each.endurance_s) else each.endurance_s
+            )
+            for each in found.vehicles
+        ]
+        return MissionEstimateModel.of(found, vehicles=vehicles)
 
     return routes

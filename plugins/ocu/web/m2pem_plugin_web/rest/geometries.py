@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal, cast
 
 from fastapi import APIRouter
 from fastapi import Path as InPath
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from m2pem.api import (
     Area,
@@ -22,13 +22,13 @@ from m2pem.errors import M2pemError
 from m2pem_plugin_web.access.permissions import Operator, Viewer
 from m2pem_plugin_web.missions.names import LONGEST, PATTERN
 from m2pem_plugin_web.problems import RESPONSES, ProblemError
-from m2pem_plugin_web.rest.models import Body, Name, find_run
+from m2pem_plugin_web.rest.models import Answer, Body, Name, find_run
 
 Kind = Literal["route", "area", "point"]
 GeometryName = Annotated[str, InPath(min_length=1, max_length=LONGEST, pattern=PATTERN)]
 
 
-class GeometryModel(BaseModel):
+class GeometryModel(Answer):
     """A route, area or point (GeoJSON). `altitude_frame`: what its altitudes are above.
 
     `speeds_m_s`: of a route, how fast vehicles leave each waypoint, null: as fast as before; []:
@@ -36,19 +36,15 @@ class GeometryModel(BaseModel):
     of each; []: `altitude_frame` holds for all.
     """
 
-    model_config = ConfigDict(populate_by_name=True)
-
     name: str
     kind: Kind
     geometry: dict[str, Any]
     altitude_frame: str
-    source: Literal["fleet", "operator"] = Field(
-        validation_alias="from", serialization_alias="from"
-    )
+    source: Literal["fleet", "operator"] = Field(serialization_alias="from")
     by: str
     at_us: int | None
-    speeds_m_s: list[float | None] = []
-    altitude_frames: list[str] = []
+    speeds_m_s: list[float | None] = Field(default=[])
+    altitude_frames: list[str] = Field(default=[])
 
 
 class HandOverModel(Body):
@@ -68,7 +64,7 @@ class RestoreModel(Body):
     force: bool = False
 
 
-class VersionModel(BaseModel):
+class VersionModel(Answer):
     """A version of a drawing; `kind` and `geometry` null: it was deleted then."""
 
     number: int
@@ -162,13 +158,11 @@ async def _refuse_used(control: MissionControl, name: str, geometry: Mapping[str
 
 def _version_model(version: GeometryVersion) -> VersionModel:
     geometry = None if version.geometry is None else parse_geojson(version.geometry)
-    return VersionModel(
-        number=version.number,
+    return VersionModel.of(
+        version,
         kind=None if geometry is None else geometry_kind(geometry),
         geometry=None if geometry is None else as_geojson(geometry)["geometry"],
         altitude_frame="relative" if geometry is None else geometry.altitude_frame,
-        by=version.by,
-        at_us=version.at_us,
     )
 
 

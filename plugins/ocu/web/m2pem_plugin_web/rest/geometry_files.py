@@ -23,7 +23,7 @@ from m2pem_plugin_web.missions.names import LONGEST, PATTERN
 from m2pem_plugin_web.problems import RESPONSES, ProblemError
 from m2pem_plugin_web.rest.bounded_threads import BoundedThreads
 from m2pem_plugin_web.rest.geometries import Kind, geometries_of_fleet, geometry_kind
-from m2pem_plugin_web.rest.models import Body
+from m2pem_plugin_web.rest.models import Answer, Body
 
 GeometryText = Annotated[str, Field(min_length=1, max_length=LONGEST, pattern=PATTERN)]
 Altitude = Annotated[float | None, Field(ge=-1_000.0, le=100_000.0)]
@@ -64,7 +64,7 @@ class ReadGeometryModel(BaseModel):
     geojson: dict[str, Any]
 
 
-class FileProblemModel(BaseModel):
+class FileProblemModel(Answer):
     """What is wrong with a file. `error`: the feature was left out; `warning`: it was read.
 
     `feature`: how people find it in the file; "" means the whole file.
@@ -115,16 +115,7 @@ def router(control: MissionControl) -> APIRouter:
         found = await threads.run(read_geometry_file, name, content)
         return GeometryFileModel(
             geometries=[_read_model(each) for each in found.geometries],
-            problems=[
-                FileProblemModel(
-                    severity=each.severity,
-                    file=name,
-                    feature=each.feature,
-                    message=each.message,
-                    remedy=each.remedy,
-                )
-                for each in found.problems
-            ],
+            problems=[FileProblemModel.of(each, file=name) for each in found.problems],
         )
 
     @routes.get("/export", response_class=Response, responses=FILE_RESPONSE)

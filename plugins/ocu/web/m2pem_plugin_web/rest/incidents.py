@@ -1,15 +1,14 @@
 """/api/incidents, /api/runs/{run}/incidents/...: errors about which operators decide."""
 
 from fastapi import APIRouter
-from pydantic import BaseModel
 
 from m2pem.api import IncidentPreview, MissionControl
 from m2pem_plugin_web.access.permissions import Operator, Viewer
 from m2pem_plugin_web.problems import RESPONSES
-from m2pem_plugin_web.rest.models import Body, Data, Name, known_run
+from m2pem_plugin_web.rest.models import Answer, Body, Data, Name, known_run
 
 
-class IncidentModel(BaseModel):
+class IncidentModel(Answer):
     """An error that no event catches: `MissionControl.incidents`."""
 
     run: str
@@ -41,7 +40,7 @@ class ResolveModel(ChoiceModel):
     even_if_stuck: bool = False
 
 
-class RequirementOutlookModel(BaseModel):
+class RequirementOutlookModel(Answer):
     """What follows for a requirement. `requirement`: its id; `english`: what it says; `text`:
     verdict and reason in a sentence."""
 
@@ -52,7 +51,7 @@ class RequirementOutlookModel(BaseModel):
     text: str
 
 
-class OutlookModel(BaseModel):
+class OutlookModel(Answer):
     """What follows a choice. `text`: verdict and reason in a sentence; `requirements`: what
     follows for those that the run is monitored for, and that are open."""
 
@@ -64,21 +63,11 @@ class OutlookModel(BaseModel):
 
 def outlook_model(preview: IncidentPreview) -> OutlookModel:
     """Return what follows as JSON."""
-    return OutlookModel(
-        verdict=preview.verdict.value,
-        reason=preview.reason,
-        text=preview.completion,
-        requirements=[
-            RequirementOutlookModel(
-                requirement=each.requirement,
-                english=each.text,
-                verdict=each.verdict.value,
-                reason=each.reason,
-                text=str(each),
-            )
-            for each in preview.requirements
-        ],
-    )
+    requirements = [
+        RequirementOutlookModel.of(each, english=each.text, text=str(each))
+        for each in preview.requirements
+    ]
+    return OutlookModel.of(preview, text=preview.completion, requirements=requirements)
 
 
 def router(control: MissionControl) -> APIRouter:
@@ -88,22 +77,7 @@ def router(control: MissionControl) -> APIRouter:
     @routes.get("/incidents")
     async def incidents(_: Viewer) -> list[IncidentModel]:
         """The incidents of all runs that are open."""
-        return [
-            IncidentModel(
-                run=each.run,
-                incident=each.incident,
-                element=each.element,
-                task=each.task,
-                code=each.code,
-                reason=each.reason,
-                choices=list(each.choices),
-                resources=list(each.resources),
-                roles={role: list(ids) for role, ids in each.roles.items()},
-                targets=dict(each.targets),
-                operator_role=each.operator_role,
-            )
-            for each in await control.incidents()
-        ]
+        return [IncidentModel.of(each) for each in await control.incidents()]
 
     @routes.post("/runs/{run}/incidents/{incident}/preview")
     async def preview(_: Operator, run: str, incident: str, wanted: ChoiceModel) -> OutlookModel:

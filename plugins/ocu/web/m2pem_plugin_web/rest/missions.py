@@ -5,15 +5,14 @@ from typing import Annotated
 
 from fastapi import APIRouter, Response
 from fastapi import Path as InPath
-from pydantic import BaseModel
 
 from m2pem.api import MissionControl, file_digest
 from m2pem_plugin_web.access.permissions import Commander, Viewer
-from m2pem_plugin_web.missions.folder import MissionFolder, Saved, Summaries
+from m2pem_plugin_web.missions.folder import MissionFolder, Summaries
 from m2pem_plugin_web.missions.versions import version_of
 from m2pem_plugin_web.problems import RESPONSES, ProblemError
 from m2pem_plugin_web.rest.drafts import MissionName, of_folder, source_of
-from m2pem_plugin_web.rest.models import Body
+from m2pem_plugin_web.rest.models import Answer, Body
 from m2pem_plugin_web.templates import find, templates
 
 BPMN = "application/xml"
@@ -21,7 +20,7 @@ BPMN = "application/xml"
 VersionNumber = Annotated[int, InPath(ge=1, le=10**9)]
 
 
-class MissionLineModel(BaseModel):
+class MissionLineModel(Answer):
     """A mission of the folder. `by`: who saved it here, "" if it came in another way.
 
     `runnable`: `m2pem check` finds no errors in it.
@@ -35,7 +34,7 @@ class MissionLineModel(BaseModel):
     runnable: bool
 
 
-class SavedModel(BaseModel):
+class SavedModel(Answer):
     """What was saved. `version`: a hash of its content."""
 
     name: str
@@ -51,7 +50,7 @@ class MissionModel(SavedModel):
     notes: list[str]
 
 
-class VersionModel(BaseModel):
+class VersionModel(Answer):
     """One that was saved or found. `deleted`: it was the last before the mission was deleted."""
 
     number: int
@@ -85,14 +84,7 @@ def router(control: MissionControl, folder: MissionFolder) -> APIRouter:
     async def missions(_: Viewer) -> list[MissionLineModel]:
         """What is in the folder."""
         return [
-            MissionLineModel(
-                name=each.saved.name,
-                title=each.title,
-                version=each.saved.version,
-                saved_at_us=each.saved.saved_at_us,
-                by=each.saved.by,
-                runnable=each.runnable,
-            )
+            MissionLineModel.of(each.saved, title=each.title, runnable=each.runnable)
             for each in await of_folder(summaries.all)
         ]
 
@@ -101,9 +93,7 @@ def router(control: MissionControl, folder: MissionFolder) -> APIRouter:
         """A mission for the editor."""
         saved = await of_folder(folder.read, name)
         found = await asyncio.to_thread(control.editable, saved.source)
-        return MissionModel(
-            **_saved(saved).model_dump(), xml=found.source.decode(), notes=list(found.notes)
-        )
+        return MissionModel.of(saved, xml=found.source.decode(), notes=found.notes)
 
     @routes.put("/{name}")
     async def save(person: Commander, name: MissionName, wanted: SaveModel) -> SavedModel:
@@ -113,7 +103,8 @@ def router(control: MissionControl, folder: MissionFolder) -> APIRouter:
         await asyncio.to_thread(control.outline, source)
         if version_of(source) != wanted.base:  # before it may be approved
             await control.note_edit(file_digest(source), by=person.name)
-        return _saved(await of_folder(folder.save, name, source, wanted.base, person.name))
+        saved = await of_folder(folder.save, name, source, wanted.base, person.name)
+        return SavedModel.of(saved)
 
     @routes.delete("/{name}", status_code=204)
     async def delete(person: Commander, name: MissionName) -> None:
@@ -131,43 +122,19 @@ def router(control: MissionControl, folder: MissionFolder) -> APIRouter:
     @routes.get("/{name}/versions")
     async def versions(_: Viewer, name: MissionName) -> list[VersionModel]:
         """All that is kept of a mission, also of one that was deleted, the oldest first."""
-        return [
-            VersionModel(
-                number=each.number,
-                version=each.version,
-                saved_at_us=each.saved_at_us,
-                by=each.by,
-                deleted=each.deleted,
-            )
-            for each in await of_folder(folder.versions, name)
-        ]
+        return [VersionModel.of(each) for each in await of_folder(folder.versions, name)]
 
     @routes.get("/{name}/versions/{number}")
     async def version(_: Viewer, name: MissionName, number: VersionNumber) -> OldMissionModel:
         """One of them, for the editor."""
         kept, source = await of_folder(folder.version, name, number)
         found = await asyncio.to_thread(control.editable, source)
-        return OldMissionModel(
-            name=name,
-            number=kept.number,
-            version=kept.version,
-            saved_at_us=kept.saved_at_us,
-            by=kept.by,
-            deleted=kept.deleted,
-            xml=found.source.decode(),
-            notes=list(found.notes),
-        )
+        return OldMissionModel.of(kept, name=name, xml=found.source.decode(), notes=found.notes)
 
     return routes
 
 
-def _saved(saved: Saved) -> SavedModel:
-    return SavedModel(
-        name=saved.name, version=saved.version, saved_at_us=saved.saved_at_us, by=saved.by
-    )
-
-
-class TemplateLineModel(BaseModel):
+class TemplateLineModel(Answer):
     """A mission to begin with; `doc` says what it does."""
 
     name: str
@@ -175,7 +142,7 @@ class TemplateLineModel(BaseModel):
     doc: str
 
 
-class TemplateModel(BaseModel):
+class TemplateModel(Answer):
     """A mission to begin with, for the editor."""
 
     name: str
@@ -189,10 +156,7 @@ def template_router() -> APIRouter:
     @routes.get("")
     async def listed(_: Viewer) -> list[TemplateLineModel]:
         """What there is."""
-        return [
-            TemplateLineModel(name=each.name, title=each.title, doc=each.doc)
-            for each in templates()
-        ]
+        return [TemplateLineModel.of(each) for each in templates()]
 
     @routes.get("/{name}")
     async def template(_: Viewer, name: str) -> TemplateModel:
@@ -200,6 +164,6 @@ def template_router() -> APIRouter:
         found = find(name)
         if found is None:
             raise ProblemError(404, f"there is no template {name}")
-        return TemplateModel(name=found.name, xml=found.xml)
+        return TemplateModel.of(found)
 
     return routes

@@ -1,8 +1,8 @@
 """Runs, prompts and findings as JSON, and the run that an address names."""
 
-from collections.abc import AsyncIterator, Iterable
+from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -10,7 +10,6 @@ from m2pem.api import (
     MAX_DATA_VALUES,
     MAX_NAME_CHARACTERS,
     MAX_REASON_CHARACTERS,
-    Finding,
     MissionControl,
     RunStatus,
     RunSummary,
@@ -31,7 +30,19 @@ class Body(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True)
 
 
-class RunModel(BaseModel):
+class Answer(BaseModel):
+    """Base of what is answered about something that the executive has returned."""
+
+    model_config = ConfigDict(from_attributes=True)
+
+    @classmethod
+    def of(cls, found: object, **more: Any) -> Self:
+        """Return what is answered: `more`, and fields of `found` that are called the same."""
+        said = {name: getattr(found, name) for name in cls.model_fields if name not in more}
+        return cls.model_validate({**said, **more})
+
+
+class RunModel(Answer):
     """A run. Times are microseconds since the Unix epoch.
 
     `began_us` is by the clock on the wall, `started_us` and `ended_us` by the executive's, which
@@ -55,18 +66,8 @@ def run_model(summary: RunSummary, took_s: float | None = None) -> RunModel:
     """A summary as JSON. `took_s`: up to now, of a run that goes on."""
     if summary.took_s is not None:
         took_s = summary.took_s
-    return RunModel(
-        run=summary.run,
-        mission=summary.mission,
-        process=summary.process,
-        status=summary.status,
-        started_us=summary.started_us,
-        ended_us=summary.ended_us,
-        records=summary.records,
-        detail=summary.detail,
-        began_us=summary.began_us or summary.started_us,
-        took_s=took_s,
-    )
+    began_us = summary.began_us or summary.started_us
+    return RunModel.of(summary, began_us=began_us, took_s=took_s)
 
 
 class RecordModel(BaseModel):
@@ -106,7 +107,7 @@ class PromptModel(BaseModel):
     role: str
 
 
-class FindingModel(BaseModel):
+class FindingModel(Answer):
     """What is wrong, or doubtful: where, and what would be right. `line` 0: none applies."""
 
     severity: Severity
@@ -117,24 +118,6 @@ class FindingModel(BaseModel):
     element: str
     message: str
     remedy: str
-
-
-def finding_models(findings: Iterable[object]) -> list[FindingModel]:
-    """Findings as JSON."""
-    return [
-        FindingModel(
-            severity=each.severity,
-            rule=each.rule,
-            number=each.number,
-            file=each.file,
-            line=each.line,
-            element=each.element,
-            message=each.message,
-            remedy=each.remedy,
-        )
-        for each in findings
-        if isinstance(each, Finding)
-    ]
 
 
 async def find_run(control: MissionControl, run: str) -> RunSummary:

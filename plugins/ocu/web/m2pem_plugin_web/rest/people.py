@@ -8,10 +8,10 @@ from pydantic import BaseModel, Field
 from m2pem.api import MAX_NOTE_CHARACTERS, MissionControl, person_of
 from m2pem_plugin_web.access.permissions import Operator, Viewer
 from m2pem_plugin_web.problems import RESPONSES, ProblemError
-from m2pem_plugin_web.rest.models import Body, known_run
+from m2pem_plugin_web.rest.models import Answer, Body, known_run
 
 
-class PresenceModel(BaseModel):
+class PresenceModel(Answer):
     """An operator is present at a unit: `OperatorPresence`."""
 
     by: str
@@ -23,7 +23,7 @@ class PresenceModel(BaseModel):
     editing: str
 
 
-class ControlRequestModel(BaseModel):
+class ControlRequestModel(Answer):
     """An operator asks another one for a resource: `OpenControlRequest`. `mine`: the one who reads
     this has it, and is asked; `own`: has asked."""
 
@@ -68,20 +68,10 @@ def router(control: MissionControl) -> APIRouter:
     async def operators(person: Viewer) -> OperatorsModel:
         """Who is present, and who asks whom for what."""
         return OperatorsModel(
-            operators=[
-                PresenceModel.model_validate(each, from_attributes=True)
-                for each in await control.operators()
-            ],
+            operators=[PresenceModel.of(each) for each in await control.operators()],
             control_requests=[
-                ControlRequestModel(
-                    resource=each.resource,
-                    by=each.by,
-                    holder=each.holder,
-                    left_s=each.left_s,
-                    given_then=each.given_then,
-                    holder_gone=each.holder_gone,
-                    mine=_same(each.holder, person.name),
-                    own=_same(each.by, person.name),
+                ControlRequestModel.of(
+                    each, mine=_same(each.holder, person.name), own=_same(each.by, person.name)
                 )
                 for each in await control.control_requests()
             ],

@@ -15,13 +15,7 @@ from m2pem_plugin_web.jobs import Job, Jobs, JobState
 from m2pem_plugin_web.missions.folder import MissionFolder
 from m2pem_plugin_web.problems import RESPONSES, ProblemError
 from m2pem_plugin_web.rest.drafts import DraftModel, draft_of
-from m2pem_plugin_web.rest.models import (
-    FindingModel,
-    RecordPage,
-    RunModel,
-    finding_models,
-    run_model,
-)
+from m2pem_plugin_web.rest.models import Answer, FindingModel, RecordPage, RunModel, run_model
 from m2pem_plugin_web.rest.record_pages import new_view, page_of
 from m2pem_plugin_web.rest.runs import LARGEST, MOST_RECORDS, RunMissionModel, file_models
 from m2pem_plugin_web.rest.verifications import JobModel
@@ -44,7 +38,7 @@ class RehearseModel(DraftModel):
     every_s: Annotated[float, Field(ge=0.05, le=60, strict=False)] = EVERY_S
 
 
-class RehearsalModel(BaseModel):
+class RehearsalModel(Answer):
     """A rehearsal. `summary`: of its one run, r1, when it is done."""
 
     id: str
@@ -91,13 +85,10 @@ def router(
     async def rehearsal(_: Viewer, identifier: str) -> RehearsalModel:
         """Return its state."""
         job = jobs.get(identifier)
-        return RehearsalModel(
-            id=job.id,
-            by=job.by,
-            state=job.state,
+        return RehearsalModel.of(
+            job,
             summary=run_model(job.result.summary) if job.result is not None else None,
             problem=job.problem or None,
-            findings=finding_models(job.findings),
         )
 
     @routes.delete("/{identifier}", status_code=204)

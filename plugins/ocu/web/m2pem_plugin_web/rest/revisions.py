@@ -4,7 +4,7 @@ versions that it has had."""
 from typing import Annotated
 
 from fastapi import APIRouter
-from pydantic import BaseModel, Field, model_validator
+from pydantic import Field, model_validator
 
 from m2pem.api import Draft, MissionControl, MissionSource, RevisionPreview
 from m2pem_plugin_web.access.permissions import Commander, Operator, Viewer
@@ -12,14 +12,7 @@ from m2pem_plugin_web.missions.folder import MissionFolder
 from m2pem_plugin_web.problems import RESPONSES
 from m2pem_plugin_web.rest.drafts import WrittenName, of_folder, source_of
 from m2pem_plugin_web.rest.incidents import OutlookModel, outlook_model
-from m2pem_plugin_web.rest.models import (
-    Body,
-    FindingModel,
-    Name,
-    find_run,
-    finding_models,
-    known_run,
-)
+from m2pem_plugin_web.rest.models import Answer, Body, FindingModel, Name, find_run, known_run
 
 MOST_MOVES = 1000
 
@@ -59,7 +52,7 @@ class RevisionModel(NewVersionModel):
     even_if_stuck: bool = False
 
 
-class VersionModel(BaseModel):
+class VersionModel(Answer):
     """A version that a run has had from record `seq` on. `at_us`: since then, by the executive's
     clock; `by`: who began the run, or revised it. `shared_with`: runs under way that have it, too.
     """
@@ -72,7 +65,7 @@ class VersionModel(BaseModel):
     shared_with: list[str]
 
 
-class EffectModel(BaseModel):
+class EffectModel(Answer):
     """What a revision does to a token, or to an event that is awaited. `resources`: what the
     token commands now."""
 
@@ -83,7 +76,7 @@ class EffectModel(BaseModel):
     resources: list[str]
 
 
-class RefusalModel(BaseModel):
+class RefusalModel(Answer):
     """Why it cannot be. `candidates`: where the token can go instead, `labels`: what each of them
     is called. `resources`: what the token commands now. `can_end`: it can end instead."""
 
@@ -96,7 +89,7 @@ class RefusalModel(BaseModel):
     can_end: bool
 
 
-class PlanModel(BaseModel):
+class PlanModel(Answer):
     """What a revision would do. `possible`: nothing speaks against it but what may be confirmed;
     `approval`: who must approve the new version before, "" if that is not needed. `busy`: what new
     and changed tasks name and others have now, with what happens then."""
@@ -116,40 +109,8 @@ class PlanModel(BaseModel):
 
 def plan_model(preview: RevisionPreview) -> PlanModel:
     """Return a plan as JSON."""
-    outlook = preview.outlook
-    return PlanModel(
-        plan=preview.plan,
-        version=preview.version,
-        previous=preview.previous,
-        possible=preview.is_possible,
-        changes=list(preview.changes),
-        effects=[
-            EffectModel(
-                kind=each.kind,
-                element=each.element,
-                token=each.token,
-                text=each.text,
-                resources=list(each.resources),
-            )
-            for each in preview.effects
-        ],
-        refusals=[
-            RefusalModel(
-                element=each.element,
-                token=each.token,
-                text=each.text,
-                candidates=list(each.candidates),
-                labels=list(each.labels),
-                resources=list(each.resources),
-                can_end=each.can_end,
-            )
-            for each in preview.refusals
-        ],
-        findings=finding_models(preview.findings),
-        outlook=None if outlook is None else outlook_model(outlook),
-        approval=preview.approval,
-        busy=list(preview.busy),
-    )
+    outlook = None if preview.outlook is None else outlook_model(preview.outlook)
+    return PlanModel.of(preview, possible=preview.is_possible, outlook=outlook)
 
 
 def router(control: MissionControl, folder: MissionFolder) -> APIRouter:
@@ -170,18 +131,7 @@ def router(control: MissionControl, folder: MissionFolder) -> APIRouter:
     async def versions(_: Viewer, run: str) -> list[VersionModel]:
         """Each version of its mission that a run has had, the present one last."""
         await find_run(control, run)
-        found = await control.versions(run)
-        return [
-            VersionModel(
-                version=each.version,
-                mission=each.mission,
-                seq=each.seq,
-                at_us=each.at_us,
-                by=each.by,
-                shared_with=list(each.shared_with),
-            )
-            for each in found
-        ]
+        return [VersionModel.of(each) for each in await control.versions(run)]
 
     @routes.post("/{run}/revision/plan")
     async def plan(_: Operator, run: str, wanted: NewVersionModel) -> PlanModel:

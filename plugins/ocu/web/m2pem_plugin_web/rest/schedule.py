@@ -11,7 +11,7 @@ from m2pem_plugin_web.access.permissions import Commander, Operator, Stopper, Vi
 from m2pem_plugin_web.missions.folder import MissionFolder
 from m2pem_plugin_web.problems import RESPONSES, ProblemError
 from m2pem_plugin_web.rest.drafts import WrittenName, of_folder
-from m2pem_plugin_web.rest.models import Body, Data, Name, Reason
+from m2pem_plugin_web.rest.models import Answer, Body, Data, Name, Reason
 
 Seconds = Annotated[float, Field(ge=0)]
 MOST_VEHICLES = 1000
@@ -68,7 +68,7 @@ class HoldModel(Body):
     reason: Reason = ""
 
 
-class SettledTimeModel(BaseModel):
+class SettledTimeModel(Answer):
     """What became of a time: started, missed (`times` of them together), or refused."""
 
     due_us: int
@@ -79,7 +79,7 @@ class SettledTimeModel(BaseModel):
     times: int
 
 
-class ScheduledMissionModel(BaseModel):
+class ScheduledMissionModel(Answer):
     """An entry of the schedule. Times are microseconds since the Unix epoch by the executive's
     clock; null: there is none. `when`: in words."""
 
@@ -100,7 +100,7 @@ class ScheduledMissionModel(BaseModel):
     times: list[SettledTimeModel]
 
 
-class ScheduleModel(BaseModel):
+class ScheduleModel(Answer):
     """The schedule of the executive's fleet. `hold`: who holds it and why; "": no operator."""
 
     hold: str
@@ -117,34 +117,11 @@ def router(control: MissionControl, folder: MissionFolder) -> APIRouter:
     async def scheduled(_: Viewer) -> ScheduleModel:
         """What starts when, and what it waits for."""
         found = await control.scheduled()
-        return ScheduleModel(
-            hold=found.hold,
-            served=found.served,
-            warning_s=found.warning_s,
-            entries=[
-                ScheduledMissionModel(
-                    entry=each.entry,
-                    mission=each.mission,
-                    process=each.process,
-                    when=each.when_text,
-                    time_zone=each.when.time_zone,
-                    status=each.status,
-                    priority=each.priority,
-                    by=each.by,
-                    next_us=each.next_us,
-                    due_us=each.due_us,
-                    deadline_us=each.deadline_us,
-                    starts_us=each.starts_us,
-                    reason=each.reason,
-                    run=each.run,
-                    times=[
-                        SettledTimeModel.model_validate(settled, from_attributes=True)
-                        for settled in each.times
-                    ],
-                )
-                for each in found.entries
-            ],
-        )
+        entries = [
+            ScheduledMissionModel.of(each, when=each.when_text, time_zone=each.when.time_zone)
+            for each in found.entries
+        ]
+        return ScheduleModel.of(found, entries=entries)
 
     @routes.post("", status_code=201)
     async def schedule(person: Commander, wanted: ToScheduleModel) -> EntryModel:

@@ -16,7 +16,7 @@ from m2pem_plugin_web.access.roles import Person
 from m2pem_plugin_web.live.hub import Hub
 from m2pem_plugin_web.live.messages import prompt_of
 from m2pem_plugin_web.problems import RESPONSES, ProblemError
-from m2pem_plugin_web.rest.models import Body, Data, Name, PromptModel, Reason, known_run
+from m2pem_plugin_web.rest.models import Answer, Body, Data, Name, PromptModel, Reason, known_run
 
 
 class StopModel(Body):
@@ -133,7 +133,7 @@ def prompt_router(control: MissionControl, hub: Hub) -> APIRouter:
     return routes
 
 
-class WaitingTaskModel(BaseModel):
+class WaitingTaskModel(Answer):
     """A task that waits for vehicles or payloads: `MissionControl.waiting`. Times in seconds."""
 
     run: str
@@ -148,7 +148,7 @@ class WaitingTaskModel(BaseModel):
     holders: dict[str, str]
 
 
-class SpaceHolderModel(BaseModel):
+class SpaceHolderModel(Answer):
     """A vehicle that has a place in a shared space. `behavior`: "" if it is at rest there."""
 
     vehicle: str
@@ -156,7 +156,7 @@ class SpaceHolderModel(BaseModel):
     lost: bool
 
 
-class SharedSpaceModel(BaseModel):
+class SharedSpaceModel(Answer):
     """A shared space of the fleet file: `MissionControl.shared_space`. `geometry` (GeoJSON): an
     area, or a route with a corridor of `width_m`. `waiting`: the tasks that wait for a place."""
 
@@ -172,17 +172,10 @@ def space_model(fleet: Fleet, state: SharedSpaceState) -> SharedSpaceModel:
     """A shared space as JSON."""
     geometry = fleet.geometries[state.name]
     assert isinstance(geometry, Area | Route)
-    return SharedSpaceModel(
-        name=state.name,
-        capacity=state.capacity,
+    return SharedSpaceModel.of(
+        state,
         geometry=as_geojson(geometry)["geometry"],
         width_m=fleet.shared_space[state.name].width_m,
-        holders=[
-            SpaceHolderModel.model_validate(each, from_attributes=True) for each in state.holders
-        ],
-        waiting=[
-            WaitingTaskModel.model_validate(each, from_attributes=True) for each in state.waiting
-        ],
     )
 
 
@@ -219,10 +212,7 @@ def resource_router(control: MissionControl) -> APIRouter:
         return HoldersModel(
             holders={str(each): who for each, who in found.items()},
             labels=dict(await control.holder_labels()),
-            waiting=[
-                WaitingTaskModel.model_validate(each, from_attributes=True)
-                for each in await control.waiting()
-            ],
+            waiting=[WaitingTaskModel.of(each) for each in await control.waiting()],
             shared_space=[
                 space_model(control.fleet(), each) for each in await control.shared_space()
             ],

@@ -27,7 +27,7 @@ from m2pem_plugin_web.access.permissions import Viewer
 from m2pem_plugin_web.problems import RESPONSES, ProblemError
 from m2pem_plugin_web.rest.bounded_threads import BoundedThreads
 from m2pem_plugin_web.rest.given_geometries import GivenGeometry, given_geometry
-from m2pem_plugin_web.rest.models import Body, Name
+from m2pem_plugin_web.rest.models import Answer, Body, Name
 
 Length = Annotated[float, Field(gt=0.0, le=100_000.0, strict=False)]
 Millimetres = Annotated[float, Field(gt=0.0, le=1_000.0, strict=False)]
@@ -35,7 +35,7 @@ Pixels = Annotated[int, Field(gt=0, le=1_000_000)]
 Overlap = Annotated[float, Field(ge=0.0, lt=1.0, strict=False)]
 
 
-class KnownCameraModel(BaseModel):
+class KnownCameraModel(Answer):
     """A camera of a maker: the sensor, the lens and the images."""
 
     name: str
@@ -91,7 +91,7 @@ class PatternModel(Body):
         return self
 
 
-class SurveyRouteModel(BaseModel):
+class SurveyRouteModel(Answer):
     """The route of a vehicle, as a GeoJSON Feature.
 
     `vehicle` is "" where none was named. `time_s` is without turns, and null without a speed.
@@ -132,17 +132,7 @@ def router(control: MissionControl) -> APIRouter:
     @routes.get("/survey-cameras")
     async def cameras(_: Viewer) -> list[KnownCameraModel]:
         """Cameras of makers, for the `camera` of a survey pattern."""
-        return [
-            KnownCameraModel(
-                name=name,
-                sensor_width_mm=each.sensor_width_mm,
-                sensor_height_mm=each.sensor_height_mm,
-                focal_length_mm=each.focal_length_mm,
-                image_width_px=each.image_width_px,
-                image_height_px=each.image_height_px,
-            )
-            for name, each in KNOWN_CAMERAS.items()
-        ]
+        return [KnownCameraModel.of(each, name=name) for name, each in KNOWN_CAMERAS.items()]
 
     @routes.post("/survey-patterns")
     async def survey(_: Viewer, wanted: PatternModel) -> SurveyRoutesModel:
@@ -255,12 +245,10 @@ def _model(
     count = None
     if images is not None:
         count = math.ceil(found.surveyed_m / images.trigger_distance_m) + found.passes
-    return SurveyRouteModel(
+    return SurveyRouteModel.of(
+        found,
         vehicle=found.surveyor.name,
         geojson=as_geojson(found.route),
-        passes=found.passes,
-        length_m=found.length_m,
-        surveyed_m=found.surveyed_m,
         time_s=time_s,
         lasts_s=found.surveyor.lasts_s,
         battery_fraction=None if endurance_s is None or time_s is None else time_s / endurance_s,

@@ -25,7 +25,7 @@ from m2pem_plugin_web.access.permissions import Viewer
 from m2pem_plugin_web.problems import RESPONSES, ProblemError
 from m2pem_plugin_web.rest.bounded_threads import BoundedThreads
 from m2pem_plugin_web.rest.given_geometries import GivenGeometry, given_geometry
-from m2pem_plugin_web.rest.models import Body
+from m2pem_plugin_web.rest.models import Answer, Body
 
 
 class ProfileModel(Body):
@@ -37,7 +37,7 @@ class ProfileModel(Body):
     home_m: Annotated[float, Field(ge=-1_000.0, le=10_000.0, strict=False)] | None = None
 
 
-class ProfilePointModel(BaseModel):
+class ProfilePointModel(Answer):
     """A place along a route; heights are null where they are not known."""
 
     along_m: float
@@ -118,15 +118,7 @@ def router(control: MissionControl, folder: Path | None) -> APIRouter:
         low = lowest(points)
         return RouteProfileModel(
             points=[
-                ProfilePointModel(
-                    along_m=each.along_m,
-                    latitude_deg=each.place[0],
-                    longitude_deg=each.place[1],
-                    ground_m=each.ground_m,
-                    altitude_m=each.altitude_m,
-                    above_ground_m=each.above_ground_m,
-                    waypoint=each.waypoint,
-                )
+                ProfilePointModel.of(each, latitude_deg=each.place[0], longitude_deg=each.place[1])
                 for each in points
             ],
             lowest=None if low is None else points.index(low),

@@ -12,7 +12,7 @@ from m2pem_plugin_web.jobs import Jobs, JobState
 from m2pem_plugin_web.missions.folder import MissionFolder
 from m2pem_plugin_web.problems import RESPONSES
 from m2pem_plugin_web.rest.drafts import DraftModel, draft_of
-from m2pem_plugin_web.rest.models import FindingModel, finding_models
+from m2pem_plugin_web.rest.models import Answer, FindingModel
 
 LONGEST_S = 3600.0
 MOST_STATES = 10_000_000
@@ -45,7 +45,7 @@ class JobModel(BaseModel):
     id: str
 
 
-class ProgressModel(BaseModel):
+class ProgressModel(Answer):
     """How far it is: `waiting` of the `states` found are still to be searched. `decided`: by
     property or requirement, its verdict, if that is certain already."""
 
@@ -56,7 +56,7 @@ class ProgressModel(BaseModel):
     decided: dict[str, str]
 
 
-class VerificationModel(BaseModel):
+class VerificationModel(Answer):
     """A verification. `report`: as docs/verification.schema.json says, when it is done."""
 
     id: str
@@ -109,21 +109,7 @@ def router(control: MissionControl, folder: MissionFolder, jobs: Jobs[Report]) -
         if report is not None:
             covered = report["coverage"]
             found = SearchProgress(covered["seconds"], covered["states"])
-        return VerificationModel(
-            id=job.id,
-            by=job.by,
-            state=job.state,
-            progress=ProgressModel(
-                seconds=found.seconds,
-                states=found.states,
-                waiting=found.waiting,
-                memory_mb=found.memory_mb,
-                decided=dict(found.decided),
-            ),
-            report=report,
-            problem=job.problem or None,
-            findings=finding_models(job.findings),
-        )
+        return VerificationModel.of(job, progress=found, report=report, problem=job.problem or None)
 
     @routes.delete("/{identifier}", status_code=204)
     async def cancel(_: Operator, identifier: str) -> None:
