@@ -162,7 +162,7 @@ class Hub(Listener):
         if is_new and type(stamped.record) in FAULT_RECORDS and _is_fault(stamped.record):
             text = describe(stamped, view).text
             own = text.startswith(f"{view.run} ")
-            self._send_to_all(messages.fault(text if own else f"{view.run}: {text}"))
+            self._send_to_all("fault", text=text if own else f"{view.run}: {text}")
 
     def status_changed(self, view: RunView) -> None:
         """Send the status with the next frame."""
@@ -170,55 +170,55 @@ class Hub(Listener):
 
     def prompt_opened(self, prompt: OpenPrompt) -> None:
         """Send the prompt at once."""
-        self._send_to_all(messages.prompt_opened(prompt, self.place(prompt)))
+        self._send_to_all("prompt", prompt=messages.prompt_of(prompt, self.place(prompt)))
 
     def prompt_closed(self, prompt: OpenPrompt, closed: PromptClosed) -> None:
         """Send the answer or withdrawal at once."""
-        self._send_to_all(messages.prompt_closed(closed))
+        self._send_to_all("prompt_closed", **asdict(closed))
 
     def alerted(self, alert: Alert) -> None:
         """Send the alert at once, unless each page shows what it is about until it is over."""
         if alert.code == CONTROL_REQUEST and not alert.clears:
             return
         text = f"{alert.run}: {alert.text}" if alert.run else alert.text
-        is_news = alert.code in NEWS
-        self._send_to_all(messages.notice(text) if is_news else messages.fault(text))
+        self._send_to_all("notice" if alert.code in NEWS else "fault", text=text)
 
     def alerts_changed(self) -> None:
         """Send at once that the alerts are to be read again."""
-        self._send_to_all(messages.alerts_changed())
+        self._send_to_all("alerts")
 
     def schedule_changed(self) -> None:
         """Send at once that the schedule is to be read again."""
-        self._send_to_all(messages.schedule_changed())
+        self._send_to_all("schedule")
 
     def shared_space_changed(self) -> None:
         """Send at once that shared space is to be read again."""
-        self._send_to_all(messages.shared_space_changed())
+        self._send_to_all("shared_space")
 
     def operators_changed(self) -> None:
         """Send at once that operators are to be read again."""
-        self._send_to_all(messages.operators_changed())
+        self._send_to_all("operators")
 
     def comments_changed(self, mission: str) -> None:
         """Send at once that the comments on a mission are to be read again."""
-        self._send_to_all(messages.comments_changed(mission))
+        self._send_to_all("comments", mission=mission)
 
     def announce(self, text: str) -> None:
         """Send a text to all operators."""
-        self._send_to_all(messages.fault(text))
+        self._send_to_all("fault", text=text)
 
     def detected(self, run: RunId, entries: Sequence[DetectionEntry], more: int) -> None:
-        """Send new detections to those who watch the run."""
-        message = messages.detections(run, entries, more)
+        """Send new detections to those who watch the run. `more`: how many have no entry."""
+        message = messages.message("detections", run=run, detections=entries, more=more)
         for viewer in self.viewers:
             if viewer.live is not None and viewer.live.view.run == run:
                 viewer.send_soon(message)
 
     def _lost(self, resource: ResourceId) -> None:
-        self._send_to_all(messages.fault(f"{resource}: its link is lost"))
+        self._send_to_all("fault", text=f"{resource}: its link is lost")
 
-    def _send_to_all(self, message: Message) -> None:
+    def _send_to_all(self, kind: str, **fields: Any) -> None:
+        message = messages.message(kind, **fields)
         for viewer in self.viewers:
             viewer.send_soon(message)
 
@@ -264,7 +264,7 @@ class Hub(Listener):
     def _send_statuses(self) -> None:
         for run in self._changed_status:
             if run in self.runs:
-                self._send_to_all(messages.run(self.runs[run].view.counted()))
+                self._send_to_all("run", run=asdict(self.runs[run].view.counted()))
         self._changed_status.clear()
 
     async def _update_holders(self, now: float) -> None:
@@ -336,7 +336,9 @@ class Hub(Listener):
             if live is not None and viewer.log_due:
                 after = max(viewer.logged_seq, live.view.newest[0].seq - 1)
                 if (log := made.get((run, after))) is None:
-                    log = made[run, after] = messages.log(live.newest_after(after))
+                    log = made[run, after] = messages.message(
+                        "log", records=live.newest_after(after)
+                    )
                 viewer.send_log(log)
 
     def _head(self, live: LiveRun | None) -> dict[str, Any]:

@@ -1,15 +1,13 @@
-"""Messages over the WebSocket: one function for each. They are encoded once for all browsers."""
+"""Messages over the WebSocket. They are encoded once for all browsers."""
 
-from collections.abc import Iterable, Sequence
-from dataclasses import asdict
+from collections.abc import Iterable
 from typing import Any, NamedTuple, TypeVar
 
 import msgspec
 
-from m2pem.api import OpenPrompt, PromptClosed, RunId, RunSummary, RunView, StampedRecord, describe
+from m2pem.api import OpenPrompt, RunId, RunView, StampedRecord, describe
 from m2pem.api.records import PromptOpened
 from m2pem.api.run_view import ElementState, Place
-from m2pem_plugin_web.tracks.detections import DetectionEntry
 
 _encode = msgspec.json.Encoder().encode
 
@@ -71,71 +69,6 @@ def prompt_record_of(run: RunId, record: PromptOpened) -> dict[str, Any]:
         "decisions": record.decisions,
         "role": record.role,
     }
-
-
-def prompt_opened(prompt: OpenPrompt, place: Place | None) -> Message:
-    """Return the message that a prompt has opened."""
-    return message("prompt", prompt=prompt_of(prompt, place))
-
-
-def prompt_closed(closed: PromptClosed) -> Message:
-    """Return the message that a prompt was answered or withdrawn."""
-    return message("prompt_closed", **asdict(closed))
-
-
-def run(summary: RunSummary) -> Message:
-    """Return the message of a run's new status."""
-    return message("run", run=asdict(summary))
-
-
-def detections(run: RunId, entries: Sequence[DetectionEntry], more: int) -> Message:
-    """Return the message of new detections of a run. `more`: how many it has without an entry."""
-    return message("detections", run=run, detections=entries, more=more)
-
-
-def fault(text: str) -> Message:
-    """Return the message of a fault."""
-    return message("fault", text=text)
-
-
-def notice(text: str) -> Message:
-    """Return the message of something that is no fault."""
-    return message("notice", text=text)
-
-
-def schedule_changed() -> Message:
-    """Return the message that the schedule is to be read again: `GET /api/schedule`."""
-    return message("schedule")
-
-
-def alerts_changed() -> Message:
-    """Return the message that the alerts are to be read again: `GET /api/alerts`."""
-    return message("alerts")
-
-
-def shared_space_changed() -> Message:
-    """Return the message that shared space is to be read again: `GET /api/resources`."""
-    return message("shared_space")
-
-
-def comments_changed(mission: str) -> Message:
-    """Return the message that the comments on a mission are to be read again."""
-    return message("comments", mission=mission)
-
-
-def operators_changed() -> Message:
-    """Return the message that operators are to be read again: `GET /api/operators`."""
-    return message("operators")
-
-
-def alive() -> Message:
-    """Return the message that an answer takes longer."""
-    return message("alive")
-
-
-def log(records: Iterable[msgspec.Raw]) -> Message:
-    """Return the message with the newest records of the watched run."""
-    return message("log", records=list(records))
 
 
 def nested(states: Iterable[tuple[Place, State]]) -> dict[str, dict[str, State]]:

@@ -169,7 +169,7 @@ class _Listener:
                     case _Edit(mission=mission):
                         await hub.edit(self._viewer, mission or "")
             except M2pemError as error:
-                self._viewer.send(messages.fault(str(error)))
+                self._viewer.send(messages.message("fault", text=str(error)))
 
 
 async def _watch(hub: Hub, viewer: Viewer, run: str | None) -> None:
@@ -177,7 +177,7 @@ async def _watch(hub: Hub, viewer: Viewer, run: str | None) -> None:
     watching = asyncio.ensure_future(hub.watch(viewer, run))
     try:
         while not (await asyncio.wait({watching}, timeout=HEARTBEAT_S))[0]:
-            viewer.send(messages.alive())
+            viewer.send(messages.message("alive"))
         await watching
     finally:
         watching.cancel()
