@@ -5,18 +5,15 @@ Each names its element by the id, with the label that the element had: one whose
 still shown.
 """
 
-import fcntl
-import os
 import threading
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 
 import msgspec
 
 from m2pem.api import person_of
-from m2pem_plugin_web.missions.folder import FolderError, MissionFolder
+from m2pem_plugin_web.missions.folder import FolderError, MissionFolder, locked
 from m2pem_plugin_web.missions.versions import FOLDER, write
 
 MOST = 1000
@@ -83,7 +80,7 @@ class Comments:
             CommentError: the parent does not exist, or there are too many.
         """
         version = self._folder.read(mission).version
-        with self._alone():
+        with locked(self._folder.path, _LOCK, self._lock):
             known = list(self.all(mission))
             if len(known) >= MOST:
                 raise CommentError(f"{mission} has {MOST} comments: delete some first")
@@ -111,7 +108,7 @@ class Comments:
         Raises:
             CommentError: there is no such comment, or it is an answer.
         """
-        with self._alone():
+        with locked(self._folder.path, _LOCK, self._lock):
             known = list(self.all(mission))
             found = _find(known, number)
             if found.parent:
@@ -129,7 +126,7 @@ class Comments:
         Raises:
             CommentError: there is no such comment, or it is that of another person.
         """
-        with self._alone():
+        with locked(self._folder.path, _LOCK, self._lock):
             known = list(self.all(mission))
             found = _find(known, number)
             if not of_others:
@@ -154,22 +151,6 @@ class Comments:
             write(path, msgspec.json.encode(comments))
         except OSError as error:
             raise FolderError(f"{path.name} of {mission}: {error.strerror}") from error
-
-    @contextmanager
-    def _alone(self) -> Iterator[None]:
-        """Lock the comments, in this process and in others of m2pem."""
-        with self._lock:
-            try:
-                hidden = self._folder.path / FOLDER
-                hidden.mkdir(parents=True, exist_ok=True)
-                handle = os.open(hidden / _LOCK, os.O_CREAT | os.O_RDWR | os.O_CLOEXEC, 0o666)
-            except OSError as error:
-                raise FolderError(f"{self._folder.path}: {error.strerror}") from error
-            try:
-                fcntl.flock(handle, fcntl.LOCK_EX)
-                yield
-            finally:
-                os.close(handle)
 
 
 def _find(comments: Sequence[Comment], number: int) -> Comment:

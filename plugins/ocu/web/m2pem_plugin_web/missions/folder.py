@@ -121,7 +121,7 @@ class MissionFolder:
             FolderError: it cannot be written.
         """
         path = self.file(name)
-        with self._alone():
+        with locked(self.path, ".lock", self._lock):
             current = self._current(name)
             if (current.version if current is not None else None) != base:
                 raise ChangedError(name, current)
@@ -146,7 +146,7 @@ class MissionFolder:
             NoMissionError: the mission or version does not exist.
         """
         path = self.file(name)
-        with self._alone():
+        with locked(self.path, ".lock", self._lock):
             current = self.read(name)
             try:
                 versions = Versions(self.path, name)
@@ -194,21 +194,26 @@ class MissionFolder:
         except NoMissionError:
             return None
 
-    @contextmanager
-    def _alone(self) -> Iterator[None]:
-        """Lock the folder against other saves, in this process and in others of m2pem."""
-        with self._lock:
-            try:
-                hidden = self.path / FOLDER
-                hidden.mkdir(parents=True, exist_ok=True)
-                handle = os.open(hidden / ".lock", os.O_CREAT | os.O_RDWR | os.O_CLOEXEC, 0o666)
-            except OSError as error:
-                raise FolderError(f"{self.path}: {error.strerror}") from error
-            try:
-                fcntl.flock(handle, fcntl.LOCK_EX)
-                yield
-            finally:
-                os.close(handle)
+
+@contextmanager
+def locked(folder: Path, file: str, lock: Lock) -> Iterator[None]:
+    """Lock what is kept in a folder: by `lock` in this process, by `file` in others of m2pem.
+
+    Raises:
+        FolderError: the disk refuses.
+    """
+    with lock:
+        try:
+            hidden = folder / FOLDER
+            hidden.mkdir(parents=True, exist_ok=True)
+            handle = os.open(hidden / file, os.O_CREAT | os.O_RDWR | os.O_CLOEXEC, 0o666)
+        except OSError as error:
+            raise FolderError(f"{folder}: {error.strerror}") from error
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX)
+            yield
+        finally:
+            os.close(handle)
 
 
 _USES_OTHERS = (b"callActivity", b"import")
