@@ -7,6 +7,7 @@ keep the others, and the answer says it for each.
 import asyncio
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Annotated
 
 from fastapi import APIRouter
@@ -155,32 +156,18 @@ def router(control: MissionControl, hub: Hub) -> APIRouter:
     @routes.post("/take")
     async def take(person: Operator, wanted: ResourcesModel) -> ResultsModel:
         """Take them from the missions, to command them by hand."""
-
-        async def command(resource: str) -> RunId:
-            await control.take(resource, by=person.name)
-            return ""
-
-        return await _each(wanted.resources, command)
+        return await _each(wanted.resources, partial(control.take, by=person.name))
 
     @routes.post("/give-back")
     async def give_back(person: Operator, wanted: GiveBackManyModel) -> ResultsModel:
         """Give them back to the missions. Only who has one may, or another one with a reason."""
-
-        async def command(resource: str) -> RunId:
-            await control.give_back(resource, reason=wanted.reason, by=person.name)
-            return ""
-
-        return await _each(wanted.resources, command)
+        give_back = partial(control.give_back, reason=wanted.reason, by=person.name)
+        return await _each(wanted.resources, give_back)
 
     @routes.post("/request")
     async def request(person: Operator, wanted: ResourcesModel) -> ResultsModel:
         """Ask the operators who have them for them."""
-
-        async def command(resource: str) -> RunId:
-            await control.request_control(resource, by=person.name)
-            return ""
-
-        return await _each(wanted.resources, command)
+        return await _each(wanted.resources, partial(control.request_control, by=person.name))
 
     @routes.post("/execute")
     async def execute(person: Operator, wanted: CommandModel) -> ResultsModel:
@@ -237,7 +224,7 @@ class _RefusedError(Exception):
 
 
 async def _each(
-    resources: Sequence[str], command: Callable[[str], Awaitable[RunId]]
+    resources: Sequence[str], command: Callable[[str], Awaitable[RunId | None]]
 ) -> ResultsModel:
     """Give a command to each resource, a few at a time."""
     turn = asyncio.Semaphore(AT_A_TIME)
@@ -245,7 +232,7 @@ async def _each(
     async def result(resource: str) -> ResultModel:
         async with turn:
             try:
-                return ResultModel(resource=resource, run=await command(resource))
+                return ResultModel(resource=resource, run=await command(resource) or "")
             except (M2pemError, _RefusedError) as error:
                 return ResultModel(resource=resource, problem=_in_words(resource, error))
 

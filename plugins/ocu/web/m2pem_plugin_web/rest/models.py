@@ -148,3 +148,13 @@ async def known_run(control: MissionControl, run: str) -> AsyncIterator[None]:
     except NotDrivenError:
         await find_run(control, run)
         raise
+
+
+async def known_resource(control: MissionControl, resource: str) -> None:
+    """Refuse what is no vehicle or payload of the fleet.
+
+    Raises:
+        ProblemError: 404, it has none.
+    """
+    if resource not in await control.holders():
+        raise ProblemError(404, f"the fleet has no {resource}")

@@ -7,8 +7,8 @@ from pydantic import BaseModel, Field
 
 from m2pem.api import MAX_NOTE_CHARACTERS, MissionControl, person_of
 from m2pem_plugin_web.access.permissions import Operator, Viewer
-from m2pem_plugin_web.problems import RESPONSES, ProblemError
-from m2pem_plugin_web.rest.models import Answer, Body, known_run
+from m2pem_plugin_web.problems import RESPONSES
+from m2pem_plugin_web.rest.models import Answer, Body, known_resource, known_run
 
 
 class PresenceModel(Answer):
@@ -60,10 +60,6 @@ def router(control: MissionControl) -> APIRouter:
     """The routes of what operators have to do with each other."""
     routes = APIRouter(prefix="/api", tags=["operators"], responses=RESPONSES)
 
-    async def known(resource: str) -> None:
-        if resource not in await control.holders():
-            raise ProblemError(404, f"the fleet has no {resource}")
-
     @routes.get("/operators")
     async def operators(person: Viewer) -> OperatorsModel:
         """Who is present, and who asks whom for what."""
@@ -80,13 +76,13 @@ def router(control: MissionControl) -> APIRouter:
     @routes.post("/resources/{resource:path}/request", status_code=204)
     async def request(person: Operator, resource: str) -> None:
         """Ask the operator who has it for it."""
-        await known(resource)
+        await known_resource(control, resource)
         await control.request_control(resource, by=person.name)
 
     @routes.post("/resources/{resource:path}/hand-over", status_code=204)
     async def hand_over(person: Operator, resource: str, wanted: AnswerControlModel) -> None:
         """Give it to the operator who asks for it, or refuse."""
-        await known(resource)
+        await known_resource(control, resource)
         await control.answer_control(resource, give=wanted.give, by=person.name)
 
     @routes.post("/runs/{run}/notes", status_code=204)

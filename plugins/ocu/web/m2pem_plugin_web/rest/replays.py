@@ -8,7 +8,7 @@ from fastapi import APIRouter, Query, Response
 from fastapi import Path as InPath
 from pydantic import BaseModel
 
-from m2pem.api import MissionControl, RunStatus, SimulationResult
+from m2pem.api import MissionControl, SimulationResult
 from m2pem_plugin_web.access.permissions import Viewer
 from m2pem_plugin_web.jobs import Jobs
 from m2pem_plugin_web.problems import RESPONSES, ProblemError
@@ -17,7 +17,7 @@ from m2pem_plugin_web.replay.replays import Making, Replays
 from m2pem_plugin_web.replay.source import ListSource
 from m2pem_plugin_web.rest.models import RecordModel, find_run
 from m2pem_plugin_web.rest.rehearsals import names_of, result_of
-from m2pem_plugin_web.rest.runs import LARGEST
+from m2pem_plugin_web.rest.runs import GOING_ON, LARGEST
 
 LATEST_S = 1e12
 
@@ -80,7 +80,7 @@ def router(
 
     async def of_run(run: str) -> Replay | Making:
         summary = await find_run(control, run)
-        if summary.status in (RunStatus.RUNNING, RunStatus.PAUSED):
+        if summary.status in GOING_ON:
             raise ProblemError(409, f"{run} goes on: it can be replayed when it has ended")
         return await replays.of_run(summary)
 

@@ -3,7 +3,6 @@
 import asyncio
 import time
 from collections.abc import Callable, Collection, Iterable, Sequence
-from contextlib import suppress
 from enum import StrEnum
 from typing import Annotated, Any
 
@@ -11,18 +10,15 @@ from fastapi import APIRouter, Query
 from pydantic import BaseModel
 
 from m2pem.api import MissionControl, RunStatus, RunSummary
-from m2pem.errors import M2pemError
 from m2pem_plugin_web.access.permissions import Viewer
 from m2pem_plugin_web.problems import RESPONSES
-from m2pem_plugin_web.rest.models import RunModel, run_model
+from m2pem_plugin_web.rest.models import RunModel
 from m2pem_plugin_web.rest.run_resources import RunResources
+from m2pem_plugin_web.rest.runs import GOING_ON, LARGEST, run_now
 
 MOST = 200
 FRESH_S = 1.0
 """For so long the list of runs that was read serves all pages."""
-
-LARGEST = 2**53 - 1
-GOING_ON = frozenset((RunStatus.RUNNING, RunStatus.PAUSED))
 
 
 class SortedBy(StrEnum):
@@ -118,13 +114,6 @@ def router(control: MissionControl) -> APIRouter:
             if each == resource or each.startswith(f"{resource}/")
         }
 
-    async def model(run: RunSummary) -> RunModel:
-        took_s = None
-        if run.status in GOING_ON:
-            with suppress(M2pemError):  # another executive drives it
-                took_s = await control.mission_time_s(run.run)
-        return run_model(run, took_s)
-
     @routes.get("")
     async def page(
         _: Viewer,
@@ -158,7 +147,7 @@ def router(control: MissionControl) -> APIRouter:
             had, unread = await resources.having(vehicle, lines)
             lines = [each for each in lines if each.run in had or each.run in now]
         return RunsPage(
-            runs=[await model(each) for each in lines[offset : offset + limit]],
+            runs=[await run_now(control, each) for each in lines[offset : offset + limit]],
             total=len(lines),
             all=len(runs),
             unread=unread,

@@ -31,6 +31,7 @@ async def shown(control: MissionControl, source: bytes) -> str:
 MOST_RUNS = 1000
 MOST_RECORDS = 5000
 LARGEST = 2**53 - 1
+GOING_ON = frozenset((RunStatus.RUNNING, RunStatus.PAUSED))
 
 
 class StartModel(Body):
@@ -90,24 +91,17 @@ def router(control: MissionControl, folder: MissionFolder, hub: Hub) -> APIRoute
         )
         return StartedModel(run=run)
 
-    async def now(summary: RunSummary) -> RunModel:
-        took_s = None
-        if summary.status in (RunStatus.RUNNING, RunStatus.PAUSED):
-            with suppress(M2pemError):  # another executive drives it
-                took_s = await control.mission_time_s(summary.run)
-        return run_model(summary, took_s)
-
     @routes.get("")
     async def runs(
         _: Viewer, limit: Annotated[int, Query(ge=1, le=MOST_RUNS)] = MOST_RUNS
     ) -> list[RunModel]:
         """The runs of the journal, the newest last; `limit` of them at most."""
-        return [await now(each) for each in list(await control.runs())[-limit:]]
+        return [await run_now(control, each) for each in list(await control.runs())[-limit:]]
 
     @routes.get("/{run}")
     async def run(_: Viewer, run: str) -> RunModel:
         """Return the summary of a run."""
-        return await now(await find_run(control, run))
+        return await run_now(control, await find_run(control, run))
 
     @routes.get("/{run}/records", response_model=RecordPage)
     async def records(
@@ -144,6 +138,15 @@ def router(control: MissionControl, folder: MissionFolder, hub: Hub) -> APIRoute
         return RunMissionModel(name=found.file, process=summary.process, files=files)
 
     return routes
+
+
+async def run_now(control: MissionControl, summary: RunSummary) -> RunModel:
+    """A run as JSON, with how long it has taken up to now."""
+    took_s = None
+    if summary.status in GOING_ON:
+        with suppress(M2pemError):  # another executive drives it
+            took_s = await control.mission_time_s(summary.run)
+    return run_model(summary, took_s)
 
 
 async def file_models(control: MissionControl, files: Iterable[MissionFile]) -> list[FileModel]:

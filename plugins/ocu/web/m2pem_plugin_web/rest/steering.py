@@ -16,7 +16,16 @@ from m2pem_plugin_web.access.roles import Person
 from m2pem_plugin_web.live.hub import Hub
 from m2pem_plugin_web.live.messages import prompt_of
 from m2pem_plugin_web.problems import RESPONSES, ProblemError
-from m2pem_plugin_web.rest.models import Answer, Body, Data, Name, PromptModel, Reason, known_run
+from m2pem_plugin_web.rest.models import (
+    Answer,
+    Body,
+    Data,
+    Name,
+    PromptModel,
+    Reason,
+    known_resource,
+    known_run,
+)
 
 
 class StopModel(Body):
@@ -201,10 +210,6 @@ def resource_router(control: MissionControl) -> APIRouter:
     """The routes of resources."""
     routes = APIRouter(prefix="/api/resources", tags=["resources"], responses=RESPONSES)
 
-    async def known(resource: str) -> None:
-        if resource not in await control.holders():
-            raise ProblemError(404, f"the fleet has no {resource}")
-
     @routes.get("")
     async def holders(_: Viewer) -> HoldersModel:
         """Who has what, which tasks wait, and what missions do not get now, and why."""
@@ -222,7 +227,7 @@ def resource_router(control: MissionControl) -> APIRouter:
     @routes.post("/{resource:path}/take", status_code=204)
     async def take(person: Operator, resource: str) -> None:
         """Take it from the missions, to steer it by hand."""
-        await known(resource)
+        await known_resource(control, resource)
         await control.take(resource, by=person.name)
 
     @routes.post("/{resource:path}/give-back", status_code=204)
@@ -230,7 +235,7 @@ def resource_router(control: MissionControl) -> APIRouter:
         person: Operator, resource: str, wanted: GiveBackModel | None = None
     ) -> None:
         """Give it back to the missions. Only who has it may, or another one with a reason."""
-        await known(resource)
+        await known_resource(control, resource)
         reason = wanted.reason if wanted is not None else ""
         await control.give_back(resource, reason=reason, by=person.name)
 
