@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from threading import Lock
-from typing import Any, Protocol
+from typing import Any, TypeAlias
 
 from m2pem_plugin_web.settings import TILES, SettingError
 
@@ -48,33 +48,6 @@ class Pictured:
     attribution: str
 
 
-class Tiles(Protocol):
-    """The tiles of a file."""
-
-    pictured: Pictured
-
-    def tile(self, zoom: int, column: int, row: int) -> bytes | None:
-        """Return a tile; rows count from the north. None: the file does not have it."""
-
-    def close(self) -> None:
-        """Close the file."""
-
-
-def open_tiles(file: Path) -> Tiles:
-    """Open a file of tiles; its first bytes say which format it has.
-
-    Raises:
-        SettingError: the file cannot be read, is neither MBTiles nor PMTiles, or has vector data
-            instead of images.
-    """
-    try:
-        with file.open("rb") as opened:
-            begins = opened.read(len(_MAGIC))
-    except OSError as error:
-        raise SettingError(f"{TILES}={file} cannot be read: {error.strerror}") from error
-    return PmTiles(file) if begins == _MAGIC else MbTiles(file)
-
-
 class MbTiles:
     """The tiles of an MBTiles file.
 
@@ -102,7 +75,7 @@ class MbTiles:
         self.pictured = Pictured(media_type, int(deepest or 0), _plain(said.get("attribution", "")))
 
     def tile(self, zoom: int, column: int, row: int) -> bytes | None:
-        """See `Tiles.tile`."""
+        """Return a tile; rows count from the north. None: the file does not have it."""
         from_south = (1 << zoom) - 1 - row
         with self._lock:
             found = self._database.execute(
@@ -113,7 +86,7 @@ class MbTiles:
         return None if found is None else bytes(found[0])
 
     def close(self) -> None:
-        """See `Tiles.close`."""
+        """Close the file."""
         self._database.close()
 
 
@@ -175,7 +148,7 @@ class PmTiles:
         )
 
     def tile(self, zoom: int, column: int, row: int) -> bytes | None:
-        """See `Tiles.tile`. A part of the archive that is damaged has no tiles."""
+        """See `MbTiles.tile`. A part of the archive that is damaged has no tiles."""
         if column >> zoom or row >> zoom:
             return None
         try:
@@ -210,7 +183,7 @@ class PmTiles:
         return data
 
     def close(self) -> None:
-        """See `Tiles.close`."""
+        """Close the file."""
         descriptor, self._descriptor = self._descriptor, None
         if descriptor is not None:
             os.close(descriptor)
@@ -233,3 +206,21 @@ def _media_type(file: Path, kind: str) -> str:
 
 def _plain(attribution: object) -> str:
     return html.unescape(_MARKUP.sub("", str(attribution))).strip()
+
+
+Tiles: TypeAlias = MbTiles | PmTiles
+
+
+def open_tiles(file: Path) -> Tiles:
+    """Open a file of tiles; its first bytes say which format it has.
+
+    Raises:
+        SettingError: the file cannot be read, is neither MBTiles nor PMTiles, or has vector data
+            instead of images.
+    """
+    try:
+        with file.open("rb") as opened:
+            begins = opened.read(len(_MAGIC))
+    except OSError as error:
+        raise SettingError(f"{TILES}={file} cannot be read: {error.strerror}") from error
+    return PmTiles(file) if begins == _MAGIC else MbTiles(file)

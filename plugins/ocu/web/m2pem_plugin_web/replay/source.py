@@ -1,8 +1,7 @@
 """Where the records of a replay come from: the journal, or a rehearsal in memory."""
 
-import asyncio
 from collections.abc import Mapping, Sequence
-from typing import Protocol
+from typing import TypeAlias
 
 from m2pem.api import Mission, MissionControl, RunId, RunSummary, StampedRecord
 from m2pem.errors import M2pemError
@@ -11,54 +10,26 @@ _EARLIER = (100, 1000, 10_000, 100_000)
 """An input may have that many records: a journal is read from the first record of one."""
 
 
-class RecordSource(Protocol):
-    """The records of a run that is over."""
-
-    @property
-    def summary(self) -> RunSummary:
-        """The run, with the number of its records."""
-        ...
-
-    @property
-    def names(self) -> Mapping[str, str] | None:
-        """The names of what the mission defines, by id; None: `mission` has them."""
-        ...
-
-    async def mission(self) -> Mission | None:
-        """Return the mission; None: there is none, or it cannot be read."""
-        ...
-
-    async def page(self, after: int, limit: int) -> Sequence[StampedRecord]:
-        """Return about `limit` records after one with which an input ended."""
-        ...
-
-    async def between(self, after: int, last: int) -> Sequence[StampedRecord]:
-        """Return the records after `after` up to and with `last`."""
-        ...
-
-
 class JournalSource:
-    """The records of a run of the journal. `summary.records`: how many it has."""
+    """The records of a run of the journal that is over. `summary.records`: how many it has."""
 
-    names = None
+    names: Mapping[str, str] | None = None
+    """The names of what the mission defines, by id; None: `mission` has them."""
 
     def __init__(self, control: MissionControl, summary: RunSummary) -> None:
         self.summary = summary
         self._control = control
 
     async def mission(self) -> Mission | None:
-        """See `RecordSource.mission`."""
+        """Return the mission; None: there is none, or it cannot be read."""
         try:
             return await self._control.mission(self.summary.run)
         except M2pemError:
             return None
 
-    async def page(self, after: int, limit: int) -> Sequence[StampedRecord]:
-        """See `RecordSource.page`."""
-        return await self._control.records(self.summary.run, after, limit)
-
     async def between(self, after: int, last: int) -> Sequence[StampedRecord]:
-        """See `RecordSource.between`: of an input that begins before, the rest."""
+        """Return the records after `after` up to and with `last`: of an input that begins before,
+        the rest."""
         run: RunId = self.summary.run
         for earlier in (*_EARLIER, after):
             begin = max(0, after - earlier)
@@ -87,14 +58,12 @@ class ListSource:
         self._records = records
 
     async def mission(self) -> Mission | None:
-        """See `RecordSource.mission`: the names are given."""
+        """See `JournalSource.mission`: the names are given."""
         return None
 
-    async def page(self, after: int, limit: int) -> Sequence[StampedRecord]:
-        """See `RecordSource.page`."""
-        await asyncio.sleep(0)
-        return self._records[after : after + limit]
-
     async def between(self, after: int, last: int) -> Sequence[StampedRecord]:
-        """See `RecordSource.between`."""
+        """See `JournalSource.between`."""
         return self._records[after:last]
+
+
+RecordSource: TypeAlias = JournalSource | ListSource

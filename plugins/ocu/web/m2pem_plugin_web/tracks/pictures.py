@@ -10,7 +10,7 @@ from collections import OrderedDict
 from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
-from typing import Protocol
+from typing import TypeAlias
 
 from m2pem.api import RunId
 from m2pem_plugin_web.tracks.camera_pictures import MEDIA_TYPES, Picture
@@ -30,41 +30,10 @@ class FullError(Exception):
         super().__init__(f"the run has {most_bytes / 1e6:g} MB of pictures already")
 
 
-class PictureStore(Protocol):
-    """Pictures of runs, by the numbers of detections. Methods raise OSError."""
-
-    def put(self, run: RunId, number: int, picture: Picture) -> None:
-        """Keep a picture, in place of one of that number.
-
-        Raises:
-            FullError: the run has too many already.
-        """
-        ...
-
-    def get(self, run: RunId, number: int) -> Picture | None:
-        """Return a picture; None if there is none."""
-        ...
-
-    def runs(self) -> Iterable[RunId]:
-        """Return the runs that have pictures."""
-        ...
-
-    def remove(self, run: RunId, after: int = 0) -> None:
-        """Remove the pictures of a run; those of later numbers than `after` alone."""
-        ...
-
-
-def pictures_beside(journal: Path | None) -> PictureStore:
-    """Return the store of a journal's pictures. `journal` None: a journal in memory."""
-    return (
-        MemoryPictures()
-        if journal is None
-        else FolderPictures(journal.with_name(f"{journal.name}-tracks"))
-    )
-
-
 class FolderPictures:
-    """Files in the folder of tracks, which only its owner may read."""
+    """Pictures of runs by the numbers of detections: files in the folder of tracks, which only its
+    owner may read. Methods raise OSError.
+    """
 
     def __init__(self, path: Path, most_bytes: int = FILE_BYTES) -> None:
         self._path = path
@@ -72,7 +41,11 @@ class FolderPictures:
         self._sizes: dict[RunId, int] = {}
 
     def put(self, run: RunId, number: int, picture: Picture) -> None:
-        """See `PictureStore.put`: a file is there whole, or not at all."""
+        """Keep a picture, in place of one of that number. A file is there whole, or not at all.
+
+        Raises:
+            FullError: the run has too many already.
+        """
         name = f"{run}-{number}.{picture.suffix}"
         if not _NAME.fullmatch(name):
             raise OSError(errno.EINVAL, f"{run!r} is not the id of a run")
@@ -97,7 +70,7 @@ class FolderPictures:
             raise
 
     def get(self, run: RunId, number: int) -> Picture | None:
-        """See `PictureStore.get`."""
+        """Return a picture; None if there is none."""
         for suffix in MEDIA_TYPES:
             name = f"{run}-{number}.{suffix}"
             if not _NAME.fullmatch(name):
@@ -107,12 +80,12 @@ class FolderPictures:
         return None
 
     def runs(self) -> Iterable[RunId]:
-        """See `PictureStore.runs`: files of others are left alone."""
+        """Return the runs that have pictures: files of others are left alone."""
         names = (_NAME.fullmatch(path.name) for path in self._path.glob("r*-*.*"))
         return {RunId(found[1]) for found in names if found}
 
     def remove(self, run: RunId, after: int = 0) -> None:
-        """See `PictureStore.remove`."""
+        """Remove the pictures of a run; those of later numbers than `after` alone."""
         self._sizes.pop(run, None)
         for file, number in self._files(run):
             if number > after:
@@ -132,7 +105,7 @@ class MemoryPictures:
         self._kept: OrderedDict[RunId, dict[int, Picture]] = OrderedDict()
 
     def put(self, run: RunId, number: int, picture: Picture) -> None:
-        """See `PictureStore.put`."""
+        """See `FolderPictures.put`."""
         pictures = self._kept.setdefault(run, {})
         size = sum(len(each.content) for each in pictures.values())
         if size + len(picture.content) > self._most_bytes:
@@ -142,17 +115,29 @@ class MemoryPictures:
             self._kept.popitem(last=False)
 
     def get(self, run: RunId, number: int) -> Picture | None:
-        """See `PictureStore.get`."""
+        """See `FolderPictures.get`."""
         return self._kept.get(run, {}).get(number)
 
     def runs(self) -> Iterable[RunId]:
-        """See `PictureStore.runs`."""
+        """See `FolderPictures.runs`."""
         return list(self._kept)
 
     def remove(self, run: RunId, after: int = 0) -> None:
-        """See `PictureStore.remove`."""
+        """See `FolderPictures.remove`."""
         pictures = self._kept.get(run, {})
         for number in [each for each in pictures if each > after]:
             del pictures[number]
         if not pictures:
             self._kept.pop(run, None)
+
+
+PictureStore: TypeAlias = FolderPictures | MemoryPictures
+
+
+def pictures_beside(journal: Path | None) -> PictureStore:
+    """Return the store of a journal's pictures. `journal` None: a journal in memory."""
+    return (
+        MemoryPictures()
+        if journal is None
+        else FolderPictures(journal.with_name(f"{journal.name}-tracks"))
+    )

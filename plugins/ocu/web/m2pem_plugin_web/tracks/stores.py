@@ -11,7 +11,7 @@ from collections import OrderedDict
 from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
-from typing import Protocol
+from typing import TypeAlias
 
 from m2pem.api import RunId
 
@@ -32,68 +32,11 @@ class HeldError(Exception):
     """Another page of the same executive writes this track."""
 
 
-class TrackText(Protocol):
-    """The text of a track, locked for one writer. Methods raise OSError."""
-
-    def read(self) -> bytes:
-        """Return the whole text."""
-        ...
-
-    def append(self, text: bytes) -> None:
-        """Add all of `text`, or nothing."""
-        ...
-
-    def replace(self, text: bytes) -> None:
-        """Replace the content by `text`, or leave it unchanged."""
-        ...
-
-    def close(self) -> None:
-        """Close the track for writing."""
-        ...
-
-
-class TrackStore(Protocol):
-    """A text for each run, of at most `most_bytes`. Methods raise OSError."""
-
-    @property
-    def most_bytes(self) -> int:
-        """The size beyond which a text is thinned."""
-        ...
-
-    def open(self, run: RunId) -> TrackText:
-        """Open the text of a run for writing; create it if it is missing.
-
-        Raises:
-            HeldError: another page writes it.
-        """
-        ...
-
-    def read(self, run: RunId, size: int = -1) -> bytes:
-        """Return the first `size` bytes of a text, all of it with -1; b"" if there is none."""
-        ...
-
-    def runs(self) -> Iterable[RunId]:
-        """Return the runs that have a text."""
-        ...
-
-    def remove(self, run: RunId) -> None:
-        """Remove the text of a run."""
-        ...
-
-
-def store_beside(journal: Path | None) -> TrackStore:
-    """Return the store of a journal's tracks. `journal` None: a journal in memory."""
-    return (
-        MemoryStore()
-        if journal is None
-        else FolderStore(journal.with_name(f"{journal.name}-tracks"))
-    )
-
-
 class FolderStore:
-    """A file for each run, which only its owner may read. `path` is made when needed.
+    """A file for each run, which only its owner may read. `path` is made when needed. Methods raise
+    OSError.
 
-    `suffix`: how names of the files end.
+    `most_bytes`: the size beyond which a text is thinned. `suffix`: how names of the files end.
     """
 
     def __init__(self, path: Path, most_bytes: int = FILE_BYTES, suffix: str = TRACKS) -> None:
@@ -102,7 +45,11 @@ class FolderStore:
         self.most_bytes = most_bytes
 
     def open(self, run: RunId) -> "TextFile":
-        """See `TrackStore.open`."""
+        """Open the text of a run for writing; create it if it is missing.
+
+        Raises:
+            HeldError: another page writes it.
+        """
         file = self._file(run)
         self._path.mkdir(mode=0o700, exist_ok=True)
         if self._path.lstat().st_uid != os.geteuid():
@@ -110,7 +57,7 @@ class FolderStore:
         return TextFile(file)
 
     def read(self, run: RunId, size: int = -1) -> bytes:
-        """See `TrackStore.read`."""
+        """Return the first `size` bytes of a text, all of it with -1; b"" if there is none."""
         try:
             with self._file(run).open("rb") as file:
                 return file.read(size)
@@ -118,13 +65,13 @@ class FolderStore:
             return b""
 
     def runs(self) -> Iterable[RunId]:
-        """See `TrackStore.runs`: files of others are left alone."""
+        """Return the runs that have a text: files of others are left alone."""
         return [
             path.stem for path in self._path.glob(f"*{self._suffix}") if _RUN.fullmatch(path.stem)
         ]
 
     def remove(self, run: RunId) -> None:
-        """See `TrackStore.remove`."""
+        """Remove the text of a run."""
         self._file(run).unlink(missing_ok=True)
 
     def _file(self, run: RunId) -> Path:
@@ -134,7 +81,7 @@ class FolderStore:
 
 
 class TextFile:
-    """A track's file, locked."""
+    """A track's file, locked for one writer. Methods raise OSError."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -147,11 +94,11 @@ class TextFile:
             os.close(self._descriptor)
 
     def read(self) -> bytes:
-        """See `TrackText.read`."""
+        """Return the whole text."""
         return self._path.read_bytes()
 
     def append(self, text: bytes) -> None:
-        """See `TrackText.append`: a partial write to a full disk is undone."""
+        """Add all of `text`, or nothing: a partial write to a full disk is undone."""
         size = os.fstat(self._descriptor).st_size
         try:
             _write(self._descriptor, text)
@@ -161,7 +108,7 @@ class TextFile:
             raise
 
     def replace(self, text: bytes) -> None:
-        """See `TrackText.replace`."""
+        """Replace the content by `text`, or leave it unchanged."""
         new = self._path.with_name(f".{self._path.name}.new")
         new.unlink(missing_ok=True)
         descriptor = _locked(new, os.O_APPEND | os.O_EXCL)
@@ -178,7 +125,7 @@ class TextFile:
         self._descriptor = descriptor
 
     def close(self) -> None:
-        """See `TrackText.close`."""
+        """Close the track for writing."""
         if self._descriptor != _CLOSED:
             os.close(self._descriptor)
         self._descriptor = _CLOSED
@@ -213,24 +160,24 @@ class MemoryStore:
         self._texts: OrderedDict[RunId, MemoryText] = OrderedDict()
 
     def open(self, run: RunId) -> "MemoryText":
-        """See `TrackStore.open`."""
+        """See `FolderStore.open`."""
         text = self._texts.setdefault(run, MemoryText())
         while len(self._texts) > self._most:
             self._texts.popitem(last=False)
         return text
 
     def read(self, run: RunId, size: int = -1) -> bytes:
-        """See `TrackStore.read`."""
+        """See `FolderStore.read`."""
         text = self._texts.get(run)
         whole = text.read() if text is not None else b""
         return whole if size < 0 else whole[:size]
 
     def runs(self) -> Iterable[RunId]:
-        """See `TrackStore.runs`."""
+        """See `FolderStore.runs`."""
         return list(self._texts)
 
     def remove(self, run: RunId) -> None:
-        """See `TrackStore.remove`."""
+        """See `FolderStore.remove`."""
         self._texts.pop(run, None)
 
 
@@ -241,16 +188,29 @@ class MemoryText:
         self._text = bytearray()
 
     def read(self) -> bytes:
-        """See `TrackText.read`."""
+        """See `TextFile.read`."""
         return bytes(self._text)
 
     def append(self, text: bytes) -> None:
-        """See `TrackText.append`."""
+        """See `TextFile.append`."""
         self._text += text
 
     def replace(self, text: bytes) -> None:
-        """See `TrackText.replace`."""
+        """See `TextFile.replace`."""
         self._text = bytearray(text)
 
     def close(self) -> None:
-        """See `TrackText.close`."""
+        """See `TextFile.close`."""
+
+
+TrackText: TypeAlias = TextFile | MemoryText
+TrackStore: TypeAlias = FolderStore | MemoryStore
+
+
+def store_beside(journal: Path | None) -> TrackStore:
+    """Return the store of a journal's tracks. `journal` None: a journal in memory."""
+    return (
+        MemoryStore()
+        if journal is None
+        else FolderStore(journal.with_name(f"{journal.name}-tracks"))
+    )
