@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, BinaryIO
 import click
 
 from m2pem.cli.completers import runs_of_journal
-from m2pem.cli.options import UnusableError, example, journal_option
+from m2pem.cli.options import UnusableError, example, journal_option, writing
 from m2pem.units import US_PER_S
 
 if TYPE_CHECKING:
@@ -112,7 +112,7 @@ def export(
 def _to_file(path: Path, write: Callable[[BinaryIO], Sequence[str]]) -> Sequence[str]:
     """Write a file, which appears when it is whole."""
     part = path.with_name(f".{path.name}.part")
-    try:
+    with writing(path):
         try:
             with part.open("wb") as file:
                 remarks = write(file)
@@ -120,21 +120,17 @@ def _to_file(path: Path, write: Callable[[BinaryIO], Sequence[str]]) -> Sequence
         finally:
             with suppress(OSError):
                 part.unlink()
-    except OSError as error:
-        raise UnusableError(f"{path} cannot be written: {error.strerror}") from error
     return remarks
 
 
 def _to_folder(path: Path, write: Callable[[Path], Sequence[str]]) -> Sequence[str]:
     """Make a folder, which appears when it is whole. Its files may be called as it is."""
-    try:
+    with writing(path):
         if path.exists():
             raise UnusableError(f"{path} is there already: name a new folder with -o")
         with TemporaryDirectory(prefix=f".{path.name}.", dir=path.parent) as part:
             remarks = write(Path(part, path.name))
             Path(part, path.name).rename(path)
-    except OSError as error:
-        raise UnusableError(f"{path} cannot be written: {error.strerror}") from error
     return remarks
 
 

@@ -1,6 +1,7 @@
 """Options that several commands have."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -25,6 +26,19 @@ class UnusableError(M2pemError):
     """A file or value of the command line is missing or cannot be used."""
 
     exit_status = 2
+
+
+@contextmanager
+def writing(file: Path) -> Iterator[None]:
+    """Within the block, an error of the disk says that `file` cannot be written.
+
+    Raises:
+        UnusableError: that.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise UnusableError(f"{file} cannot be written: {error.strerror or error}") from error
 
 
 mission_argument = click.argument("mission", shell_complete=file_or())

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import click
 
 from m2pem.cli.options import (
-    UnusableError,
     answers_option,
     data_option,
     example,
@@ -17,6 +16,7 @@ from m2pem.cli.options import (
     path_option,
     process_option,
     spec_option,
+    writing,
 )
 from m2pem.units import US_PER_S
 
@@ -135,8 +135,6 @@ def _draw(file: Path, records: "list[StampedRecord]", fleet: "Fleet | None") -> 
     from m2pem.cli.notes import note
     from m2pem.rehearsal.gantt import gantt_svg
 
-    try:
+    with writing(file):
         file.write_text(gantt_svg(records, fleet), encoding="utf-8")
-    except OSError as error:
-        raise UnusableError(f"{file} cannot be written: {error.strerror}") from error
     note(f"the chart is in {file}")

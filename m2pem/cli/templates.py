@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from m2pem.cli.options import UnusableError, as_json, example, fleet_option
+from m2pem.cli.options import as_json, example, fleet_option, writing
 
 
 @click.group(
@@ -56,8 +56,6 @@ def export(fleet_file: str, editor: str, out: Path | None) -> None:
     if out is None:
         click.echo(text, nl=False)
         return
-    try:
+    with writing(out):
         out.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise UnusableError(f"{out} cannot be written: {error.strerror or error}") from error
     click.echo(f"{out}: {len(made)} element templates of the fleet {fleet.name}")

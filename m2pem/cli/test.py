@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from m2pem.cli.options import UnusableError, as_json, example, format_option
+from m2pem.cli.options import UnusableError, as_json, example, format_option, writing
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -92,7 +92,8 @@ def test(
     else:
         click.echo(reports_of.summary_of(reports))
     if junit is not None:
-        _write(junit, reports_of.junit_of(reports))
+        with writing(junit):
+            junit.write_bytes(reports_of.junit_of(reports))
     return reports_of.exit_status_of(reports)
 
 
@@ -112,15 +113,6 @@ def _add(report: "Report", fleet: str) -> None:
     if not isinstance(report, MissionReport) or not report.suggestions:
         return
     file = report.scenarios or report.mission.with_suffix(SUFFIX)
-    try:
+    with writing(file):
         count = add_scenarios(file, fleet, report.suggestions)
-    except OSError as error:
-        raise UnusableError(f"{file} cannot be written: {error.strerror}") from error
     note(f"{count} scenarios were added to {file}")
-
-
-def _write(file: Path, content: bytes) -> None:
-    try:
-        file.write_bytes(content)
-    except OSError as error:
-        raise UnusableError(f"{file} cannot be written: {error.strerror}") from error

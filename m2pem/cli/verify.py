@@ -20,6 +20,7 @@ from m2pem.cli.options import (
     path_option,
     process_option,
     spec_option,
+    writing,
 )
 
 if TYPE_CHECKING:
@@ -203,10 +204,8 @@ def _emit(text: str, file: str) -> None:
     if not file:
         click.echo(text, nl=False)
         return
-    try:
+    with writing(Path(file)):
         Path(file).write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise UnusableError(f"{file} cannot be written: {error.strerror}") from error
 
 
 def _sarif(found: "Findings") -> "dict[str, Any]":
@@ -315,7 +314,7 @@ def write(file: Path, findings: "Findings") -> None:
     Raises:
         UnusableError: it cannot be written, or the mission cannot be drawn.
     """
-    try:
+    with writing(file):
         if file.suffix == ".json":
             from m2pem.verify.report.data import as_data
 
@@ -327,8 +326,6 @@ def write(file: Path, findings: "Findings") -> None:
             _write_pictures(file, _pictures(findings, first))
         else:
             _write_markdown(file, findings)
-    except OSError as error:
-        raise UnusableError(f"{file} cannot be written: {error.strerror}") from error
 
 
 def _write_markdown(file: Path, findings: "Findings") -> None:
