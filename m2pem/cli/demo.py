@@ -1,6 +1,7 @@
 """`m2pem demo`: missions of the examples on simulated vehicles."""
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -109,27 +110,8 @@ def gateway(context: click.Context, domain: int, vehicles_port: int, port: int) 
     help="The end event that the run must come to.",
 )
 @click.pass_context
-def team(
-    context: click.Context,
-    domain: int,
-    ardupilot: Path | None,
-    fleet: Path | None,
-    answers: Path | None,
-    port: int,
-    pointing_deg: float,
-    reached: str,
-) -> None:
+def team(context: click.Context, /, **options: Any) -> None:
     """March in a column with a camera and a copter, over ROS 2 and MAVLink."""
     from m2pem.demo import demos
 
-    context.exit(
-        demos.team(
-            domain,
-            fleet=fleet,
-            ardupilot=ardupilot,
-            port=port,
-            answers=answers,
-            pointing_deg=pointing_deg,
-            reached=reached,
-        )
-    )
+    context.exit(demos.team(**options))

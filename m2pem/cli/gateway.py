@@ -1,6 +1,7 @@
 """`m2pem gateway`: a fleet for programs of other protocols, without operators."""
 
 import asyncio
+from typing import Any
 
 import click
 
@@ -22,14 +23,7 @@ from m2pem.cli.options import (
 @simulate_option
 @speed_option
 @format_option
-def gateway(
-    fleet_file: str,
-    face_names: str | None,
-    journal: str | None,
-    simulate: bool,
-    speed: float,
-    output: str,
-) -> int:
+def gateway(**options: Any) -> int:
     """Show a fleet to programs of other protocols, without operators.
 
     Ctrl-C or SIGTERM end it. It is `m2pem serve --ocu none` that needs a face: what programs
@@ -40,18 +34,4 @@ def gateway(
     from m2pem.cli.serve import serve_fleet
 
     with Interruption() as interruption:
-        return asyncio.run(
-            serve_fleet(
-                fleet_file,
-                journal,
-                "none",
-                face_names,
-                (),
-                simulate,
-                speed,
-                None,
-                output,
-                interruption,
-                needs_face=True,
-            )
-        )
+        return asyncio.run(serve_fleet(interruption, ocu_names="none", needs_face=True, **options))

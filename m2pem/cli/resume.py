@@ -3,7 +3,7 @@
 import asyncio
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -30,15 +30,7 @@ if TYPE_CHECKING:
 @answers_option
 @click.option("--stop", is_flag=True, help="Stop the run, and the vehicles, at once.")
 @format_option
-def resume(
-    run_id: str,
-    journal: str | None,
-    ocu_names: str | None,
-    face_names: str | None,
-    answers: Path | None,
-    stop: bool,
-    output: str,
-) -> int:
+def resume(**options: Any) -> int:
     """Take up a run that was interrupted.
 
     The mission, the fleet, whether it is simulated, and its speed, are in the journal; the faces
@@ -47,23 +39,19 @@ def resume(
     from m2pem.cli.interruption import Interruption
 
     with Interruption() as interruption:
-        return asyncio.run(
-            _resume(
-                run_id, journal, ocu_names, face_names, answers, output, interruption, stop=stop
-            )
-        )
+        return asyncio.run(_resume(interruption, **options))
 
 
 async def _resume(
-    run_id: str,
-    journal_url: str | None,
-    ocu_names: str | None,
-    face_names: str | None,
-    answers_file: Path | None,
-    output: str,
     interruption: "Interruption",
     *,
+    run_id: str,
+    journal: str | None,
+    ocu_names: str | None,
+    face_names: str | None,
+    answers: Path | None,
     stop: bool,
+    output: str,
 ) -> int:
     from m2pem.api.clock import SystemClock
     from m2pem.api.operator import operator_name
@@ -82,26 +70,21 @@ async def _resume(
     plugins = PluginManager()
     operators = Operators(chosen(ocu_names, plugins), plugins)
     interruption.begin()
-    async with existing_journal(journal_url) as journal:
-        line = await find_run(journal, run_id)
+    async with existing_journal(journal) as opened:
+        line = await find_run(opened, run_id)
         header = line.header
         if line.outcome is not None:
             raise UnusableError(f"{run_id} has ended ({line.outcome.value}): nothing to resume")
         if line.driven:
             raise UnusableError(f"{run_id} is being driven by an executive that is alive")
         mission = mission_of(header)
-        answers = get_answers(answers_file, mission)
+        script = get_answers(answers, mission)
         fleet = fleet_of(header)
         faces = Faces(face_names, with_faces_of_file(fleet), plugins)
         # Simulated time may have run ahead of the wall clock; it never goes back.
-        start_us = max(time.time_ns() // 1000, await last_decided_us(journal, line))
-        executive = make_executive(
-            fleet,
-            journal,
-            plugins,
-            SystemClock(header.speed, start_us),
-            answers=answers,
-        )
+        start_us = max(time.time_ns() // 1000, await last_decided_us(opened, line))
+        clock = SystemClock(header.speed, start_us)
+        executive = make_executive(fleet, opened, plugins, clock, answers=script)
         faces.make(executive.control)
         executive.expect_interrupted([run_id])
         with output_of(output) as out:
@@ -122,11 +105,11 @@ async def _resume(
                 executive,
                 out,
                 operators,
-                answers,
-                file_of(url_of(journal_url)),
+                script,
+                file_of(url_of(journal)),
                 interruption,
                 take_up,
                 faces,
             )
-        tidy_up(executive, file_of(url_of(journal_url)))
+        tidy_up(executive, file_of(url_of(journal)))
     return status

@@ -2,7 +2,7 @@
 
 import asyncio
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -47,7 +47,22 @@ if TYPE_CHECKING:
 @simulate_option
 @speed_option
 @format_option
-def run(
+def run(**options: Any) -> int:
+    """Run a mission to its end.
+
+    Ends with 0 if the mission completed or terminated itself, with 1 if it failed, with 2 if it
+    cannot be started, and with 130 if an operator stopped it. Ctrl-C stops it, and waits until its
+    vehicles are released.
+    """
+    from m2pem.cli.interruption import Interruption
+
+    with Interruption() as interruption:
+        return asyncio.run(_run(interruption, **options))
+
+
+async def _run(
+    interruption: "Interruption",
+    *,
     mission: str,
     fleet_file: str,
     process: str | None,
@@ -59,52 +74,6 @@ def run(
     face_names: str | None,
     answers: Path | None,
     simulate: bool,
-    speed: float,
-    output: str,
-) -> int:
-    """Run a mission to its end.
-
-    Ends with 0 if the mission completed or terminated itself, with 1 if it failed, with 2 if it
-    cannot be started, and with 130 if an operator stopped it. Ctrl-C stops it, and waits until its
-    vehicles are released.
-    """
-    from m2pem.cli.interruption import Interruption
-
-    with Interruption() as interruption:
-        return asyncio.run(
-            _run(
-                mission,
-                fleet_file,
-                interruption,
-                process=process,
-                search_path=search_path,
-                data=data,
-                spec=spec,
-                journal_url=journal,
-                ocu_names=ocu_names,
-                face_names=face_names,
-                answers_file=answers,
-                simulated=simulate,
-                speed=speed,
-                output=output,
-            )
-        )
-
-
-async def _run(
-    mission_file: str,
-    fleet_name: str,
-    interruption: "Interruption",
-    *,
-    process: str | None,
-    search_path: tuple[Path, ...],
-    data: "dict[str, Value]",
-    spec: Path | None,
-    journal_url: str | None,
-    ocu_names: str | None,
-    face_names: str | None,
-    answers_file: Path | None,
-    simulated: bool,
     speed: float,
     output: str,
 ) -> int:
@@ -126,38 +95,33 @@ async def _run(
 
     plugins = PluginManager()
     operators = Operators(chosen(ocu_names, plugins), plugins)
-    url = url_of(journal_url)
-    mission = load_source(mission_file, search_path)
-    answers = get_answers(answers_file, mission)
-    fleet = fleet_of(fleet_name, mission)
-    fleet = with_own_state(simulated_fleet(fleet) if simulated else fleet, file_of(url))
+    url = url_of(journal)
+    loaded = load_source(mission, search_path)
+    script = get_answers(answers, loaded)
+    fleet = fleet_of(fleet_file, loaded)
+    fleet = with_own_state(simulated_fleet(fleet) if simulate else fleet, file_of(url))
     refuse_speed(fleet, speed)
     faces = Faces(face_names, fleet, plugins)
     interruption.begin()
-    async with journal_at(url) as journal:
+    async with journal_at(url) as opened:
         clock = SystemClock(speed)
         executive = make_executive(
-            fleet,
-            journal,
-            plugins,
-            clock,
-            answers=answers,
-            search_path=search_path,
+            fleet, opened, plugins, clock, answers=script, search_path=search_path
         )
         faces.make(executive.control)
-        process_id, warnings = executive.admit(mission, process, data)
+        process_id, warnings = executive.admit(loaded, process, data)
         for line in lines(warnings):
             note(line)
-        required = monitored_requirements(mission, fleet, plugins, known_data(data), spec)
+        required = monitored_requirements(loaded, fleet, plugins, known_data(data), spec)
         with output_of(output) as out:
             status = await drive_run(
                 executive,
                 out,
                 operators,
-                answers,
+                script,
                 file_of(url),
                 interruption,
-                lambda: executive.begin(mission, process_id, data, "", requirements=required),
+                lambda: executive.begin(loaded, process_id, data, "", requirements=required),
                 faces,
             )
         tidy_up(executive, file_of(url))

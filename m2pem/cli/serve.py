@@ -5,7 +5,7 @@ import re
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 from click.core import ParameterSource
@@ -88,20 +88,7 @@ class DaysOption(click.ParamType):  # type: ignore[type-arg]  # older clicks hav
     help="How often --backup-to copies the journal, such as 12h or 1d.",
 )
 @format_option
-def serve(
-    fleet_file: str,
-    journal: str | None,
-    ocu_names: str | None,
-    face_names: str | None,
-    search_path: tuple[Path, ...],
-    simulate: bool,
-    speed: float,
-    standby: bool,
-    keep_s: float | None,
-    backup_to: Path | None,
-    backup_every_s: float,
-    output: str,
-) -> int:
+def serve(**options: Any) -> int:
     """Serve operators, who start missions, until stopped.
 
     Takes up runs of the journal that were interrupted, if they had this fleet. Ctrl-C or SIGTERM
@@ -110,40 +97,24 @@ def serve(
     from m2pem.cli.interruption import Interruption
 
     given = click.get_current_context().get_parameter_source("backup_every_s")
-    if backup_to is None and given is not ParameterSource.DEFAULT:
+    if options["backup_to"] is None and given is not ParameterSource.DEFAULT:
         raise click.UsageError("--backup-every needs --backup-to FOLDER")
     with Interruption() as interruption:
-        return asyncio.run(
-            serve_fleet(
-                fleet_file,
-                journal,
-                ocu_names,
-                face_names,
-                search_path,
-                simulate,
-                speed,
-                keep_s,
-                output,
-                interruption,
-                standby=standby,
-                backup_to=backup_to,
-                backup_every_s=backup_every_s,
-            )
-        )
+        return asyncio.run(serve_fleet(interruption, **options))
 
 
 async def serve_fleet(
-    fleet_file: str,
-    journal_url: str | None,
-    ocu_names: str | None,
-    face_names: str | None,
-    search_path: tuple[Path, ...],
-    simulated: bool,
-    speed: float,
-    keep_s: float | None,
-    output: str,
     interruption: "Interruption",
     *,
+    fleet_file: str,
+    journal: str | None,
+    ocu_names: str | None,
+    face_names: str | None,
+    simulate: bool,
+    speed: float,
+    output: str,
+    search_path: tuple[Path, ...] = (),
+    keep_s: float | None = None,
     standby: bool = False,
     backup_to: Path | None = None,
     backup_every_s: float = 3600.0,
@@ -168,8 +139,8 @@ async def serve_fleet(
 
     plugins = PluginManager()
     operators = Operators(chosen(ocu_names, plugins), plugins)
-    url = url_of(journal_url)
-    fleet = _fleet_of(fleet_file, url, speed, simulated=simulated)
+    url = url_of(journal)
+    fleet = _fleet_of(fleet_file, url, speed, simulated=simulate)
     faces = Faces(face_names, fleet, plugins)
     if needs_face and not faces.names:
         raise click.UsageError(
@@ -179,15 +150,15 @@ async def serve_fleet(
     if backup_to is not None:
         _refuse_other_than_file(url)
     interruption.begin()
-    async with journal_at(url) as journal:
+    async with journal_at(url) as opened:
         if standby:
-            await standing_by(journal, fleet, plugins, speed, operators, interruption)
+            await standing_by(opened, fleet, plugins, speed, operators, interruption)
         if interruption.asked.is_set():
             return 0
-        mine, _ = await interrupted_runs(journal, fleet, speed)
-        clock = SystemClock(speed, await _start_us(journal, mine, speed))
+        mine, _ = await interrupted_runs(opened, fleet, speed)
+        clock = SystemClock(speed, await _start_us(opened, mine, speed))
         executive = make_executive(
-            fleet, journal, plugins, clock, search_path=search_path, page=operators.page
+            fleet, opened, plugins, clock, search_path=search_path, page=operators.page
         )
         faces.make(executive.control)
         executive.expect_interrupted([line.run for line in mine])
@@ -200,7 +171,7 @@ async def serve_fleet(
                 note(f"m2pem: serving {fleet.name}; operators: {who}{seen}")
                 await executive.load_schedule()
                 # Again: runs that were created for the schedule and never began are gone.
-                mine, others = await interrupted_runs(journal, fleet, speed)
+                mine, others = await interrupted_runs(opened, fleet, speed)
                 for line in others:
                     click.echo(
                         f"m2pem: {line.run} was interrupted with other vehicles, or at another "
@@ -213,7 +184,7 @@ async def serve_fleet(
                     note(f"m2pem: schedule: {each}")
                 keeping = [
                     asyncio.create_task(work)
-                    for work in _housekeeping(journal, clock, keep_s, backup_to, backup_every_s)
+                    for work in _housekeeping(opened, clock, keep_s, backup_to, backup_every_s)
                 ]
                 await interruption.asked.wait()
                 for task in keeping:
