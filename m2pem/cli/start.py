@@ -70,36 +70,18 @@ def start(
     with found_elsewhere(journal):
         path = choose_executive(journal_file(journal), run_on)
     loaded = load_source(mission, search_path)
-    files = mission_files(loaded)
-    found = ask(
-        path, "check", timeout_s=LONG_TIMEOUT_S, mission=files, process=process, data=list(data)
-    )
-    findings = msgspec.convert(found, list[Finding])
+    sent: dict[str, Any] = {
+        "timeout_s": LONG_TIMEOUT_S,
+        "mission": mission_files(loaded),
+        "process": process,
+    }
+    findings = msgspec.convert(ask(path, "check", **sent, data=list(data)), list[Finding])
     if not has_errors(findings):  # else the refusal has them all
         for line in lines(findings):
             note(line)
+    sent |= {"data": data, "by": by or operator_name()}
     if when is not None:
-        entry = ask(
-            path,
-            "schedule",
-            timeout_s=LONG_TIMEOUT_S,
-            mission=files,
-            when=msgspec.to_builtins(when),
-            process=process,
-            data=data,
-            priority=priority,
-            by=by or operator_name(),
-        )
-        click.echo(entry)
-        return
-    run = ask(
-        path,
-        "start",
-        timeout_s=LONG_TIMEOUT_S,
-        mission=files,
-        process=process,
-        data=data,
-        by=by or operator_name(),
-        even_if_busy=even_if_busy,
-    )
-    click.echo(run)
+        sent |= {"when": msgspec.to_builtins(when), "priority": priority}
+        click.echo(ask(path, "schedule", **sent))
+    else:
+        click.echo(ask(path, "start", **sent, even_if_busy=even_if_busy))
