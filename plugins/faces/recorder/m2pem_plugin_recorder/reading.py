@@ -4,7 +4,7 @@ import struct
 from collections.abc import Iterator, Sequence
 from io import SEEK_CUR, BytesIO
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import msgspec
 import zstandard
@@ -18,7 +18,7 @@ from mcap.records import Schema as McapSchema
 from mcap.stream_reader import MAGIC_SIZE, StreamReader, get_chunk_data_stream
 
 from m2pem.api import PayloadState, TeamState, Telemetry, VehicleState
-from m2pem_plugin_recorder.channels import RECORDS, TELEMETRY, Channel, Schema
+from m2pem_plugin_recorder.channels import RECORDS, TELEMETRY, Channel, ChannelMessage, Schema
 
 _HEAD = struct.Struct("<BQ")
 """How each record of MCAP begins: opcode, and length of the rest."""
@@ -30,16 +30,7 @@ _TORN = (McapError, zstandard.ZstdError, EOFError, ValueError, KeyError, struct.
 """What the end of a torn file looks like to the reader of MCAP and its decompressor."""
 
 
-class RecordedMessage(NamedTuple):
-    """A message of a recording."""
-
-    channel: Channel
-    time_us: int
-    sequence: int
-    data: bytes
-
-
-def messages_of(path: Path, topics: Sequence[str] = ()) -> Iterator[RecordedMessage]:
+def messages_of(path: Path, topics: Sequence[str] = ()) -> Iterator[ChannelMessage]:
     """Yield the messages of a file in the order in which they were written, up to its end or to
     where it is torn. `topics`: only these; none: all.
 
@@ -60,8 +51,8 @@ def messages_of(path: Path, topics: Sequence[str] = ()) -> Iterator[RecordedMess
                     case McapMessage():
                         channel = channels[record.channel_id]
                         if not topics or channel.topic in topics:
-                            yield RecordedMessage(
-                                channel, record.log_time // 1000, record.sequence, record.data
+                            yield ChannelMessage(
+                                channel, record.log_time // 1000, record.data, record.sequence
                             )
         except _TORN:
             return

@@ -5,7 +5,7 @@ from typing import BinaryIO
 
 from m2pem.api import ExportedRun, ExportOptions, LocalFrame, StampedRecord
 from m2pem.errors import PluginError
-from m2pem_plugin_recorder.channels import PICTURES, PROMPTS, RECORDS, ChannelMessage
+from m2pem_plugin_recorder.channels import PICTURES, PROMPTS, RECORDS
 from m2pem_plugin_recorder.diagrams import diagram_of
 from m2pem_plugin_recorder.export.places import geometries_of
 from m2pem_plugin_recorder.export.states import files_of
@@ -50,7 +50,7 @@ class McapExporter:
         for path in paths:
             for message in messages_of(path):
                 if message.channel.topic not in _FROM_JOURNAL:
-                    file.write(ChannelMessage(message.channel, message.time_us, message.data))
+                    file.write(message)
         encoder = RecordEncoder(summary.run)
         for seq, _, t_s, record in run.records:
             for found in encoder.messages(StampedRecord(summary.run, seq, t_s, record)):
