@@ -11,7 +11,7 @@ import click
 from m2pem.api.capabilities import face_capabilities
 from m2pem.api.control import MissionControl
 from m2pem.api.face import Face, FaceSettings
-from m2pem.cli.ocus import NO_UNIT
+from m2pem.cli.ocus import names_of
 from m2pem.cli.options import UnusableError
 from m2pem.errors import M2pemError, PluginError
 from m2pem.fleet.fleet import Fleet
@@ -26,14 +26,7 @@ def chosen_faces(names: str | None, fleet: Fleet) -> tuple[str, ...]:
     Raises:
         UsageError: `none` beside others.
     """
-    if names is None:
-        return tuple(fleet.faces)
-    wanted = tuple(dict.fromkeys(name.strip() for name in names.split(",") if name.strip()))
-    if wanted == (NO_UNIT,):
-        return ()
-    if not wanted or NO_UNIT in wanted:
-        raise click.UsageError(f"--face {names!r}: name faces, or `{NO_UNIT}` alone")
-    return wanted
+    return tuple(fleet.faces) if names is None else names_of("--face", names, "faces")
 
 
 def with_faces_of_file(fleet: Fleet) -> Fleet:

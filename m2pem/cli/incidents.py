@@ -12,7 +12,7 @@ from m2pem.cli.options import (
     journal_option,
     run_argument,
 )
-from m2pem.cli.run_control import by_option, executives_here, journal_file, steer
+from m2pem.cli.run_control import ask_driving, by_option, executives_here, steer
 
 if TYPE_CHECKING:
     from m2pem.api.allocation import WaitingTask
@@ -141,13 +141,6 @@ def _preview(journal: str | None, run: str, params: dict[str, Any]) -> None:
     import msgspec
 
     from m2pem.api.runs import IncidentPreview
-    from m2pem.cli.run_control import explain
-    from m2pem.control_socket.client import ask_driver
-    from m2pem.errors import NotDrivenError
 
-    path = journal_file(journal)
-    try:
-        sent = ask_driver(path, run, "preview_incident", timeout_s=LONG_TIMEOUT_S, **params)
-    except NotDrivenError as error:
-        raise explain(error, journal, path, "preview_incident", run) from error
+    sent = ask_driving(journal, run, "preview_incident", timeout_s=LONG_TIMEOUT_S, **params)
     click.echo(str(msgspec.convert(sent, IncidentPreview)))

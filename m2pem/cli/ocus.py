@@ -43,11 +43,7 @@ def chosen(names: str | None, plugins: PluginManager) -> tuple[str, ...]:
     on_terminal = sys.stdin.isatty() and sys.stdout.isatty()
     if names is None:
         return (TERMINAL if on_terminal and TERMINAL in plugins.ocus() else PLAIN,)
-    wanted = tuple(dict.fromkeys(name.strip() for name in names.split(",") if name.strip()))
-    if wanted == (NO_UNIT,):
-        return ()
-    if not wanted or NO_UNIT in wanted:
-        raise click.UsageError(f"--ocu {names!r}: name units, or `{NO_UNIT}` alone")
+    wanted = names_of("--ocu", names, "units")
     found: dict[str, None] = {}
     for name in wanted:
         try:
@@ -61,6 +57,20 @@ def chosen(names: str | None, plugins: PluginManager) -> tuple[str, ...]:
     if sum(ocu_capabilities(plugins.ocu(name)).takes_terminal for name in found) > 1:
         raise click.UsageError(f"--ocu {names!r}: only one of them can have the terminal")
     return tuple(found)
+
+
+def names_of(option: str, text: str, what: str) -> tuple[str, ...]:
+    """The names that an option lists with commas; none for `none`. `what`: what it names.
+
+    Raises:
+        UsageError: it names none, or `none` beside others.
+    """
+    wanted = tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
+    if wanted == (NO_UNIT,):
+        return ()
+    if not wanted or NO_UNIT in wanted:
+        raise click.UsageError(f"{option} {text!r}: name {what}, or `{NO_UNIT}` alone")
+    return wanted
 
 
 class Operators:

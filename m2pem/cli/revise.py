@@ -15,7 +15,7 @@ from m2pem.cli.options import (
     path_option,
     run_argument,
 )
-from m2pem.cli.run_control import by_option, explain, journal_file
+from m2pem.cli.run_control import ask_driving, ask_of_run, by_option
 
 if TYPE_CHECKING:
     from m2pem.api.revision import RevisionPreview
@@ -81,8 +81,10 @@ def revise(
     commands and waits for; then it is asked whether to do it. What would leave a token without a
     place is refused, with where the token can go (--move, --end).
     """
+    import msgspec
+
     from m2pem.api.operations import mission_files
-    from m2pem.api.operator import operator_name
+    from m2pem.api.revision import RevisionPreview
     from m2pem.cli.notes import note
     from m2pem.control_socket.client import LONG_TIMEOUT_S
     from m2pem.errors import OperatorError, StuckError
@@ -94,9 +96,9 @@ def revise(
     if yes and only_plan:
         raise click.UsageError("--plan does nothing, and --yes does it: give one of both")
     files = mission_files(load_source(mission, search_path))
-    timeout: dict[str, Any] = {"timeout_s": LONG_TIMEOUT_S}
-    params: dict[str, Any] = {"mission": files, "moves": moves, **timeout}
-    preview = _preview(journal, run_id, params)
+    params: dict[str, Any] = {"mission": files, "moves": moves, "timeout_s": LONG_TIMEOUT_S}
+    plan = ask_driving(journal, run_id, "plan_revision", **params)
+    preview = msgspec.convert(plan, RevisionPreview)
     click.echo(as_json(_as_data(preview)) if output == "json" else str(preview))
     if not preview.is_possible:
         raise OperatorError(f"{run_id} is not revised")
@@ -107,32 +109,12 @@ def revise(
             raise OperatorError(f"{run_id} is not revised. --yes does it")
         if not click.confirm(f"Revise {run_id}?", err=output == "json"):
             raise OperatorError(f"{run_id} is not revised")
-    who = by or operator_name()
-    given = {**params, "plan": preview.plan, "by": who, "even_if_stuck": even_if_stuck}
+    params |= {"plan": preview.plan, "even_if_stuck": even_if_stuck}
     try:
-        _ask(journal, run_id, "revise", given)
+        ask_of_run(journal, run_id, "revise", by, **params)
     except StuckError as error:
         raise OperatorError(f"{error}. --even-if-stuck does it all the same") from error
     note(f"{run_id} goes on with version {preview.version[:12]}")
-
-
-def _preview(journal: str | None, run: str, params: dict[str, Any]) -> "RevisionPreview":
-    import msgspec
-
-    from m2pem.api.revision import RevisionPreview
-
-    return msgspec.convert(_ask(journal, run, "plan_revision", params), RevisionPreview)
-
-
-def _ask(journal: str | None, run: str, method: str, params: dict[str, Any]) -> Any:
-    from m2pem.control_socket.client import ask_driver
-    from m2pem.errors import NotDrivenError
-
-    path = journal_file(journal)
-    try:
-        return ask_driver(path, run, method, **params)
-    except NotDrivenError as error:
-        raise explain(error, journal, path, method, run) from error
 
 
 def _as_data(preview: "RevisionPreview") -> dict[str, Any]:

@@ -31,7 +31,7 @@ def steer(
     """Call a method of the executive that drives the run; then note what was `done`.
 
     Raises:
-        OperatorError, UnusableError: as `ask_of_run`.
+        OperatorError, UnusableError: as `ask_driving`.
     """
     from m2pem.cli.notes import note
 
@@ -42,19 +42,25 @@ def steer(
 def ask_of_run(
     journal_url: str | None, run: str, method: str, by: str | None, **params: Any
 ) -> Any:
+    """Call a method of the executive that drives the run, as `ask_driving`, and say who asks."""
+    from m2pem.api.operator import operator_name
+
+    return ask_driving(journal_url, run, method, by=by or operator_name(), **params)
+
+
+def ask_driving(journal_url: str | None, run: str, method: str, **params: Any) -> Any:
     """Call a method of the executive that drives the run, and return the result.
 
     Raises:
         OperatorError: it refused, or none drives the run; then, what the run has left behind.
         UnusableError: the journal is in memory.
     """
-    from m2pem.api.operator import operator_name
     from m2pem.control_socket.client import ask_driver
     from m2pem.errors import NotDrivenError
 
     path = journal_file(journal_url)
     try:
-        return ask_driver(path, run, method, by=by or operator_name(), **params)
+        return ask_driver(path, run, method, **params)
     except NotDrivenError as error:
         raise explain(error, journal_url, path, method, run) from error
 
