@@ -17,6 +17,7 @@ from m2pem.api.arbiter import (
 from m2pem.api.async_queue import AsyncQueue
 from m2pem.api.behavior_tracker import BehaviorTracker
 from m2pem.api.capabilities import ArbiterCapabilities
+from m2pem.api.latest_task import cancel_and_wait
 from m2pem.api.telemetry import PayloadState, VehicleState
 from m2pem.mission.catalogue import BehaviorSpec, BehaviorState, ResourceId
 from m2pem.mission.values import Value
@@ -132,9 +133,7 @@ class GoalArbiter:
         self._tasks += [create(self._watch(resource)) for resource in self.connections]
         waits = [create(self._wait_for_all()), create(self._sleep(CONNECT_WITHIN_S))]
         await asyncio.wait(waits, return_when=asyncio.FIRST_COMPLETED)
-        for task in waits:
-            task.cancel()
-        await asyncio.gather(*waits, return_exceptions=True)
+        await cancel_and_wait(*waits)
 
     async def start(self, request: BehaviorRequest) -> None:
         """`begin`, unless the request is known, past, refused, or for a busy resource."""
@@ -171,9 +170,7 @@ class GoalArbiter:
 
     async def close(self) -> None:
         """Close all connections. Vehicles go on with their goals."""
-        for task in self._tasks:
-            task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
+        await cancel_and_wait(*self._tasks)
         self._tasks = []
         self._states.close()
         self._ledger.close()

@@ -36,9 +36,7 @@ class LatestTask:
 
     async def close(self) -> None:
         """Cancel all work, and wait for its end."""
-        tasks = list(self._tasks)
-        self.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
+        await cancel_and_wait(*self._tasks)
 
     async def _after(
         self, before: set[asyncio.Task[None]], work: Callable[[], Awaitable[None]]
@@ -46,3 +44,11 @@ class LatestTask:
         if before:
             await asyncio.wait(before)
         await work()
+
+
+async def cancel_and_wait(*tasks: asyncio.Future[Any] | None) -> None:
+    """Cancel tasks, and wait until they have ended, with whatever result. None counts as ended."""
+    begun = [task for task in tasks if task is not None]
+    for task in begun:
+        task.cancel()
+    await asyncio.gather(*begun, return_exceptions=True)

@@ -25,6 +25,7 @@ from m2pem.api import (
     ResourceId,
     VehicleState,
 )
+from m2pem.api.latest_task import cancel_and_wait
 from m2pem_plugin_mavlink.catalogue import offered
 from m2pem_plugin_mavlink.checkpoint import Checkpoint, decode_checkpoint, encode_checkpoint
 from m2pem_plugin_mavlink.protocol.url import chooses_port, parse_url
@@ -202,9 +203,7 @@ class MavlinkArbiter:
 
     async def close(self) -> None:
         """Close all links. The vehicles continue what they do."""
-        for task in self._tasks:
-            task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
+        await cancel_and_wait(*self._tasks)
         self._tasks = []
         for controller in self._controllers.values():
             await controller.close()

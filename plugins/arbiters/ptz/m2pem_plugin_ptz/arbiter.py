@@ -23,6 +23,7 @@ from m2pem.api import (
     ResourceId,
     VehicleState,
 )
+from m2pem.api.latest_task import cancel_and_wait
 from m2pem_plugin_ptz.catalogue import offered
 from m2pem_plugin_ptz.checkpoint import Checkpoint, decode_checkpoint, encode_checkpoint
 from m2pem_plugin_ptz.drivers import make_driver as _make_driver
@@ -128,9 +129,7 @@ class PtzArbiter:
 
     async def close(self) -> None:
         """Close all connections. The cameras go on with what they do."""
-        for task in self._tasks:
-            task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
+        await cancel_and_wait(*self._tasks)
         self._tasks = []
         for camera in self._cameras.values():
             await camera.close()

@@ -9,6 +9,7 @@ import logging
 from dataclasses import dataclass
 
 from m2pem.api import BehaviorId, BehaviorState, BehaviorTracker, LatestTask, Limits
+from m2pem.api.latest_task import cancel_and_wait
 from m2pem_plugin_ptz.behaviors.behavior import (
     LEAST_SHARE,
     REPORTED_SHARE,
@@ -210,9 +211,7 @@ class CameraController:
             else:
                 self._end(task, BehaviorState.CANCELLED)
         finally:
-            for work in (leave, late):
-                work.cancel()
-            await asyncio.gather(leave, late, return_exceptions=True)
+            await cancel_and_wait(leave, late)
 
     async def _fail(self, task: _Task, reason: str, code: str = "") -> None:
         """Stop a failed behavior."""

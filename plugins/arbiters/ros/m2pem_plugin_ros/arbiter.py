@@ -24,6 +24,7 @@ from m2pem.api import (
     ResourceId,
     VehicleState,
 )
+from m2pem.api.latest_task import cancel_and_wait
 from m2pem_plugin_ros.catalogue import LEVEL, PAYLOAD
 from m2pem_plugin_ros.checkpoint import Checkpoint, decode_checkpoint, encode_checkpoint
 from m2pem_plugin_ros.connections import ConnectionsSetup, VehicleConnections
@@ -323,15 +324,11 @@ class RosArbiter:
         try:
             await asyncio.wait(waits, timeout=within_s)
         finally:
-            for wait in waits:
-                wait.cancel()
-            await asyncio.gather(*waits, return_exceptions=True)
+            await cancel_and_wait(*waits)
 
     async def _disconnect(self) -> None:
         attending, self._attending = self._attending, None
-        if attending is not None:
-            attending.cancel()
-            await asyncio.gather(attending, return_exceptions=True)
+        await cancel_and_wait(attending)
         vehicles, self._vehicles = self._vehicles, {}
         await asyncio.gather(*(vehicle.close() for vehicle in vehicles.values()))
         station, self._vehicle_connections = self._vehicle_connections, None

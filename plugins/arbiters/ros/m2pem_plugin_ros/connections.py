@@ -16,6 +16,7 @@ from m2pem.api import (
     ResourceId,
     VehicleState,
 )
+from m2pem.api.latest_task import cancel_and_wait
 from m2pem_plugin_ros import loopback
 from m2pem_plugin_ros.interfaces import set_stamp
 from m2pem_plugin_ros.log_throttle import LogThrottle
@@ -223,9 +224,7 @@ class DdsConnections:
 
     async def close(self) -> None:
         watching, self._watching = self._watching, []
-        for task in watching:
-            task.cancel()
-        await asyncio.gather(*watching, return_exceptions=True)
+        await cancel_and_wait(*watching)
         runtimes = list(self._runtimes.values())
         self._runtimes.clear()
         await asyncio.gather(*(runtime.close() for runtime in runtimes))

@@ -28,6 +28,7 @@ from m2pem.api import (
     VehicleState,
     raw_parameters,
 )
+from m2pem.api.latest_task import cancel_and_wait
 from m2pem.errors import PluginError
 from m2pem_plugin_ros.checkpoint import goal_id, run_id
 from m2pem_plugin_ros.connections import VehicleConnection, VehicleSensors
@@ -374,10 +375,7 @@ class Vehicle:
 
     async def close(self) -> None:
         """Close the driver. The vehicle goes on with what it does."""
-        tasks = list(self._tasks)
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
+        await cancel_and_wait(*self._tasks)
         try:
             async with asyncio.timeout(CLOSE_WITHIN_S):
                 await self.driver.close()

@@ -21,6 +21,7 @@ from m2pem.api import (
     ResourceId,
     VehicleState,
 )
+from m2pem.api.latest_task import cancel_and_wait
 from m2pem_plugin_vda5050.broker import Broker
 from m2pem_plugin_vda5050.catalogue import STOPS, USUAL
 from m2pem_plugin_vda5050.checkpoint import (
@@ -125,9 +126,7 @@ class Vda5050Arbiter:
         waits = [asyncio.ensure_future(v.first_contact.wait()) for v in self._vehicles.values()]
         if waits:
             await asyncio.wait(waits, timeout=FIRST_CONTACT_WITHIN_S)
-            for wait in waits:
-                wait.cancel()
-            await asyncio.gather(*waits, return_exceptions=True)
+            await cancel_and_wait(*waits)
         for resource, vehicle in self._vehicles.items():
             vehicle.listen_from_now()
             if not vehicle.first_contact.is_set():
@@ -137,9 +136,7 @@ class Vda5050Arbiter:
     async def close(self) -> None:
         """Close all connections. The vehicles go on to the last node that was released."""
         attending, self._attending = self._attending, None
-        if attending is not None:
-            attending.cancel()
-            await asyncio.gather(attending, return_exceptions=True)
+        await cancel_and_wait(attending)
         await asyncio.gather(*(broker.close() for broker in self._brokers.values()))
         self._states.close()
         self._tracker.close()

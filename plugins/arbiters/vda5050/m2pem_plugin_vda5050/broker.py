@@ -8,6 +8,7 @@ from pathlib import Path
 
 import aiomqtt
 
+from m2pem.api.latest_task import cancel_and_wait
 from m2pem.errors import PluginError
 from m2pem_plugin_vda5050.messages import RETAINED
 from m2pem_plugin_vda5050.settings import BrokerSettings, private, read_password
@@ -90,10 +91,8 @@ class Broker:
                     await self._outgoing.join()
             except TimeoutError:
                 self._logger.warning("%s: not all messages were sent", self._settings.url)
-        if self._task is not None:
-            self._task.cancel()
-            await asyncio.gather(self._task, return_exceptions=True)
-            self._task = None
+        await cancel_and_wait(self._task)
+        self._task = None
 
     def publish(self, topic: str, payload: bytes, qos: int = 0, retain: bool = False) -> bool:
         """Send a message soon, in the order of the calls. False: it is not connected, or too much
@@ -159,8 +158,7 @@ class Broker:
                     )
             finally:
                 self._outgoing = None
-                sending.cancel()
-                await asyncio.gather(sending, return_exceptions=True)
+                await cancel_and_wait(sending)
 
     async def _send(
         self, client: aiomqtt.Client, outgoing: asyncio.Queue[tuple[str, bytes, int, bool]]

@@ -28,6 +28,7 @@ from m2pem.api import (
     VehicleState,
     WhenCutOff,
 )
+from m2pem.api.latest_task import cancel_and_wait
 from m2pem.errors import StaleCommandError
 from m2pem_plugin_zenoh import messages as m
 from m2pem_plugin_zenoh.store import HostStore, Kept, run_of
@@ -115,10 +116,7 @@ class ArbiterHost:
 
     async def close(self) -> None:
         """Close the arbiter. Its vehicles go on."""
-        tasks = [*self._tasks, *self._answers.values()]
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
+        await cancel_and_wait(*self._tasks, *self._answers.values())
         await self._end()
         self._store.close()
 

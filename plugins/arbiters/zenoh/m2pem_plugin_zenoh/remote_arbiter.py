@@ -26,6 +26,7 @@ from m2pem.api import (
     Telemetry,
     VehicleState,
 )
+from m2pem.api.latest_task import cancel_and_wait
 from m2pem.errors import PluginError, StaleCommandError
 from m2pem_plugin_zenoh import messages as m
 from m2pem_plugin_zenoh.arbiter_host import LinkError, lost_after_s
@@ -160,10 +161,7 @@ class RemoteArbiter:
 
     async def close(self) -> None:
         """Close the link. The host's arbiter goes on."""
-        tasks = list(self._tasks)
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
+        await cancel_and_wait(*self._tasks)
         link, self._link = self._link, None
         if link is not None:
             await link.close()

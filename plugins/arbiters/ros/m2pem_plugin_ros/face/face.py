@@ -8,6 +8,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from m2pem.api import EventThrower, ThrownEvents, follow
+from m2pem.api.latest_task import cancel_and_wait
 from m2pem.errors import M2pemError
 from m2pem_plugin_ros.face.event_settings import read_event_rules
 from m2pem_plugin_ros.face.names import Names
@@ -80,9 +81,7 @@ class RosFace:
             try:
                 await serving.run()
             finally:
-                for task in beside:
-                    task.cancel()
-                await asyncio.gather(*beside, return_exceptions=True)
+                await cancel_and_wait(*beside)
 
     def _events(self, ros: "RosRuntime") -> list[Coroutine[Any, Any, None]]:
         """Return what passes events between ROS and missions."""

@@ -18,6 +18,7 @@ from m2pem.api import (
     ellipsoidal_m,
     shown_geometries,
 )
+from m2pem.api.latest_task import cancel_and_wait
 from m2pem.errors import M2pemError
 from m2pem_plugin_ros.face.behavior_actions import BehaviorActions
 from m2pem_plugin_ros.face.diagnostics import DiagnosticsPublisher
@@ -106,9 +107,7 @@ class Serving:
         except M2pemError as error:
             log.warning("the fleet is in ROS no more: %s", error)
         finally:
-            for task in (following, *tasks):
-                task.cancel()
-            await asyncio.gather(following, *tasks, return_exceptions=True)
+            await cancel_and_wait(following, *tasks)
             self._close()
 
     # --- inside ---------------------------------------------------------------------------------

@@ -24,6 +24,7 @@ from m2pem.api import (
     VehicleState,
     adjusts,
 )
+from m2pem.api.latest_task import cancel_and_wait
 from m2pem_plugin_ros.drivers.driver import DriverEvents, Health, Order, Outcome
 
 EPOCH = 1
@@ -66,10 +67,7 @@ class ArbiterDriver:
         self._tasks = [create(work) for work in works]
 
     async def close(self) -> None:
-        tasks = (*self._tasks, *self._answers)
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
+        await cancel_and_wait(*self._tasks, *self._answers)
         while not self._calls.empty():
             self._calls.get_nowait().close()
         await self._arbiter.close()

@@ -20,6 +20,7 @@ from m2pem.api import (
     PayloadState,
     Value,
 )
+from m2pem.api.latest_task import cancel_and_wait
 from m2pem_plugin_ros.catalogue import LEVEL
 from m2pem_plugin_ros.drivers.driver import Driver, DriverEvents, Order, Outcome
 from m2pem_plugin_ros.installation import require_interfaces
@@ -161,9 +162,7 @@ class OnboardNode:
 
     async def drop(self) -> None:
         """Close at once without publishing, as in a power failure."""
-        for task in self._tasks:
-            task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
+        await cancel_and_wait(*self._tasks)
         self._tasks = []
         self._publisher.close()
         self._goals = None
@@ -400,9 +399,7 @@ class OnboardNode:
         waits = (happens, self._clock.sleep(seconds), asyncio.sleep(seconds))
         tasks = [asyncio.ensure_future(each) for each in waits]
         await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
+        await cancel_and_wait(*tasks)
 
 
 class _Events:

@@ -19,6 +19,7 @@ from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
 from unique_identifier_msgs import msg as unique_identifier
 
+from m2pem.api.latest_task import cancel_and_wait
 from m2pem_plugin_ros.installation import RosError
 from m2pem_plugin_ros.runtime import qos as qualities
 from m2pem_plugin_ros.runtime.arguments import process_arguments, refused
@@ -368,9 +369,7 @@ class RosRuntime:
 
     async def _close(self) -> None:
         self._calls.close()
-        for task in self._tasks:
-            task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
+        await cancel_and_wait(*self._tasks)
         # End the threads first: they may wait for entities that are destroyed below.
         rclpy.try_shutdown(context=self.context)
         for thread in self._threads:

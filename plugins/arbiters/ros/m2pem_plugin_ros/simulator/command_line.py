@@ -11,6 +11,7 @@ from m2pem.api import GeoPosition
 from m2pem.api.command_options import FaultOption, PositionOption
 from m2pem.api.faults import FaultError, PlannedFault
 from m2pem.api.foreground import Lines, interrupted
+from m2pem.api.latest_task import cancel_and_wait
 from m2pem.errors import PluginError
 from m2pem_plugin_ros.frames import Origin, to_local
 from m2pem_plugin_ros.loopback import keep_on_loopback
@@ -207,9 +208,7 @@ async def _run(
         await asyncio.wait((ended, stopped), return_when=asyncio.FIRST_COMPLETED)
         if ended.done():
             ended.result()
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
+        await cancel_and_wait(*tasks)
 
 
 async def _read_faults(vehicles: "Simulation") -> None:

@@ -6,6 +6,7 @@ from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any
 
 from m2pem.api.clock import Clock, RateTimer
+from m2pem.api.latest_task import cancel_and_wait
 from m2pem_plugin_ros.runtime import RosRuntime
 from m2pem_plugin_ros.settings import DriverName
 from m2pem_plugin_ros.simulator.faults import TrafficFaults
@@ -63,9 +64,7 @@ class SimulatedVehicle:
 
     async def close(self) -> None:
         """Stop the nodes in order: the vehicle stops, and the end of its behavior is published."""
-        for task in self._tasks:
-            task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
+        await cancel_and_wait(*self._tasks)
         try:
             await self._end_steering(self._onboard_control.close)
         finally:

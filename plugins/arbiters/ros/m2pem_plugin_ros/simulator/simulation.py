@@ -13,6 +13,7 @@ from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 
 from m2pem.api import US_PER_S, SystemClock
 from m2pem.api.faults import FaultError, FaultSchedule, PlannedFault
+from m2pem.api.latest_task import cancel_and_wait
 from m2pem_plugin_ros.runtime import RosRuntime
 from m2pem_plugin_ros.runtime.ros_clock import RosClock
 from m2pem_plugin_ros.simulator.faults import GRAMMAR, FaultTarget, check
@@ -97,9 +98,7 @@ class Simulation:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        if self._task is not None:
-            self._task.cancel()
-            await asyncio.gather(self._task, return_exceptions=True)
+        await cancel_and_wait(self._task)
         await self._close()
 
     async def stopped(self) -> None:

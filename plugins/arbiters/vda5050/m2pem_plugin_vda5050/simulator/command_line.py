@@ -9,6 +9,7 @@ import click
 from m2pem.api.command_options import FaultOption
 from m2pem.api.faults import FaultError, PlannedFault
 from m2pem.api.foreground import Lines, interrupted
+from m2pem.api.latest_task import cancel_and_wait
 from m2pem.errors import PluginError
 from m2pem_plugin_vda5050.settings import ARBITER, Settings
 from m2pem_plugin_vda5050.simulator.agv import AgvSpec
@@ -82,9 +83,7 @@ async def _run(
         await asyncio.wait((stopping, ended), return_when=asyncio.FIRST_COMPLETED)
         if ended.done():
             ended.result()
-        for task in (connecting, stopping, reading, ended):
-            task.cancel()
-        await asyncio.gather(connecting, stopping, reading, ended, return_exceptions=True)
+        await cancel_and_wait(connecting, stopping, reading, ended)
 
 
 async def _read_faults(simulation: Simulation) -> None:

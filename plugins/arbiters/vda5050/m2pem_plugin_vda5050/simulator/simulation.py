@@ -13,6 +13,7 @@ import aiomqtt
 
 from m2pem.api import Connection, Dimension, Fleet, SystemClock, quantity
 from m2pem.api.faults import FaultSchedule, PlannedFault
+from m2pem.api.latest_task import cancel_and_wait
 from m2pem.api.simulator_settings import coordinates, fraction
 from m2pem.errors import PluginError
 from m2pem.units import UnitError
@@ -270,9 +271,7 @@ class Simulation:
         return self
 
     async def __aexit__(self, *_: object) -> None:
-        if self._task is not None:
-            self._task.cancel()
-            await asyncio.gather(self._task, return_exceptions=True)
+        await cancel_and_wait(self._task)
         await asyncio.gather(*(vehicle.close() for vehicle in self.vehicles.values()))
 
     async def connected(self) -> None:

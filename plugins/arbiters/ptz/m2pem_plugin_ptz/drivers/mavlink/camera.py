@@ -17,6 +17,7 @@ from m2pem_plugin_mavlink import (
     message_type,
 )
 
+from m2pem.api.latest_task import cancel_and_wait
 from m2pem_plugin_ptz.drivers.driver import CameraError
 from m2pem_plugin_ptz.drivers.mavlink.context import CameraContext
 from m2pem_plugin_ptz.gimbal import CapturedImage
@@ -72,10 +73,7 @@ class CameraComponent:
     async def close(self) -> None:
         """Close. The camera stays as it is."""
         self._stop_listening()
-        tasks = [each for each in (self._attending, self._zooming) if each is not None]
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
+        await cancel_and_wait(self._attending, self._zooming)
 
     # --- state ----------------------------------------------------------------------------------
 

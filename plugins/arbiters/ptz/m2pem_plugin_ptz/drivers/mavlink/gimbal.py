@@ -17,6 +17,7 @@ from m2pem_plugin_mavlink import (
     message_type,
 )
 
+from m2pem.api.latest_task import cancel_and_wait
 from m2pem_plugin_ptz.drivers.mavlink.context import CameraContext, Direction
 from m2pem_plugin_ptz.drivers.mavlink.settings import Yaw
 from m2pem_plugin_ptz.gimbal import Ramp, Reach
@@ -83,9 +84,7 @@ class GimbalControl:
 
     async def close(self) -> None:
         """Release control of the gimbal."""
-        if self._taking is not None:
-            self._taking.cancel()
-            await asyncio.gather(self._taking, return_exceptions=True)
+        await cancel_and_wait(self._taking)
         if self._in_control:
             try:
                 async with asyncio.timeout(RELEASE_WITHIN_S):
@@ -204,10 +203,7 @@ class GimbalDriver:
     async def close(self) -> None:
         """Close, and release the control. The gimbal stays as it is."""
         self._stop_listening()
-        tasks = [each for each in (self._attending, self._job) if each is not None]
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
+        await cancel_and_wait(self._attending, self._job)
         if self._found is not None:
             await self._found.control.close()
 

@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import math
 
+from m2pem.api.latest_task import cancel_and_wait
 from m2pem.errors import PluginError
 from m2pem_plugin_ptz.drivers.driver import CameraError, DriverSetup
 from m2pem_plugin_ptz.drivers.onvif.capabilities import Capabilities, read_capabilities
@@ -63,9 +64,7 @@ class OnvifDriver:
 
     async def close(self) -> None:
         task, self._task = self._task, None
-        if task is not None:
-            task.cancel()
-            await asyncio.gather(task, return_exceptions=True)
+        await cancel_and_wait(task)
 
     def _credentials(self) -> Credentials | None:
         path = self._settings.credentials

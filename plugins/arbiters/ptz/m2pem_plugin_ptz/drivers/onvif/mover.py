@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 
 from m2pem.api import Clock
+from m2pem.api.latest_task import cancel_and_wait
 from m2pem_plugin_ptz.drivers.driver import CameraError
 from m2pem_plugin_ptz.drivers.onvif.capabilities import Capabilities
 from m2pem_plugin_ptz.drivers.onvif.session import RefusedError, Session, SilentError
@@ -118,9 +119,7 @@ class Mover:
                 task.result()
         finally:
             self._session = None
-            for task in (*tasks, *self._stops):
-                task.cancel()
-            await asyncio.gather(*tasks, *self._stops, return_exceptions=True)
+            await cancel_and_wait(*tasks, *self._stops)
 
     # --- polling --------------------------------------------------------------------------------
 

@@ -8,6 +8,7 @@ import re
 from collections.abc import Awaitable, Callable
 
 from m2pem.api.faults import NUMBER, Effect, FaultGrammar, FaultKind, PlannedFault, fixed
+from m2pem.api.latest_task import cancel_and_wait
 from m2pem_plugin_ptz.simulator.onvif.camera import Camera
 
 REBOOT_S = 5.0
@@ -66,9 +67,7 @@ class Faults:
 
     async def close(self) -> None:
         """Cancel all planned faults."""
-        for task in tuple(self._tasks):
-            task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
+        await cancel_and_wait(*self._tasks)
 
 
 async def _happen(fault: PlannedFault[Faults], faults: Faults) -> None:

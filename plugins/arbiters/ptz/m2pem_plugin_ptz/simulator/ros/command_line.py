@@ -9,6 +9,7 @@ import click
 
 from m2pem.api import SystemClock
 from m2pem.api.foreground import interrupted
+from m2pem.api.latest_task import cancel_and_wait
 from m2pem.errors import PluginError
 
 if TYPE_CHECKING:
@@ -82,6 +83,4 @@ async def _run(specs: "Sequence[CameraSpec]", speed: float, domain_id: int | Non
         await asyncio.wait((simulating, stopped), return_when=asyncio.FIRST_COMPLETED)
     if simulating.done():
         simulating.result()
-    for task in tasks:
-        task.cancel()
-    await asyncio.gather(*tasks, return_exceptions=True)
+    await cancel_and_wait(*tasks)

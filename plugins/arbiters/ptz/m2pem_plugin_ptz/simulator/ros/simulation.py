@@ -7,6 +7,7 @@ from dataclasses import replace
 from m2pem_plugin_ros import RosRuntime
 
 from m2pem.api import Clock
+from m2pem.api.latest_task import cancel_and_wait
 from m2pem_plugin_ptz.onboard import CameraNode
 from m2pem_plugin_ptz.simulator.ros.camera import CameraSpec, NodeSpec, SimulatedCamera
 
@@ -39,9 +40,7 @@ async def simulate(
         await moving
     finally:
         await asyncio.gather(*(node.close() for node in nodes), return_exceptions=True)
-        if moving is not None:
-            moving.cancel()
-            await asyncio.gather(moving, return_exceptions=True)
+        await cancel_and_wait(moving)
         for runtime in runtimes.values():
             await runtime.close()
 

@@ -24,6 +24,7 @@ from m2pem.api import (
     ResourceId,
     VehicleState,
 )
+from m2pem.api.latest_task import cancel_and_wait
 from m2pem_plugin_ros.behaviors import (
     STALE_S,
     STANDING,
@@ -199,8 +200,7 @@ class BaseDriver:
         task, self._task = self._task, None
         if task is None:
             return
-        task.cancel()
-        await asyncio.gather(task, return_exceptions=True)
+        await cancel_and_wait(task)
         if self._pilot.busy:
             self._pilot.drop()
             await self._commands.stop()

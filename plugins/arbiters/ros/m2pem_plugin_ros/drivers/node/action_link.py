@@ -12,6 +12,7 @@ from m2pem_interfaces.action import ExecuteBehavior
 from unique_identifier_msgs import msg as unique_identifier
 
 from m2pem.api import BehaviorState
+from m2pem.api.latest_task import cancel_and_wait
 from m2pem_plugin_ros.drivers.driver import DriverSetup, Order, Outcome
 from m2pem_plugin_ros.drivers.node.link import (
     QUERY_WITHIN_S,
@@ -121,9 +122,7 @@ class ActionLink:
             reason = f"the vehicle's node did not answer within {QUERY_WITHIN_S:g} s"
             return Outcome(BehaviorState.UNKNOWN, reason=reason)
         finally:
-            for task in (asked, shown):
-                task.cancel()
-            await asyncio.gather(asked, shown, return_exceptions=True)
+            await cancel_and_wait(asked, shown)
         if number == action.GoalStatus.STATUS_UNKNOWN:
             return Outcome(BehaviorState.UNKNOWN, reason=RESTARTED)
         return self._outcome(order.goal, number, status)

@@ -12,6 +12,7 @@ from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
 
 from m2pem.api import BehaviorRequest, BehaviorState, Point, ResolvedValue, ResourceId, Route, Value
+from m2pem.api.latest_task import cancel_and_wait
 from m2pem_plugin_ros.drivers.driver import Driver, DriverEvents, Order, Outcome
 from m2pem_plugin_ros.frames import Origin, to_geodetic
 from m2pem_plugin_ros.pose import Pose
@@ -88,8 +89,7 @@ class GoalServer:
                 await asyncio.wait([work], timeout=LOOK_S)
             return self._result(handle, work)
         finally:
-            work.cancel()
-            await asyncio.gather(work, return_exceptions=True)
+            await cancel_and_wait(work)
             if self._current is handle:
                 self._current = None
 
@@ -101,8 +101,7 @@ class GoalServer:
             try:
                 await asyncio.wait([work], timeout=self._faults.abort_after_s)
             finally:
-                work.cancel()
-                await asyncio.gather(work, return_exceptions=True)
+                await cancel_and_wait(work)
             raise AbortedError(self._faults.error_code, self._faults.error_msg)
         return await self._carry_out(handle)
 

@@ -12,6 +12,7 @@ from lifecycle_msgs.msg import State
 from lifecycle_msgs.srv import GetState
 from rclpy.action import ActionClient
 
+from m2pem.api.latest_task import cancel_and_wait
 from m2pem_plugin_ros.drivers.nav2.parameters import apart_m
 from m2pem_plugin_ros.frames import Origin, yaw_of_quaternion
 from m2pem_plugin_ros.installation import require_interfaces
@@ -211,8 +212,7 @@ class Nav2Server:
                 await asyncio.wait([doing], timeout=FEEDBACK_S)
             doing.result()
         finally:
-            doing.cancel()
-            await asyncio.gather(doing, return_exceptions=True)
+            await cancel_and_wait(doing)
 
     def _tell(self, handle: Any, name: str, left: Sequence[Pose]) -> None:
         feedback = self._action(name).Feedback()
