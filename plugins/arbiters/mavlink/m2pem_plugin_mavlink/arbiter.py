@@ -2,30 +2,27 @@
 connection."""
 
 import asyncio
-from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Protocol
 
 from m2pem.api import (
     ArbiterCapabilities,
     ArbiterContext,
-    AsyncQueue,
     BehaviorId,
     BehaviorReport,
     BehaviorRequest,
     BehaviorSpec,
     BehaviorState,
-    BehaviorTracker,
     Connection,
     Fence,
     Limits,
     LinkState,
-    PayloadState,
     ResolvedValue,
     ResourceId,
-    VehicleState,
 )
 from m2pem.api.latest_task import cancel_and_wait
+from m2pem.api.unit_arbiter import LATE_FACTOR, UnitArbiter
 from m2pem_plugin_mavlink.catalogue import offered
 from m2pem_plugin_mavlink.checkpoint import Checkpoint, decode_checkpoint, encode_checkpoint
 from m2pem_plugin_mavlink.protocol.url import chooses_port, parse_url
@@ -47,10 +44,6 @@ RECEIVED_WITHIN_S = 5.0
 """Seconds for which `connect` waits; a running autopilot sends a heartbeat every second."""
 
 TELEMETRY_EVERY_S = 0.2
-LATE = 2.0
-"""A loop that runs later than this many periods means that this process was suspended."""
-
-STATES_WAITING = 1000
 
 
 class VehicleConnections(Protocol):
@@ -96,7 +89,7 @@ def _make_connections(
     return MavlinkVehicleConnections(connections, settings, context, lost_after_s)
 
 
-class MavlinkArbiter:
+class MavlinkArbiter(UnitArbiter["VehicleController"]):
     """Implements `m2pem.api.Arbiter`. Its settings in a fleet file: docs/mavlink.md.
 
     Raises:
@@ -113,14 +106,10 @@ class MavlinkArbiter:
         context: ArbiterContext,
         make_vehicle_connections: MakeVehicleConnections = _make_connections,
     ) -> None:
-        self._connections = connections
-        self._context = context
+        super().__init__(connections, context)
         self._settings = read_settings(connections, context.state_folder)
         self._make_vehicle_connections = make_vehicle_connections
         self._vehicle_connections: VehicleConnections | None = None
-        self._tracker = BehaviorTracker(self._behaviors_of, context.logger)
-        self._states: AsyncQueue[VehicleState | PayloadState] = AsyncQueue(STATES_WAITING)
-        self._controllers: dict[ResourceId, VehicleController] = {}
         self._takeover_monitors: list[TakeoverMonitor] = []
         self._fences: dict[ResourceId, Fence] = {}
         self._failsafe_problems: dict[ResourceId, tuple[str, ...]] = {}
@@ -136,7 +125,7 @@ class MavlinkArbiter:
             return ()
         return offered(self._connections[resource].domain)
 
-    def _behaviors_of(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
+    def _may_take(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
         """Return the behaviors of a vehicle or, for a payload, of the vehicle that carries it."""
         return self.catalogue(ResourceId(resource.partition("/")[0]))
 
@@ -178,19 +167,16 @@ class MavlinkArbiter:
             watch.open()
             self._takeover_monitors.append(watch)
             limits = self.limits(resource)
-            self._controllers[resource] = VehicleController(
+            self._units[resource] = VehicleController(
                 vehicle, watch, self._tracker, limits, self._context.logger
             )
             area = self._connections[resource].fence
             if area is not None:
                 self._fences[resource] = fences.setdefault(id(area), Fence(area))
-            self._publish_mode_changes(self._controllers[resource])
+            self._publish_mode_changes(self._units[resource])
             self._tasks.append(create(self._monitor_vehicle(resource)))
         known = await asyncio.gather(
-            *(
-                controller.wait_until_known(RECEIVED_WITHIN_S)
-                for controller in self._controllers.values()
-            )
+            *(controller.wait_until_known(RECEIVED_WITHIN_S) for controller in self._units.values())
         )
         for vehicle in vehicles.values():  # the first behavior may follow another vehicle
             self._states.put(vehicle.telemetry())
@@ -205,7 +191,7 @@ class MavlinkArbiter:
         """Close all links. The vehicles continue what they do."""
         await cancel_and_wait(*self._tasks)
         self._tasks = []
-        for controller in self._controllers.values():
+        for controller in self._units.values():
             await controller.close()
         for watch in self._takeover_monitors:
             await watch.close()
@@ -225,16 +211,9 @@ class MavlinkArbiter:
         try:
             if self._tracker.admit(request, lambda: self._native_ref(request), self._refusal):
                 resource, behavior = _vehicles(request)[0], self._pending[request.id]
-                self._controllers[resource].start(request.id, behavior, look_first=queried)
+                self._units[resource].start(request.id, behavior, look_first=queried)
         finally:
             self._pending.pop(request.id, None)
-
-    async def cancel(self, behavior: BehaviorId, epoch: int) -> None:
-        """Stop the vehicle that executes the behavior."""
-        if self._tracker.may_cancel(behavior, epoch):
-            for resource, controller in self._controllers.items():
-                if self._tracker.holder(resource) == behavior:
-                    controller.cancel(behavior)
 
     async def adjust(
         self, behavior: BehaviorId, epoch: int, parameters: Mapping[str, ResolvedValue]
@@ -244,59 +223,21 @@ class MavlinkArbiter:
         if not isinstance(speed_m_s, int | float) or speed_m_s <= 0:
             return None
         if self._tracker.may_adjust(behavior, epoch):
-            for resource, controller in self._controllers.items():
-                if self._tracker.holder(resource) == behavior:
-                    return controller.adjust(behavior, float(speed_m_s))
+            for controller in self._executing(behavior):
+                return controller.adjust(behavior, float(speed_m_s))
         return None
-
-    async def hold(self, resource: ResourceId) -> None:
-        """Stop a vehicle at once; it keeps its behavior."""
-        if resource in self._controllers:
-            self._controllers[resource].hold()
-
-    async def resume(self, resource: ResourceId) -> None:
-        """Continue the behavior of a held vehicle."""
-        if resource in self._controllers:
-            self._controllers[resource].resume()
 
     async def reclaim(self, resource: ResourceId) -> str:
         """Stop a vehicle that was lost and is connected again, unless it executes a failsafe."""
-        return await self._controllers[resource].reclaim() if resource in self._controllers else ""
-
-    async def fence(self, run: str, epoch: int) -> None:
-        """Refuse lower epochs of a run here: autopilots know none."""
-        self._tracker.fence(run, epoch)
+        return await self._units[resource].reclaim() if resource in self._units else ""
 
     async def disown(self, run: str) -> None:
         """End setpoints, repeated commands and further steps of a run's behaviors."""
-        held = {resource: self._tracker.holder(resource) for resource in self._controllers}
+        held = {resource: self._tracker.holder(resource) for resource in self._units}
         behaviors = self._tracker.disown(run)
-        for resource, controller in self._controllers.items():
+        for resource, controller in self._units.items():
             if held[resource] in behaviors:
                 controller.release()
-
-    async def query(self, behavior: BehaviorId, native_ref: str | None) -> BehaviorReport:
-        """Return the last report or, after a restart, the state that the vehicle shows. Only
-        questions are sent to the vehicle."""
-        self._tracker.fence(behavior, self._context.epoch_of(behavior))
-        known = self._tracker.last(behavior)
-        if known.state is not BehaviorState.UNKNOWN:
-            return known
-        checkpoint = decode_checkpoint(native_ref) if native_ref else None
-        if checkpoint is None or checkpoint.resource not in self._controllers:
-            self._queried.add(behavior)
-            return known
-        return await self._reattach(behavior, checkpoint, native_ref or "")
-
-    # --- streams --------------------------------------------------------------------------------
-
-    def reports(self) -> AsyncIterator[BehaviorReport]:
-        """Yield reports to one reader until `close`."""
-        return self._tracker.reports()
-
-    def telemetry(self) -> AsyncIterator[VehicleState | PayloadState]:
-        """Yield states to one reader until `close`; a slow reader misses old states."""
-        return self._states.read()
 
     # --- inside ---------------------------------------------------------------------------------
 
@@ -309,11 +250,8 @@ class MavlinkArbiter:
         if len(vehicles) != 1:
             return f"{request.behavior} takes one vehicle, and has {len(vehicles)}"
         resource = vehicles[0]
-        allowed = self._connections[resource].behaviors
-        if allowed is not None and request.behavior not in allowed:
-            return f"the fleet does not allow {resource} the behavior '{request.behavior}'"
-        if resource not in self._controllers:
-            return "the arbiter is not connected"
+        if prohibition := self._prohibition(resource, request.behavior):
+            return prohibition
         checkpoint = Checkpoint(resource, request.behavior, request.parameters, {})
         try:
             behavior = self._make(checkpoint)
@@ -326,7 +264,7 @@ class MavlinkArbiter:
         from m2pem_plugin_mavlink.behaviors import BEHAVIORS  # noqa: PLC0415
         from m2pem_plugin_mavlink.behaviors.behavior import BehaviorContext  # noqa: PLC0415
 
-        controller, clock = self._controllers[checkpoint.resource], self._context.clock
+        controller, clock = self._units[checkpoint.resource], self._context.clock
         context = BehaviorContext(
             controller.vehicle,
             checkpoint.parameters,
@@ -344,12 +282,18 @@ class MavlinkArbiter:
 
         state = self._pending[request.id].checkpoint()
         resource = _vehicles(request)[0]
-        before = take_snapshot(
-            self._controllers[resource].vehicle, self._context.clock.now_us() / 1e6
-        )
+        before = take_snapshot(self._units[resource].vehicle, self._context.clock.now_us() / 1e6)
         return encode_checkpoint(
             Checkpoint(resource, request.behavior, request.parameters, state, before)
         )
+
+    async def _find(self, unknown: BehaviorReport, native_ref: str | None) -> BehaviorReport:
+        """Only questions are sent to the vehicle."""
+        checkpoint = decode_checkpoint(native_ref) if native_ref else None
+        if checkpoint is None or checkpoint.resource not in self._units:
+            self._queried.add(unknown.id)
+            return unknown
+        return await self._reattach(unknown.id, checkpoint, native_ref or "")
 
     async def _reattach(
         self, id_: BehaviorId, checkpoint: Checkpoint, reference: str
@@ -361,7 +305,7 @@ class MavlinkArbiter:
         from m2pem_plugin_mavlink.protocol.transaction import ExchangeError  # noqa: PLC0415
         from m2pem_plugin_mavlink.reattachment import shows_not_begun  # noqa: PLC0415
 
-        controller = self._controllers[checkpoint.resource]
+        controller = self._units[checkpoint.resource]
         vehicle = controller.vehicle
         unknown = replace(self._tracker.last(id_), native_ref=reference, reason="")
         if checkpoint.behavior not in BEHAVIORS:
@@ -414,7 +358,7 @@ class MavlinkArbiter:
                 self._context.logger.warning("%s: %s", resource, text)
         if before and not found:
             self._context.logger.info("%s: its failsafes are as the fleet says now", resource)
-        self._publish(self._controllers[resource])
+        self._publish(self._units[resource])
 
     def _publish(self, controller: "VehicleController") -> None:
         vehicle = controller.vehicle
@@ -425,7 +369,7 @@ class MavlinkArbiter:
 
     async def _monitor_vehicle(self, resource: ResourceId) -> None:
         """Publish the state of a vehicle, and report its behavior LOST when it falls silent."""
-        controller, clock = self._controllers[resource], self._context.clock
+        controller, clock = self._units[resource], self._context.clock
         vehicle = controller.vehicle
         bound_s = self.limits(resource).lost_after_s
         began_us = looked_us = clock.now_us()
@@ -433,7 +377,7 @@ class MavlinkArbiter:
         while True:
             now_us = clock.now_us()
             # After a suspension of this process, messages of the vehicle are still to be read.
-            late = not was_late and now_us - looked_us > LATE * TELEMETRY_EVERY_S * 1e6
+            late = not was_late and now_us - looked_us > LATE_FACTOR * TELEMETRY_EVERY_S * 1e6
             looked_us, was_late = now_us, late
             silent_s = vehicle.silent_s
             never_received = silent_s is None

@@ -1,29 +1,27 @@
 """The arbiter of cameras that turn. Its catalogue needs no library and no connection."""
 
 import asyncio
-from collections.abc import AsyncIterator, Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from m2pem.api import (
     ArbiterCapabilities,
     ArbiterContext,
-    AsyncQueue,
     BehaviorId,
     BehaviorParameters,
     BehaviorReport,
     BehaviorRequest,
     BehaviorSpec,
     BehaviorState,
-    BehaviorTracker,
     Connection,
     Limits,
     LinkState,
     PayloadState,
     ResourceId,
-    VehicleState,
 )
 from m2pem.api.latest_task import cancel_and_wait
+from m2pem.api.unit_arbiter import UnitArbiter
 from m2pem_plugin_ptz.catalogue import offered
 from m2pem_plugin_ptz.checkpoint import Checkpoint, decode_checkpoint, encode_checkpoint
 from m2pem_plugin_ptz.drivers import make_driver as _make_driver
@@ -47,13 +45,9 @@ FIRST_CONTACT_WITHIN_S = 5.0
 """`connect` waits no longer than this for cameras."""
 
 TELEMETRY_EVERY_S = 0.2
-LATE_FACTOR = 2.0
-"""A loop that runs later than this many periods means that this process was suspended."""
-
-STATES_WAITING = 1000
 
 
-class PtzArbiter:
+class PtzArbiter(UnitArbiter["CameraController"]):
     """The arbiter `ptz` (docs/ptz.md). Implements `m2pem.api.Arbiter`.
 
     Raises:
@@ -68,13 +62,9 @@ class PtzArbiter:
         context: ArbiterContext,
         make_driver: Callable[[DriverSetup], CameraDriver] = _make_driver,
     ) -> None:
-        self._connections = connections
-        self._context = context
+        super().__init__(connections, context)
         self._settings = read_settings(connections)
         self._make_driver = make_driver
-        self._tracker = BehaviorTracker(self.catalogue, context.logger)
-        self._states: AsyncQueue[VehicleState | PayloadState] = AsyncQueue(STATES_WAITING)
-        self._cameras: dict[ResourceId, CameraController] = {}
         self._drivers: list[CameraDriver] = []
         self._pending: dict[BehaviorId, Behavior] = {}
         self._tasks: list[asyncio.Task[None]] = []
@@ -102,7 +92,7 @@ class PtzArbiter:
         from m2pem_plugin_ptz.camera_model.model import CameraModel  # noqa: PLC0415
         from m2pem_plugin_ptz.controller import CameraController  # noqa: PLC0415  # it needs NumPy
 
-        context, cameras = self._context, self._cameras
+        context, cameras = self._context, self._units
         for resource, settings in self._settings.items():
             connection = self._connections[resource]
 
@@ -131,7 +121,7 @@ class PtzArbiter:
         """Close all connections. The cameras go on with what they do."""
         await cancel_and_wait(*self._tasks)
         self._tasks = []
-        for camera in self._cameras.values():
+        for camera in self._units.values():
             await camera.close()
         drivers, self._drivers = self._drivers, []
         for driver in drivers:
@@ -146,60 +136,18 @@ class PtzArbiter:
             if self._tracker.admit(
                 request, lambda: self._encoded_checkpoint(request), self._refusal
             ):
-                camera = self._cameras[request.resources[0]]
+                camera = self._units[request.resources[0]]
                 camera.take(request.id, self._pending[request.id])
         finally:
             self._pending.pop(request.id, None)
 
-    async def cancel(self, behavior: BehaviorId, epoch: int) -> None:
-        """Stop the camera that does the behavior."""
-        if self._tracker.may_cancel(behavior, epoch):
-            for resource, camera in self._cameras.items():
-                if self._tracker.holder(resource) == behavior:
-                    camera.cancel(behavior)
-
-    async def hold(self, resource: ResourceId) -> None:
-        """Stop a camera at once. It keeps its behavior."""
-        if resource in self._cameras:
-            self._cameras[resource].hold()
-
-    async def resume(self, resource: ResourceId) -> None:
-        """Let a camera continue after `hold`."""
-        if resource in self._cameras:
-            self._cameras[resource].resume()
-
-    async def fence(self, run: str, epoch: int) -> None:
-        """Refuse lower epochs of a run here: cameras know none."""
-        self._tracker.fence(run, epoch)
-
     async def disown(self, run: str) -> None:
         """End the behaviors of a run; the cameras are not commanded."""
-        held = {resource: self._tracker.holder(resource) for resource in self._cameras}
+        held = {resource: self._tracker.holder(resource) for resource in self._units}
         behaviors = self._tracker.disown(run)
-        for resource, camera in self._cameras.items():
+        for resource, camera in self._units.items():
             if held[resource] in behaviors:
                 camera.drop()
-
-    async def query(self, behavior: BehaviorId, native_ref: str | None) -> BehaviorReport:
-        """Return the last report, or after a restart, what the direction of the camera shows."""
-        self._tracker.fence(behavior, self._context.epoch_of(behavior))
-        known = self._tracker.last(behavior)
-        if known.state is not BehaviorState.UNKNOWN:
-            return known
-        checkpoint = decode_checkpoint(native_ref) if native_ref else None
-        if checkpoint is None or checkpoint.resource not in self._cameras:
-            return known
-        return await self._reattach(behavior, checkpoint, native_ref or "")
-
-    # --- streams --------------------------------------------------------------------------------
-
-    def reports(self) -> AsyncIterator[BehaviorReport]:
-        """Yield reports until `close`, for one reader."""
-        return self._tracker.reports()
-
-    def telemetry(self) -> AsyncIterator[VehicleState | PayloadState]:
-        """Yield states until `close`, for one reader. A slow reader misses old states."""
-        return self._states.read()
 
     # --- inside ---------------------------------------------------------------------------------
 
@@ -207,12 +155,9 @@ class PtzArbiter:
         if len(request.resources) != 1:
             return f"{request.behavior} takes one camera, and has {len(request.resources)}"
         resource = request.resources[0]
-        allowed = self._connections[resource].behaviors
-        if allowed is not None and request.behavior not in allowed:
-            return f"the fleet does not allow {resource} the behavior '{request.behavior}'"
-        if resource not in self._cameras:
-            return "the arbiter is not connected"
-        if reason := self._cameras[resource].driver.refusal(request.behavior):
+        if prohibition := self._prohibition(resource, request.behavior):
+            return prohibition
+        if reason := self._units[resource].driver.refusal(request.behavior):
             return reason
         behavior = self._make(request.id, self._make_checkpoint(request))
         self._pending[request.id] = behavior
@@ -222,7 +167,7 @@ class PtzArbiter:
         from m2pem_plugin_ptz.behaviors import BEHAVIORS  # noqa: PLC0415
         from m2pem_plugin_ptz.behaviors.behavior import BehaviorContext  # noqa: PLC0415
 
-        model = self._cameras[checkpoint.resource].model
+        model = self._units[checkpoint.resource].model
         return BEHAVIORS[checkpoint.behavior](
             BehaviorContext(id_, BehaviorParameters(checkpoint.parameters), model)
         )
@@ -234,13 +179,19 @@ class PtzArbiter:
     def _encoded_checkpoint(self, request: BehaviorRequest) -> str:
         return encode_checkpoint(self._make_checkpoint(request))
 
+    async def _find(self, unknown: BehaviorReport, native_ref: str | None) -> BehaviorReport:
+        checkpoint = decode_checkpoint(native_ref) if native_ref else None
+        if checkpoint is None or checkpoint.resource not in self._units:
+            return unknown
+        return await self._reattach(unknown.id, checkpoint, native_ref or "")
+
     async def _reattach(
         self, id_: BehaviorId, checkpoint: Checkpoint, reference: str
     ) -> BehaviorReport:
         from m2pem_plugin_ptz.behaviors import BEHAVIORS  # noqa: PLC0415
         from m2pem_plugin_ptz.behaviors.behavior import BehaviorFailedError  # noqa: PLC0415
 
-        camera = self._cameras[checkpoint.resource]
+        camera = self._units[checkpoint.resource]
         unknown = replace(self._tracker.last(id_), native_ref=reference, reason="")
         if checkpoint.behavior not in BEHAVIORS:
             return replace(unknown, reason=f"the behavior '{checkpoint.behavior}' no longer exists")
@@ -262,17 +213,12 @@ class PtzArbiter:
 
     async def _attend(self, resource: ResourceId) -> None:
         """Publish the state of a camera, and detect its silence."""
-        camera, clock = self._cameras[resource], self._context.clock
+        camera = self._units[resource]
         bound_us = self.limits(resource).lost_after_s * 1e6
-        began_us = last_us = clock.now_us()
+        began_us = self._context.clock.now_us()
         loop = asyncio.get_running_loop()
         found_by_s = loop.time() + FIRST_CONTACT_WITHIN_S + FOUND_WITHIN_S
-        was_late = False
-        while True:
-            now_us = clock.now_us()
-            # After a suspension of this process, messages of the camera are still to be read.
-            late = not was_late and now_us - last_us > LATE_FACTOR * TELEMETRY_EVERY_S * 1e6
-            last_us, was_late = now_us, late
+        async for now_us, late in self._rounds(TELEMETRY_EVERY_S):
             silent_us = now_us - (
                 began_us if camera.last_contact_us is None else camera.last_contact_us
             )
@@ -288,7 +234,6 @@ class PtzArbiter:
                 self._context.logger.exception(
                     "%s: cannot publish the state of the camera", resource
                 )
-            await clock.sleep(TELEMETRY_EVERY_S)
 
     def _state(self, camera: "CameraController", now_us: int, *, lost: bool) -> PayloadState:
         model, ptz = camera.model, camera.driver.ptz

@@ -3,19 +3,18 @@
 import asyncio
 import math
 import os
-from collections.abc import AsyncIterator, Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 from m2pem.api import (
     ArbiterCapabilities,
     ArbiterContext,
-    AsyncQueue,
     BehaviorId,
     BehaviorReport,
     BehaviorRequest,
     BehaviorSpec,
     BehaviorState,
-    BehaviorTracker,
     Connection,
     Limits,
     LinkState,
@@ -25,6 +24,7 @@ from m2pem.api import (
     VehicleState,
 )
 from m2pem.api.latest_task import cancel_and_wait
+from m2pem.api.unit_arbiter import UnitArbiter
 from m2pem_plugin_ros.catalogue import LEVEL, PAYLOAD
 from m2pem_plugin_ros.checkpoint import Checkpoint, decode_checkpoint, encode_checkpoint
 from m2pem_plugin_ros.connections import ConnectionsSetup, VehicleConnections
@@ -59,11 +59,6 @@ ATTEND_EVERY_S = 0.2
 PAYLOADS_EVERY = 5
 """The state of payloads is published in every fifth round of `_attend`."""
 
-LATE_FACTOR = 2.0
-"""A round that comes more than twice as late as planned means that this process was suspended."""
-
-STATES_WAITING = 1000
-
 MakeConnections = Callable[[ConnectionsSetup], VehicleConnections]
 
 
@@ -73,7 +68,7 @@ def _vehicle_connections(installation: ConnectionsSetup) -> VehicleConnections:
     return DdsConnections(installation)
 
 
-class RosArbiter:
+class RosArbiter(UnitArbiter[Vehicle]):
     """The arbiter `ros` (docs/ros.md).
 
     `make_driver` and `make_connections` are replaced in tests without ROS.
@@ -93,19 +88,13 @@ class RosArbiter:
         make_driver: Callable[[DriverSetup], Driver] = make_fleet_driver,
         make_connections: MakeConnections = _vehicle_connections,
     ) -> None:
-        self._connections = connections
-        self._context = context
+        super().__init__(connections, context, _may_be_missed)
         vehicles = read_settings(connections)
         self._settings = {**vehicles, **read_payloads(connections, vehicles)}
         self._detectors = read_detectors(connections, self._settings)
         self._make_driver = make_driver
         self._make_connections = make_connections
         self._vehicle_connections: VehicleConnections | None = None
-        self._tracker = BehaviorTracker(self._taken, context.logger)
-        self._states: AsyncQueue[VehicleState | PayloadState] = AsyncQueue(
-            STATES_WAITING, _may_be_missed
-        )
-        self._vehicles: dict[ResourceId, Vehicle] = {}
         self._queried: set[BehaviorId] = set()
         self._unknown: dict[BehaviorId, tuple[Checkpoint, str | None]] = {}
         self._attending: asyncio.Task[None] | None = None
@@ -126,9 +115,8 @@ class RosArbiter:
         """Payloads whose topic of detections is read: they have a `topic`, or `detector: true`."""
         return self._detectors.keys()
 
-    def _taken(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
-        """Return the specifications for the tracker. A payload may be used by a behavior of its
-        vehicle, too."""
+    def _may_take(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
+        """A payload may be used by a behavior of its vehicle, too."""
         vehicle = ResourceId(resource.partition("/")[0])
         of_vehicle = self.catalogue(vehicle) if vehicle != resource else ()
         return (*of_vehicle, *self.catalogue(resource))
@@ -180,9 +168,9 @@ class RosArbiter:
             for resource, settings in self._settings.items():
                 connection, limits = self._connections[resource], self.limits(resource)
                 setup = VehicleSetup(connection, settings, self._context, self._tracker, limits)
-                self._vehicles[resource] = Vehicle(setup, connected[resource], self._make_driver)
+                self._units[resource] = Vehicle(setup, connected[resource], self._make_driver)
             opened = await asyncio.gather(
-                *(vehicle.open() for vehicle in self._vehicles.values()), return_exceptions=True
+                *(vehicle.open() for vehicle in self._units.values()), return_exceptions=True
             )
             for outcome in opened:
                 if isinstance(outcome, BaseException):
@@ -191,7 +179,7 @@ class RosArbiter:
             await self._disconnect()
             raise
         await self._until_first_contact()
-        for vehicle in self._vehicles.values():
+        for vehicle in self._units.values():
             vehicle.listen_from_now()
         self._attending = asyncio.get_running_loop().create_task(self._attend())
 
@@ -210,16 +198,14 @@ class RosArbiter:
             request.resources, request.behavior, request.epoch, request.parameters
         )
         if self._tracker.admit(request, lambda: encode_checkpoint(checkpoint), self._refusal):
-            vehicle = self._vehicles[self._commanded(request.resources)[0]]
+            vehicle = self._units[self._commanded(request.resources)[0]]
             await vehicle.take(request, query_first=asked)
 
     async def cancel(self, behavior: BehaviorId, epoch: int) -> None:
         """Cancel the behavior on its vehicle. After a restart, also if the vehicle reported
         UNKNOWN."""
         self._readopt(behavior)
-        if self._tracker.may_cancel(behavior, epoch):
-            for vehicle in self._running(behavior):
-                vehicle.cancel(behavior)
+        await super().cancel(behavior, epoch)
 
     async def adjust(
         self, behavior: BehaviorId, epoch: int, parameters: Mapping[str, ResolvedValue]
@@ -227,75 +213,38 @@ class RosArbiter:
         """Change parameters of a behavior that goes on. Values that are not finite are ignored."""
         if self._tracker.may_adjust(behavior, epoch):
             sane = {name: value for name, value in parameters.items() if _is_sane(value)}
-            for vehicle in self._running(behavior) if sane else ():
+            for vehicle in self._executing(behavior) if sane else ():
                 vehicle.adjust(behavior, sane)
-
-    async def hold(self, resource: ResourceId) -> None:
-        """Stop a vehicle at once. It keeps its behavior."""
-        if resource in self._vehicles:
-            self._vehicles[resource].hold()
-
-    async def resume(self, resource: ResourceId) -> None:
-        """Let a vehicle continue after `hold`."""
-        if resource in self._vehicles:
-            self._vehicles[resource].resume()
 
     async def reclaim(self, resource: ResourceId) -> str:
         """End what a vehicle still does that was lost and is received again; see
         `Vehicle.reclaim`."""
-        return await self._vehicles[resource].reclaim() if resource in self._vehicles else ""
+        return await self._units[resource].reclaim() if resource in self._units else ""
 
     async def fence(self, run: str, epoch: int) -> None:
         """Tell the nodes of all vehicles that the run has this epoch. Nav2 and plain bases know no
         epochs."""
-        self._tracker.fence(run, epoch)
-        for vehicle in self._vehicles.values():
+        await super().fence(run, epoch)
+        for vehicle in self._units.values():
             vehicle.claim(run, epoch)
 
     async def disown(self, run: str) -> None:
         """End velocities and repeated commands for a run. Nav2 and nodes go on with their goals."""
         behaviors = self._tracker.disown(run)
-        for vehicle in self._vehicles.values():
+        for vehicle in self._units.values():
             vehicle.disown(behaviors)
-
-    async def query(self, behavior: BehaviorId, native_ref: str | None) -> BehaviorReport:
-        """Return the last report, or after a restart, what the vehicle answers. No behavior is
-        started."""
-        self._tracker.fence(behavior, self._context.epoch_of(behavior))
-        known = self._tracker.last(behavior)
-        if known.state is not BehaviorState.UNKNOWN:
-            return known
-        checkpoint = decode_checkpoint(native_ref) if native_ref else None
-        if checkpoint is None:
-            return await self._search(behavior, known)
-        resource = next(
-            iter([*self._commanded(checkpoint.resources), *checkpoint.resources]), ResourceId("")
-        )
-        if resource not in self._vehicles:
-            kind = "payload with a node" if "/" in resource else "vehicle"
-            return replace(known, reason=f"the {kind} '{resource}' no longer exists")
-        return await self._query_vehicle(self._vehicles[resource], behavior, checkpoint, native_ref)
-
-    # --- streams --------------------------------------------------------------------------------
-
-    def reports(self) -> AsyncIterator[BehaviorReport]:
-        """Yield reports until `close`, for one reader."""
-        return self._tracker.reports()
-
-    def telemetry(self) -> AsyncIterator[VehicleState | PayloadState]:
-        """Yield states until `close`, for one reader. A slow reader misses old states, but no
-        detection."""
-        return self._states.read()
 
     # --- inside ---------------------------------------------------------------------------------
 
     async def _until_first_contact(self) -> None:
         loop = asyncio.get_running_loop()
         began_s = loop.time()
-        await self._until_received(min(SEARCH_AFTER_S, FIRST_CONTACT_WITHIN_S))
+        with suppress(TimeoutError):
+            async with asyncio.timeout(min(SEARCH_AFTER_S, FIRST_CONTACT_WITHIN_S)):
+                await asyncio.gather(*(v.first_contact.wait() for v in self._units.values()))
         absent = [
             resource
-            for resource, vehicle in self._vehicles.items()
+            for resource, vehicle in self._units.items()
             if not vehicle.first_contact.is_set() and not vehicle.is_listed
         ]
         left_s = min(NAMED_WITHIN_S, FIRST_CONTACT_WITHIN_S) - (loop.time() - began_s)
@@ -303,33 +252,24 @@ class RosArbiter:
             await self._vehicle_connections.search(absent, left_s)
         while True:
             passed_s = loop.time() - began_s
-            wrong = [vehicle for vehicle in self._vehicles.values() if vehicle.problem]
-            silent = [v for v in self._vehicles.values() if not v.first_contact.is_set()]
+            wrong = [vehicle for vehicle in self._units.values() if vehicle.problem]
+            silent = [v for v in self._units.values() if not v.first_contact.is_set()]
             is_well = not (wrong or silent) and passed_s >= DISCOVERY_S
             if is_well or passed_s >= FIRST_CONTACT_WITHIN_S:
                 break
             if passed_s >= NAMED_WITHIN_S and all(vehicle in wrong for vehicle in silent):
                 break
             await asyncio.sleep(LOOK_EVERY_S)
-        for resource, vehicle in self._vehicles.items():
+        for resource, vehicle in self._units.items():
             if not vehicle.first_contact.is_set():
                 self._context.logger.warning(
                     "%s: no message from the vehicle yet: %s", resource, vehicle.absence
                 )
 
-    async def _until_received(self, within_s: float) -> None:
-        waits = [asyncio.ensure_future(v.first_contact.wait()) for v in self._vehicles.values()]
-        if not waits:
-            return
-        try:
-            await asyncio.wait(waits, timeout=within_s)
-        finally:
-            await cancel_and_wait(*waits)
-
     async def _disconnect(self) -> None:
         attending, self._attending = self._attending, None
         await cancel_and_wait(attending)
-        vehicles, self._vehicles = self._vehicles, {}
+        vehicles, self._units = self._units, {}
         await asyncio.gather(*(vehicle.close() for vehicle in vehicles.values()))
         station, self._vehicle_connections = self._vehicle_connections, None
         if station is not None:
@@ -342,12 +282,8 @@ class RosArbiter:
         resource = doers[0]
         if all(spec.name != request.behavior for spec in self.catalogue(resource)):
             return f"{resource} has no behavior '{request.behavior}'; its vehicle is to have a role"
-        allowed = self._connections[resource].behaviors
-        if allowed is not None and request.behavior not in allowed:
-            return f"the fleet does not allow {resource} the behavior '{request.behavior}'"
-        if resource not in self._vehicles:
-            return "the arbiter is not connected"
-        return self._vehicles[resource].refusal(request)
+        prohibition = self._prohibition(resource, request.behavior)
+        return prohibition or self._units[resource].refusal(request)
 
     def _commanded(self, resources: Sequence[ResourceId]) -> list[ResourceId]:
         """Return the resources that are commanded: vehicles, or without any, payloads with a
@@ -355,15 +291,29 @@ class RosArbiter:
         vehicles = [resource for resource in resources if "/" not in resource]
         return vehicles or [resource for resource in resources if resource in self._settings]
 
-    def _running(self, behavior: BehaviorId) -> list[Vehicle]:
-        return [vehicle for vehicle in self._vehicles.values() if vehicle.doing == behavior]
+    def _executing(self, behavior: BehaviorId) -> list[Vehicle]:
+        """Of a behavior of a vehicle that only uses a payload, the vehicle alone."""
+        return [vehicle for vehicle in self._units.values() if vehicle.doing == behavior]
+
+    async def _find(self, unknown: BehaviorReport, native_ref: str | None) -> BehaviorReport:
+        checkpoint = decode_checkpoint(native_ref) if native_ref else None
+        if checkpoint is None:
+            return await self._search(unknown.id, unknown)
+        resource = next(
+            iter([*self._commanded(checkpoint.resources), *checkpoint.resources]), ResourceId("")
+        )
+        if resource not in self._units:
+            kind = "payload with a node" if "/" in resource else "vehicle"
+            return replace(unknown, reason=f"the {kind} '{resource}' no longer exists")
+        vehicle = self._units[resource]
+        return await self._query_vehicle(vehicle, unknown.id, checkpoint, native_ref)
 
     async def _search(self, behavior: BehaviorId, unknown: BehaviorReport) -> BehaviorReport:
         """Query all vehicles about a behavior of which there is no checkpoint."""
         self._queried.add(behavior)
         candidates = [
             vehicle
-            for resource, vehicle in self._vehicles.items()
+            for resource, vehicle in self._units.items()
             if vehicle.settings.driver is not DriverName.BASE
             and self._tracker.holder(resource) is None
         ]
@@ -384,7 +334,7 @@ class RosArbiter:
         if checkpoint is None or self._tracker.last(behavior).state is not BehaviorState.UNKNOWN:
             return
         resource = next(iter([*self._commanded(checkpoint.resources), *checkpoint.resources]))
-        vehicle = self._vehicles.get(resource)
+        vehicle = self._units.get(resource)
         if vehicle is not None and self._tracker.holder(resource) is None:
             order = vehicle.order_for(
                 behavior, checkpoint.epoch, checkpoint.behavior, checkpoint.parameters
@@ -426,15 +376,10 @@ class RosArbiter:
 
     async def _attend(self) -> None:
         """Check all vehicles every 0.2 s, and put their states into the telemetry."""
-        clock = self._context.clock
         log_throttle = LogThrottle(self._context.logger, "the arbiter of ROS vehicles")
-        last_us, was_late, round_number = clock.now_us(), False, 0
-        while True:
-            now_us = clock.now_us()
-            # After a suspension of this process, messages of vehicles are still to be read.
-            late = not was_late and now_us - last_us > LATE_FACTOR * ATTEND_EVERY_S * 1e6
-            last_us, was_late = now_us, late
-            for vehicle in self._vehicles.values():
+        round_number = 0
+        async for now_us, late in self._rounds(ATTEND_EVERY_S):
+            for vehicle in self._units.values():
                 try:
                     state = vehicle.attend(may_lose=not late)
                 except Exception as error:  # an error of one vehicle must not stop the others
@@ -449,12 +394,11 @@ class RosArbiter:
             if round_number % PAYLOADS_EVERY == 0:
                 self._publish_payload_states(now_us)
             round_number += 1
-            await clock.sleep(ATTEND_EVERY_S)
 
     def _publish_payload_states(self, now_us: int) -> None:
         for resource in self._connections:
             if resource not in self._settings:
-                vehicle = self._vehicles.get(ResourceId(resource.partition("/")[0]))
+                vehicle = self._units.get(ResourceId(resource.partition("/")[0]))
                 link = LinkState.CONNECTED if vehicle is None else vehicle.link
                 self._states.put(PayloadState(resource, now_us, link=link))
 

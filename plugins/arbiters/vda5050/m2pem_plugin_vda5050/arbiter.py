@@ -2,26 +2,25 @@
 
 import asyncio
 import uuid
-from collections.abc import AsyncIterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 
 from m2pem.api import (
     ArbiterCapabilities,
     ArbiterContext,
-    AsyncQueue,
     BehaviorId,
     BehaviorReport,
     BehaviorRequest,
     BehaviorSpec,
     BehaviorState,
-    BehaviorTracker,
     Connection,
     Limits,
     ResourceId,
-    VehicleState,
 )
 from m2pem.api.latest_task import cancel_and_wait
+from m2pem.api.unit_arbiter import UnitArbiter
 from m2pem_plugin_vda5050.broker import Broker
 from m2pem_plugin_vda5050.catalogue import STOPS, USUAL
 from m2pem_plugin_vda5050.checkpoint import (
@@ -43,13 +42,9 @@ FIRST_CONTACT_WITHIN_S = 3.0
 """`connect` waits no longer than this for vehicles, in real time."""
 
 ATTEND_EVERY_S = 0.2
-LATE_FACTOR = 2.0
-"""A round that comes more than twice as late as planned means that this process was suspended."""
-
-STATES_WAITING = 1000
 
 
-class Vda5050Arbiter:
+class Vda5050Arbiter(UnitArbiter[Vehicle]):
     """The arbiter `vda5050` (docs/vda5050.md).
 
     Raises:
@@ -61,12 +56,8 @@ class Vda5050Arbiter:
     def __init__(
         self, connections: Mapping[ResourceId, Connection], context: ArbiterContext
     ) -> None:
-        self._connections = connections
-        self._context = context
+        super().__init__(connections, context)
         self._settings = read_settings(connections)
-        self._tracker = BehaviorTracker(self.catalogue, context.logger)
-        self._states: AsyncQueue[VehicleState] = AsyncQueue(STATES_WAITING)
-        self._vehicles: dict[ResourceId, Vehicle] = {}
         self._brokers: dict[BrokerSettings, Broker] = {}
         self._topics: dict[str, tuple[Vehicle, str]] = {}
         self._attending: asyncio.Task[None] | None = None
@@ -110,7 +101,7 @@ class Vda5050Arbiter:
                 self.limits(resource),
                 partial(self._publish, settings),
             )
-            vehicle = self._vehicles[resource] = Vehicle(setup)
+            vehicle = self._units[resource] = Vehicle(setup)
             for topic in FROM_VEHICLE:
                 self._topics[f"{settings.broker.url} {settings.prefix}/{topic}"] = vehicle, topic
             for prefix in settings.other_prefixes:
@@ -123,11 +114,10 @@ class Vda5050Arbiter:
             raise
         for made in self._brokers.values():
             made.open()
-        waits = [asyncio.ensure_future(v.first_contact.wait()) for v in self._vehicles.values()]
-        if waits:
-            await asyncio.wait(waits, timeout=FIRST_CONTACT_WITHIN_S)
-            await cancel_and_wait(*waits)
-        for resource, vehicle in self._vehicles.items():
+        with suppress(TimeoutError):
+            async with asyncio.timeout(FIRST_CONTACT_WITHIN_S):
+                await asyncio.gather(*(v.first_contact.wait() for v in self._units.values()))
+        for resource, vehicle in self._units.items():
             vehicle.listen_from_now()
             if not vehicle.first_contact.is_set():
                 self._context.logger.warning("%s: %s", resource, vehicle.absence)
@@ -146,70 +136,29 @@ class Vda5050Arbiter:
     async def start(self, request: BehaviorRequest) -> None:
         def reference() -> str:
             resource = request.resources[0]
-            before = self._vehicles[resource].order if resource in self._vehicles else ""
+            before = self._units[resource].order if resource in self._units else ""
             return encode_checkpoint(
                 Checkpoint(resource, request.behavior, request.parameters, before)
             )
 
         if self._tracker.admit(request, reference, self._refusal):
-            self._vehicles[request.resources[0]].take(request)
-
-    async def cancel(self, behavior: BehaviorId, epoch: int) -> None:
-        if self._tracker.may_cancel(behavior, epoch):
-            for vehicle in self._vehicles.values():
-                if vehicle.doing == behavior:
-                    vehicle.cancel()
-
-    async def hold(self, resource: ResourceId) -> None:
-        if resource in self._vehicles:
-            self._vehicles[resource].hold()
-
-    async def resume(self, resource: ResourceId) -> None:
-        if resource in self._vehicles:
-            self._vehicles[resource].resume()
+            self._units[request.resources[0]].take(request)
 
     async def reclaim(self, resource: ResourceId) -> str:
         """Cancel what a vehicle still does that was lost and is received again."""
-        return await self._vehicles[resource].reclaim() if resource in self._vehicles else ""
-
-    async def fence(self, run: str, epoch: int) -> None:
-        """Refuse lower epochs of the run here. VDA 5050 knows no epochs."""
-        self._tracker.fence(run, epoch)
+        return await self._units[resource].reclaim() if resource in self._units else ""
 
     async def disown(self, run: str) -> None:
         """Send no more updates of the orders of a run. Vehicles go on to the last released node."""
         behaviors = self._tracker.disown(run)
-        for vehicle in self._vehicles.values():
+        for vehicle in self._units.values():
             vehicle.forget(behaviors)
-
-    async def query(self, behavior: BehaviorId, native_ref: str | None) -> BehaviorReport:
-        """Return the last report, or after a restart, what the state of the vehicle shows."""
-        self._tracker.fence(behavior, self._context.epoch_of(behavior))
-        known = self._tracker.last(behavior)
-        if known.state is not BehaviorState.UNKNOWN:
-            return known if known.state.terminal else replace(known, held=self._is_held(behavior))
-        checkpoint = decode_checkpoint(native_ref) if native_ref else None
-        if checkpoint is None:
-            return await self._search(behavior, known)
-        vehicle = self._vehicles.get(checkpoint.resource)
-        if vehicle is None:
-            return replace(known, reason=f"the vehicle '{checkpoint.resource}' no longer exists")
-        return await self._query(vehicle, behavior, checkpoint, native_ref)
-
-    # --- streams --------------------------------------------------------------------------------
-
-    def reports(self) -> AsyncIterator[BehaviorReport]:
-        return self._tracker.reports()
-
-    def telemetry(self) -> AsyncIterator[VehicleState]:
-        """Yield states until `close`, for one reader. A slow reader misses old states."""
-        return self._states.read()
 
     # --- inside ---------------------------------------------------------------------------------
 
     def _broker(self, settings: BrokerSettings) -> Broker:
         vehicles = [
-            self._vehicles[resource]
+            self._units[resource]
             for resource, each in self._settings.items()
             if each.broker == settings
         ]
@@ -259,22 +208,27 @@ class Vda5050Arbiter:
         if len(request.resources) != 1:
             return f"{request.behavior} takes one vehicle, not {len(request.resources)}"
         resource = request.resources[0]
-        allowed = self._connections[resource].behaviors
-        if allowed is not None and request.behavior not in allowed:
-            return f"the fleet does not allow {resource} the behavior '{request.behavior}'"
-        if resource not in self._vehicles:
-            return "the arbiter is not connected"
-        return self._vehicles[resource].refusal(request)
+        prohibition = self._prohibition(resource, request.behavior)
+        return prohibition or self._units[resource].refusal(request)
 
     def _is_held(self, behavior: BehaviorId) -> bool:
-        return any(v.is_held for v in self._vehicles.values() if v.doing == behavior)
+        return any(vehicle.is_held for vehicle in self._executing(behavior))
+
+    async def _find(self, unknown: BehaviorReport, native_ref: str | None) -> BehaviorReport:
+        checkpoint = decode_checkpoint(native_ref) if native_ref else None
+        if checkpoint is None:
+            return await self._search(unknown.id, unknown)
+        vehicle = self._units.get(checkpoint.resource)
+        if vehicle is None:
+            return replace(unknown, reason=f"the vehicle '{checkpoint.resource}' no longer exists")
+        return await self._query(vehicle, unknown.id, checkpoint, native_ref)
 
     async def _search(self, behavior: BehaviorId, unknown: BehaviorReport) -> BehaviorReport:
         """Look for a behavior of which there is no checkpoint: an executive may have died between
         sending it and storing its report."""
         wanted = order_id(self._context.journal, behavior)
-        states = await asyncio.gather(*(v.known_state() for v in self._vehicles.values()))
-        for vehicle, state in zip(self._vehicles.values(), states, strict=True):
+        states = await asyncio.gather(*(v.known_state() for v in self._units.values()))
+        for vehicle, state in zip(self._units.values(), states, strict=True):
             if state is None:
                 continue
             if state.order_id == wanted and is_executing(state):
@@ -340,14 +294,8 @@ class Vda5050Arbiter:
 
     async def _attend(self) -> None:
         """Look after all vehicles every 0.2 s."""
-        clock = self._context.clock
-        last_us, was_late = clock.now_us(), False
-        while True:
-            now_us = clock.now_us()
-            # After a suspension of this process, messages of vehicles are still to be read.
-            late = not was_late and now_us - last_us > LATE_FACTOR * ATTEND_EVERY_S * 1e6
-            last_us, was_late = now_us, late
-            for vehicle in self._vehicles.values():
+        async for _, late in self._rounds(ATTEND_EVERY_S):
+            for vehicle in self._units.values():
                 broker = self._brokers[vehicle.settings.broker]
                 try:
                     state = vehicle.attend(may_lose=not late, problem=broker.problem)
@@ -356,4 +304,3 @@ class Vda5050Arbiter:
                 else:
                     if state is not None:
                         self._states.put(state)
-            await clock.sleep(ATTEND_EVERY_S)

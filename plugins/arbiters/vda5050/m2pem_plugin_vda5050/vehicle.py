@@ -296,8 +296,8 @@ class Vehicle:
         self._task = self._task_for(request)
         self.step()
 
-    def cancel(self) -> None:
-        if self._task is not None:
+    def cancel(self, behavior: BehaviorId) -> None:
+        if self._task is not None and self.doing == behavior:
             self._task.cancel()
 
     def hold(self) -> None:
