@@ -7,7 +7,7 @@ checks every promise made here.
 from collections.abc import AsyncIterator, Awaitable, Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, TypeGuard
+from typing import TYPE_CHECKING, Any, Protocol, Self, TypeAlias, TypeGuard
 from uuid import UUID, uuid4
 
 from m2pem.api.capabilities import ArbiterCapabilities, arbiter_capabilities
@@ -19,10 +19,10 @@ from m2pem.mission.values import Value
 
 if TYPE_CHECKING:
     import logging
-    from pathlib import Path
 
     from m2pem.api.bus import FleetBus
     from m2pem.api.clock import Clock
+    from m2pem.fleet.fleet import Fleet
 
 BehaviorId: TypeAlias = str
 """Unique in a journal: "r1.b3" is the third behavior of run r1."""
@@ -55,6 +55,27 @@ class Connection:
     cruise_speed_m_s: float | None = None
     endurance_s: float | None = None
     folder: Path = field(default_factory=Path)
+
+    @classmethod
+    def of(cls, fleet: "Fleet", resource: ResourceId) -> Self:
+        """Return how a resource of a fleet is reached, as its arbiter gets it."""
+        payload = fleet.payloads.get(resource)
+        vehicle = fleet.vehicles[resource if payload is None else payload.vehicle]
+        area = fleet.geometries.get(fleet.fence)
+        return cls(
+            resource,
+            vehicle.domain.value,
+            (payload or vehicle).settings,
+            (payload or vehicle).behaviors,
+            detector=payload is not None and payload.detector,
+            lost_after_s=vehicle.lost_after_s,
+            failsafe=vehicle.failsafe,
+            fence=area if isinstance(area, Area) else None,
+            sitl=vehicle.sitl,
+            cruise_speed_m_s=vehicle.cruise_speed_m_s if payload is None else None,
+            endurance_s=vehicle.endurance_s if payload is None else None,
+            folder=Path(fleet.file).parent,
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,6 @@ import json
 from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 from m2pem.api.arbiter import (
@@ -24,7 +23,6 @@ from m2pem.fleet.fleet import SIMULATED, Fleet
 from m2pem.fleet.graph import ResourceGraph
 from m2pem.mission.behavior import BehaviorType
 from m2pem.mission.catalogue import BehaviorSpec, ResourceId
-from m2pem.mission.geometry import Area
 from m2pem.teams.capabilities import Capabilities
 
 if TYPE_CHECKING:
@@ -54,40 +52,14 @@ HOST_LINK = "zenoh"
 
 def _connections(fleet: Fleet) -> dict[tuple[str, str], dict[ResourceId, Connection]]:
     """The connections of each arbiter, by its name and the host that it runs on."""
-    area = fleet.geometries.get(fleet.fence)
-    fence = area if isinstance(area, Area) else None
-    folder = Path(fleet.file).parent
     connections: dict[tuple[str, str], dict[ResourceId, Connection]] = {}
     for vehicle in fleet.vehicles.values():
         group = connections.setdefault((vehicle.arbiter, vehicle.host), {})
-        group[vehicle.id] = Connection(
-            vehicle.id,
-            vehicle.domain.value,
-            vehicle.settings,
-            vehicle.behaviors,
-            lost_after_s=vehicle.lost_after_s,
-            failsafe=vehicle.failsafe,
-            fence=fence,
-            sitl=vehicle.sitl,
-            cruise_speed_m_s=vehicle.cruise_speed_m_s,
-            endurance_s=vehicle.endurance_s,
-            folder=folder,
-        )
+        group[vehicle.id] = Connection.of(fleet, vehicle.id)
     for payload in fleet.payloads.values():
-        owner = fleet.vehicles[payload.vehicle]
-        group = connections.setdefault((payload.arbiter, owner.host), {})
-        group[payload.id] = Connection(
-            payload.id,
-            owner.domain.value,
-            payload.settings,
-            payload.behaviors,
-            detector=payload.detector,
-            lost_after_s=owner.lost_after_s,
-            failsafe=owner.failsafe,
-            fence=fence,
-            sitl=owner.sitl,
-            folder=folder,
-        )
+        host = fleet.vehicles[payload.vehicle].host
+        group = connections.setdefault((payload.arbiter, host), {})
+        group[payload.id] = Connection.of(fleet, payload.id)
     return connections
 
 

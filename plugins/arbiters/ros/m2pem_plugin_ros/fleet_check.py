@@ -31,9 +31,7 @@ async def check_vehicles(fleet: Fleet) -> Sequence[HealthCheck]:
     """Return for each vehicle of this host whether it is there, and whether it could be
     commanded."""
     connections = {
-        vehicle.id: Connection(
-            vehicle.id, vehicle.domain.value, vehicle.settings, sitl=vehicle.sitl
-        )
+        vehicle.id: Connection.of(fleet, vehicle.id)
         for vehicle in fleet.vehicles.values()
         if vehicle.arbiter == "ros" and not vehicle.host
     }

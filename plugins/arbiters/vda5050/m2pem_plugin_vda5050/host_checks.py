@@ -2,7 +2,6 @@
 
 import socket
 from collections.abc import Sequence
-from pathlib import Path
 
 from m2pem.api import Connection, Fleet, HealthCheck, HealthStatus
 from m2pem.errors import PluginError
@@ -14,9 +13,8 @@ CONNECTED_WITHIN_S = 1.0
 
 def check_brokers(fleet: Fleet) -> Sequence[HealthCheck]:
     """Check each broker of the fleet once. Nothing is sent to it."""
-    folder = Path(fleet.file).parent
     connections = {
-        vehicle.id: Connection(vehicle.id, vehicle.domain.value, vehicle.settings, folder=folder)
+        vehicle.id: Connection.of(fleet, vehicle.id)
         for vehicle in fleet.vehicles.values()
         if vehicle.arbiter == ARBITER
     }

@@ -105,22 +105,9 @@ def _token(name: str) -> str:
 
 def _settings_here(fleet: Fleet, options: Options) -> Mapping[ResourceId, Settings]:
     """The settings of the fleet's ROS vehicles and payloads in the domain of the face."""
-    vehicles = [each for each in fleet.vehicles.values() if each.arbiter == ARBITER]
-    connections = {
-        each.id: Connection(each.id, each.domain, each.settings, each.behaviors)
-        for each in vehicles
-    }
-    mounted = [each for each in fleet.payloads.values() if each.arbiter == ARBITER]
-    connections |= {
-        each.id: Connection(
-            each.id,
-            fleet.vehicles[each.vehicle].domain,
-            each.settings,
-            each.behaviors,
-            each.detector,
-        )
-        for each in mounted
-    }
+    vehicles = [each.id for each in fleet.vehicles.values() if each.arbiter == ARBITER]
+    payloads = [each.id for each in fleet.payloads.values() if each.arbiter == ARBITER]
+    connections = {each: Connection.of(fleet, each) for each in (*vehicles, *payloads)}
     read = read_settings(connections)
     return {
         resource: settings

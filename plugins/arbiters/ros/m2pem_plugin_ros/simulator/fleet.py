@@ -43,14 +43,9 @@ def read_specs(fleet: Fleet, words: Mapping[str, Any]) -> Iterator[VehicleSpec]:
         WordError: one of `words` is wrong.
     """
     vehicles = [each for each in fleet.vehicles.values() if each.arbiter == ARBITER and each.sitl]
-    connections = {
-        each.id: Connection(each.id, each.domain.value, each.settings, sitl=True)
-        for each in vehicles
-    }
+    connections = {each.id: Connection.of(fleet, each.id) for each in vehicles}
     payloads = {
-        payload.id: Connection(
-            payload.id, vehicle.domain.value, payload.settings, detector=True, sitl=True
-        )
+        payload.id: Connection.of(fleet, payload.id)
         for vehicle in vehicles
         for payload in (fleet.payloads[name] for name in vehicle.payloads)
         if payload.arbiter == ARBITER and payload.detector

@@ -6,7 +6,6 @@ import math
 import time
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
-from pathlib import Path
 from typing import Any, Self
 
 import aiomqtt
@@ -57,12 +56,7 @@ def read_specs(fleet: Fleet) -> list[tuple[AgvSpec, Settings, float]]:
         PluginError: a connection is wrong; the text names the resource and the key.
     """
     vehicles = [each for each in fleet.vehicles.values() if each.arbiter == ARBITER and each.sitl]
-    folder = Path(fleet.file).parent
-    connections = {
-        each.id: Connection(each.id, each.domain.value, each.settings, sitl=True, folder=folder)
-        for each in vehicles
-    }
-    read = read_settings(connections)
+    read = read_settings({each.id: Connection.of(fleet, each.id) for each in vehicles})
     return [
         _spec(each.id, read[each.id], number, fleet.origin) for number, each in enumerate(vehicles)
     ]

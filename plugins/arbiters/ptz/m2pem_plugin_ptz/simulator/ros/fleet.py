@@ -23,10 +23,9 @@ def read_specs(fleet: Fleet) -> Iterator[CameraSpec]:
         PluginError: a connection is wrong; the text names the resource and the key.
     """
     for payload in fleet.payloads.values():
-        vehicle = fleet.vehicles[payload.vehicle]
-        if payload.arbiter != ARBITER or not vehicle.sitl:
+        connection = Connection.of(fleet, payload.id)
+        if payload.arbiter != ARBITER or not connection.sitl:
             continue
-        connection = Connection(payload.id, vehicle.domain.value, payload.settings, sitl=True)
         settings = read_settings({payload.id: connection})[payload.id]
         if settings.driver is DriverName.ROS:
             yield CameraSpec(payload.id, read_own_settings(connection), settings.reach)
@@ -34,23 +33,9 @@ def read_specs(fleet: Fleet) -> Iterator[CameraSpec]:
 
 
 def _with_nodes(fleet: Fleet) -> Iterator[CameraSpec]:
-    connections: dict[ResourceId, Connection] = {}
-    for vehicle in fleet.vehicles.values():
-        if vehicle.arbiter == NODES:
-            connections[vehicle.id] = Connection(
-                vehicle.id, vehicle.domain.value, vehicle.settings, sitl=vehicle.sitl
-            )
-    for payload in fleet.payloads.values():
-        owner = fleet.vehicles[payload.vehicle]
-        if payload.arbiter == NODES:
-            connections[payload.id] = Connection(
-                payload.id,
-                owner.domain.value,
-                payload.settings,
-                payload.behaviors,
-                payload.detector,
-                sitl=owner.sitl,
-            )
+    vehicles = [each.id for each in fleet.vehicles.values() if each.arbiter == NODES]
+    payloads = [each.id for each in fleet.payloads.values() if each.arbiter == NODES]
+    connections = {each: Connection.of(fleet, each) for each in (*vehicles, *payloads)}
     for resource, settings in read_payloads(connections, read_vehicles(connections)).items():
         if not connections[resource].sitl:
             continue
