@@ -7,9 +7,14 @@ import select
 import signal
 import threading
 import time
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import suppress
-from typing import ClassVar
+from typing import Any, ClassVar
+
+import click
+
+from m2pem.api.faults import FaultError, FaultGrammar, PlannedFault
+from m2pem.api.latest_task import cancel_and_wait
 
 
 def interrupted() -> asyncio.Event:
@@ -19,6 +24,23 @@ def interrupted() -> asyncio.Event:
     for number in (signal.SIGINT, signal.SIGTERM):
         asyncio.get_running_loop().add_signal_handler(number, event.set)
     return event
+
+
+async def until_interrupted(
+    stop: asyncio.Event, ends: Awaitable[None], *beside: Awaitable[None]
+) -> None:
+    """Wait until `stop` is set or `ends` is over, and cancel `ends` and `beside`.
+
+    Raises:
+        Exception: what `ends` raises.
+    """
+    ended, stopped, *others = (asyncio.ensure_future(each) for each in (ends, stop.wait(), *beside))
+    try:
+        await asyncio.wait((ended, stopped), return_when=asyncio.FIRST_COMPLETED)
+        if ended.done():
+            ended.result()
+    finally:
+        await cancel_and_wait(ended, stopped, *others)
 
 
 STDIN = 0
@@ -87,3 +109,18 @@ class Lines:
             return os.tcgetpgrp(self._descriptor) != os.getpgrp()
         except OSError:
             return False
+
+
+async def plan_typed_faults(
+    grammar: FaultGrammar[Any], plan: Callable[[PlannedFault[Any]], None]
+) -> None:
+    """Plan the faults that are typed, until the input ends."""
+    async for line in Lines():
+        if not (text := line.strip()):
+            continue
+        try:
+            plan(grammar.parse(text))
+        except FaultError as error:
+            click.echo(f"m2pem: {error}", err=True)
+        else:
+            click.echo(f"fault: {text}")

@@ -20,7 +20,7 @@ async def main(name: str, settings: str, endless: str) -> None:
     connection = Connection(ResourceId(name), "ground", json.loads(settings))
     spec = CameraSpec(name, read_settings(connection), ENDLESS if endless == "yes" else REACH)
     ready = asyncio.Event()
-    going = asyncio.create_task(simulate([spec], SystemClock(), None, ready))
+    going = asyncio.create_task(simulate([spec], SystemClock(), None, ready.set))
     asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, going.cancel)
     await ready.wait()
     print("ready", flush=True)

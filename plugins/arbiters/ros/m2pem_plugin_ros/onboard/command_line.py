@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from m2pem.api import Connection, EpochFence, GeoPosition, ResourceId
-from m2pem.api.command_options import PositionOption
+from m2pem.api.command_options import PositionOption, TextOption, read_setting
 from m2pem.errors import PluginError
 from m2pem_plugin_ros.loopback import keep_on_loopback
 from m2pem_plugin_ros.settings import DriverName, read_settings
@@ -15,22 +15,15 @@ from m2pem_plugin_ros.settings import DriverName, read_settings
 _FLAGS = {"true": True, "false": False}
 
 
-class Setting(click.ParamType):  # type: ignore[type-arg]  # older clicks have it bare
-    """KEY=VALUE. A key of an inner map has a dot: bounds.speed=1.5 m/s."""
-
-    name = "key=value"
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[tuple[str, ...], str | bool]:
-        """Return the path of keys, and the value."""
-        if isinstance(value, tuple):
-            return value
-        key, equals, said = (part.strip() for part in str(value).partition("="))
-        path = tuple(key.split("."))
-        if not (equals and said and all(path) and len(path) <= 2):
-            self.fail(f"{value!r} is not KEY=VALUE, such as bounds.speed=1.5 m/s", param, ctx)
-        return path, _FLAGS.get(said, said)
+def _read_setting(text: str) -> tuple[tuple[str, ...], str | bool]:
+    """Read KEY=VALUE. A key of an inner map has a dot: bounds.speed=1.5 m/s. Return the path of
+    keys, and the value."""
+    example = "bounds.speed=1.5 m/s"
+    key, said = read_setting(text, example)
+    path = tuple(key.split("."))
+    if not all(path) or len(path) > 2:
+        raise ValueError(f"{text!r} is not KEY=VALUE, such as {example}")
+    return path, _FLAGS.get(said, said)
 
 
 @click.command()
@@ -58,7 +51,7 @@ class Setting(click.ParamType):  # type: ignore[type-arg]  # older clicks have i
 @click.option(
     "--set",
     "words",
-    type=Setting(),
+    type=TextOption("key=value", _read_setting),
     multiple=True,
     help="A key of a connection in a fleet, such as bounds.speed=1.5 m/s or odom_frame=odom. "
     "May be given more than once.",

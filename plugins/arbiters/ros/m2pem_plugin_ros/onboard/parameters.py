@@ -16,8 +16,8 @@ from rcl_interfaces.msg import (
 )
 from rclpy.node import Node
 
-from m2pem.api import GeoPosition, did_you_mean
-from m2pem.api.command_options import PositionOption
+from m2pem.api import did_you_mean
+from m2pem.api.command_options import read_position
 from m2pem_plugin_ros.installation import RosError
 from m2pem_plugin_ros.settings import (
     BOUNDS,
@@ -169,8 +169,8 @@ def _type(parameter: _Parameter) -> int:
 def _origin(values: list[float]) -> tuple[float, float, float]:
     text = ",".join(f"{value!r}" for value in values)
     try:
-        place: GeoPosition = PositionOption().convert(text, None, None)
-    except Exception as error:
+        place = read_position(text)
+    except ValueError as error:
         raise RosError(f"parameter origin: {values} is no LAT,LON,ALT: {error}") from error
     return place.latitude_deg, place.longitude_deg, place.altitude_m
 

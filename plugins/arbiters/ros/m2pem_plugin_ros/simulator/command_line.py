@@ -2,16 +2,23 @@
 
 import asyncio
 from collections.abc import Iterable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from m2pem.api import GeoPosition
-from m2pem.api.command_options import FaultOption, PositionOption
+from m2pem.api.command_options import (
+    FaultOption,
+    PositionOption,
+    TextOption,
+    read_position,
+    read_setting,
+    speed_option,
+)
 from m2pem.api.faults import FaultError, PlannedFault
-from m2pem.api.foreground import Lines, interrupted
-from m2pem.api.latest_task import cancel_and_wait
+from m2pem.api.foreground import interrupted, plan_typed_faults, until_interrupted
 from m2pem.errors import PluginError
 from m2pem_plugin_ros.frames import Origin, to_local
 from m2pem_plugin_ros.loopback import keep_on_loopback
@@ -22,42 +29,18 @@ from m2pem_plugin_ros.simulator.sensors import Target
 from m2pem_plugin_ros.simulator.specification import FORT, SettingError, VehicleSpec
 
 if TYPE_CHECKING:
-    from m2pem_plugin_ros.simulator.simulation import Simulation
+    pass
 
 MOST = 100
 """Vehicles in one process; 20 are moderate, see docs/ros-simulation.md."""
 
 
-class SettingOption(click.ParamType):  # type: ignore[type-arg]  # older clicks have it bare
-    """KEY=VALUE, a setting of a vehicle."""
-
-    name = "key=value"
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[str, str]:
-        if isinstance(value, tuple):
-            return value
-        key, equals, said = str(value).partition("=")
-        if not (key.strip() and equals and said.strip()):
-            self.fail(f"{value!r} is not KEY=VALUE, such as max_speed=3 m/s", param, ctx)
-        return key.strip(), said.strip()
-
-
-class PlantedTarget(click.ParamType):  # type: ignore[type-arg]  # older clicks have it bare
-    """TYPE@LAT,LON, something that a detector can find."""
-
-    name = "type@lat,lon"
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[str, GeoPosition]:
-        if isinstance(value, tuple):
-            return value
-        kind, at, place = str(value).partition("@")
-        if not (kind.strip() and at):
-            self.fail(f"{value!r} is not TYPE@LAT,LON, such as gpr@38.1,-77.3", param, ctx)
-        return kind.strip(), PositionOption().convert(place, param, ctx)
+def _read_target(text: str) -> tuple[str, GeoPosition]:
+    """Read TYPE@LAT,LON, something that a detector can find."""
+    kind, at, place = text.partition("@")
+    if not (kind.strip() and at):
+        raise ValueError(f"{text!r} is not TYPE@LAT,LON, such as gpr@38.1,-77.3")
+    return kind.strip(), read_position(place)
 
 
 @click.command()
@@ -80,17 +63,11 @@ class PlantedTarget(click.ParamType):  # type: ignore[type-arg]  # older clicks 
 @click.option(
     "--target",
     "targets",
-    type=PlantedTarget(),
+    type=TextOption("type@lat,lon", _read_target),
     multiple=True,
     help="Something that detectors of vehicles without a fleet find, such as gpr@38.1,-77.3.",
 )
-@click.option(
-    "--speed",
-    type=click.FloatRange(0.1, 20),
-    default=1.0,
-    show_default=True,
-    help="Simulated seconds per second.",
-)
+@speed_option(20)
 @click.option(
     "--domain-id",
     type=click.IntRange(0, 101),
@@ -99,7 +76,7 @@ class PlantedTarget(click.ParamType):  # type: ignore[type-arg]  # older clicks 
 @click.option(
     "--set",
     "words",
-    type=SettingOption(),
+    type=TextOption("key=value", partial(read_setting, example="max_speed=3 m/s")),
     multiple=True,
     help="Of all vehicles, such as max_speed=3 m/s. May be given more than once.",
 )
@@ -200,28 +177,8 @@ async def _run(
         for spec in specs:
             click.echo(_line(spec))
         click.echo("ready")
-        tasks = [
-            asyncio.ensure_future(each)
-            for each in (vehicles.stopped(), stop.wait(), _read_faults(vehicles))
-        ]
-        ended, stopped, _ = tasks
-        await asyncio.wait((ended, stopped), return_when=asyncio.FIRST_COMPLETED)
-        if ended.done():
-            ended.result()
-        await cancel_and_wait(*tasks)
-
-
-async def _read_faults(vehicles: "Simulation") -> None:
-    """Plan the faults that are typed, until the input ends."""
-    async for line in Lines():
-        if not (text := line.strip()):
-            continue
-        try:
-            vehicles.plan(GRAMMAR.parse(text))
-        except FaultError as error:
-            click.echo(f"m2pem: {error}", err=True)
-        else:
-            click.echo(f"fault: {text}")
+        typed = plan_typed_faults(GRAMMAR, vehicles.plan)
+        await until_interrupted(stop, vehicles.stopped(), typed)
 
 
 def _line(spec: VehicleSpec) -> str:

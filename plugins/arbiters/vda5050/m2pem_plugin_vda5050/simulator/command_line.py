@@ -6,9 +6,9 @@ from pathlib import Path
 
 import click
 
-from m2pem.api.command_options import FaultOption
+from m2pem.api.command_options import FaultOption, speed_option
 from m2pem.api.faults import FaultError, PlannedFault
-from m2pem.api.foreground import Lines, interrupted
+from m2pem.api.foreground import interrupted, plan_typed_faults, until_interrupted
 from m2pem.api.latest_task import cancel_and_wait
 from m2pem.errors import PluginError
 from m2pem_plugin_vda5050.settings import ARBITER, Settings
@@ -25,13 +25,7 @@ from m2pem_plugin_vda5050.simulator.simulation import Simulation, read_specs
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
     help="Simulate what this fleet file has of arbiter vda5050, marked `sitl: true`.",
 )
-@click.option(
-    "--speed",
-    type=click.FloatRange(0.1, 50),
-    default=1.0,
-    show_default=True,
-    help="Simulated seconds per second.",
-)
+@speed_option(50)
 @click.option(
     "--fault",
     "faults",
@@ -78,22 +72,6 @@ async def _run(
             for spec, settings, _ in specs:
                 click.echo(f"{spec.name}: {settings.address}")
             click.echo("ready")
-        reading = asyncio.create_task(_read_faults(simulation))
-        ended = asyncio.create_task(simulation.ended())
-        await asyncio.wait((stopping, ended), return_when=asyncio.FIRST_COMPLETED)
-        if ended.done():
-            ended.result()
-        await cancel_and_wait(connecting, stopping, reading, ended)
-
-
-async def _read_faults(simulation: Simulation) -> None:
-    """Plan the faults that are typed, until the input ends."""
-    async for line in Lines():
-        if not (text := line.strip()):
-            continue
-        try:
-            simulation.plan(GRAMMAR.parse(text))
-        except FaultError as error:
-            click.echo(f"m2pem: {error}", err=True)
-        else:
-            click.echo(f"fault: {text}")
+        typed = plan_typed_faults(GRAMMAR, simulation.plan)
+        await until_interrupted(stop, simulation.ended(), typed)
+        await cancel_and_wait(connecting, stopping)

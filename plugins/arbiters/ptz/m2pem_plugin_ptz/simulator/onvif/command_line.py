@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from m2pem.api.command_options import DurationOption, FaultOption
+from m2pem.api.command_options import DurationOption, FaultOption, TextOption
 from m2pem.api.faults import PlannedFault
 from m2pem.api.foreground import interrupted
 from m2pem.errors import PluginError
@@ -18,46 +18,33 @@ from m2pem_plugin_ptz.simulator.onvif.server import OnvifServer
 Address = tuple[str, int]
 
 
-class HttpAddress(click.ParamType):  # type: ignore[type-arg]  # older clicks have it bare
-    """HOST:PORT."""
-
-    name = "host:port"
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> Address:
-        if isinstance(value, tuple):
-            return value
-        match = re.fullmatch(r"(?:http://)?([^:/]+|\[[^]]+\]):(\d{1,5})/?", str(value))
-        if match is None or int(match[2]) > 65535:
-            self.fail(f"{value!r} is not HOST:PORT, such as 127.0.0.1:8081", param, ctx)
-        host = match[1].strip("[]")
-        return ("127.0.0.1" if host == "localhost" else host), int(match[2])
+def _read_address(text: str) -> Address:
+    """Read HOST:PORT."""
+    match = re.fullmatch(r"(?:http://)?([^:/]+|\[[^]]+\]):(\d{1,5})/?", text)
+    if match is None or int(match[2]) > 65535:
+        raise ValueError(f"{text!r} is not HOST:PORT, such as 127.0.0.1:8081")
+    host = match[1].strip("[]")
+    return ("127.0.0.1" if host == "localhost" else host), int(match[2])
 
 
-class Range(click.ParamType):  # type: ignore[type-arg]  # older clicks have it bare
-    """LOW,HIGH in degrees."""
+def _read_range(text: str) -> tuple[float, float]:
+    """Read LOW,HIGH in degrees."""
+    try:
+        low, high = map(float, text.split(","))
+    except ValueError:
+        raise ValueError(f"{text!r} is not LOW,HIGH in degrees, such as -170,170") from None
+    if not -360 <= low < high <= 360:
+        raise ValueError(f"{text!r}: it goes up from LOW to HIGH, within -360 to 360")
+    return low, high
 
-    name = "low,high"
 
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[float, float]:
-        if isinstance(value, tuple):
-            return value
-        try:
-            low, high = map(float, str(value).split(","))
-        except ValueError:
-            self.fail(f"{value!r} is not LOW,HIGH in degrees, such as -170,170", param, ctx)
-        if not -360 <= low < high <= 360:
-            self.fail(f"{value!r}: it goes up from LOW to HIGH, within -360 to 360", param, ctx)
-        return low, high
+_RANGE = TextOption("low,high", _read_range)
 
 
 @click.command()
 @click.option(
     "--listen",
-    type=HttpAddress(),
+    type=TextOption("host:port", _read_address),
     default="127.0.0.1:8081",
     show_default=True,
     help="Where it is reached; port 0: any that is free.",
@@ -67,8 +54,8 @@ class Range(click.ParamType):  # type: ignore[type-arg]  # older clicks have it 
     type=click.Path(path_type=Path, dir_okay=False),
     help="The file with the user and the password that it takes.  [default: it takes everybody]",
 )
-@click.option("--pan", type=Range(), default="-180,180", show_default=True, help="In degrees.")
-@click.option("--tilt", type=Range(), default="-90,30", show_default=True, help="In degrees.")
+@click.option("--pan", type=_RANGE, default="-180,180", show_default=True, help="In degrees.")
+@click.option("--tilt", type=_RANGE, default="-90,30", show_default=True, help="In degrees.")
 @click.option("--endless", is_flag=True, help="It pans all round, without stops.")
 @click.option("--zoom-max", type=click.FloatRange(1.1, 100), default=20.0, show_default=True)
 @click.option(

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import click
 
 from m2pem.api import SystemClock
-from m2pem.api.foreground import interrupted
-from m2pem.api.latest_task import cancel_and_wait
+from m2pem.api.command_options import speed_option
+from m2pem.api.foreground import interrupted, until_interrupted
 from m2pem.errors import PluginError
 
 if TYPE_CHECKING:
@@ -25,13 +25,7 @@ if TYPE_CHECKING:
     help="Simulate the cameras of this fleet file on vehicles marked `sitl: true`: of arbiter ptz "
     "and driver ros, and those of arbiter ros that have an m2pem node of their own.",
 )
-@click.option(
-    "--speed",
-    type=click.FloatRange(0.1, 20),
-    default=1.0,
-    show_default=True,
-    help="Simulated seconds per second.",
-)
+@speed_option(20)
 @click.option(
     "--domain-id",
     type=click.IntRange(0, 101),
@@ -65,22 +59,11 @@ def ros_cameras(fleet_file: Path, speed: float, domain_id: int | None) -> None:
 async def _run(specs: "Sequence[CameraSpec]", speed: float, domain_id: int | None) -> None:
     from m2pem_plugin_ptz.simulator.ros.simulation import simulate  # noqa: PLC0415  # it needs ROS
 
-    stop, ready = interrupted(), asyncio.Event()
-    simulating, started, stopped = tasks = [
-        asyncio.ensure_future(each)
-        for each in (
-            simulate(specs, SystemClock(speed), domain_id, ready),
-            ready.wait(),
-            stop.wait(),
-        )
-    ]
-    await asyncio.wait((simulating, started), return_when=asyncio.FIRST_COMPLETED)
-    if started.done():
+    def ready() -> None:
         for spec in specs:
             node = "" if spec.node is None else ", an m2pem node"
             click.echo(f"{spec.name}: {spec.settings.joint_states}, {spec.settings.image}{node}")
         click.echo("ready")
-        await asyncio.wait((simulating, stopped), return_when=asyncio.FIRST_COMPLETED)
-    if simulating.done():
-        simulating.result()
-    await cancel_and_wait(*tasks)
+
+    simulating = simulate(specs, SystemClock(speed), domain_id, ready)
+    await until_interrupted(interrupted(), simulating)

@@ -1,7 +1,7 @@
 """Runs all simulated cameras of a process."""
 
 import asyncio
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from m2pem_plugin_ros import RosRuntime
@@ -16,9 +16,9 @@ NODE = "m2pem_sim_cameras"
 
 
 async def simulate(
-    specs: Sequence[CameraSpec], clock: Clock, domain_id: int | None, ready: asyncio.Event
+    specs: Sequence[CameraSpec], clock: Clock, domain_id: int | None, ready: Callable[[], None]
 ) -> None:
-    """Simulate until cancelled. `ready` is set when all cameras are subscribed. `domain_id`: for
+    """Simulate until cancelled. `ready` is called when all cameras are subscribed. `domain_id`: for
     cameras whose fleet has none; None takes ROS_DOMAIN_ID."""
     runtimes: dict[int | None, RosRuntime] = {}
     nodes: list[CameraNode] = []
@@ -36,7 +36,7 @@ async def simulate(
                 nodes.append(_node(ros, spec.node, domain, clock))
         moving = asyncio.get_running_loop().create_task(_move(cameras))
         await asyncio.gather(*(node.open() for node in nodes))
-        ready.set()
+        ready()
         await moving
     finally:
         await asyncio.gather(*(node.close() for node in nodes), return_exceptions=True)
