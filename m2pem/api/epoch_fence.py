@@ -5,6 +5,7 @@ import logging
 from pathlib import Path
 
 from m2pem.api.arbiter import BehaviorId
+from m2pem.api.remember import remember
 from m2pem.errors import StaleCommandError
 from m2pem.whole_file import write_whole
 
@@ -47,10 +48,9 @@ class EpochFence:
 
     def admit_run(self, run: str, epoch: int) -> bool:
         """The same for a run, whose name may be any text."""
-        before = self._highest.pop(run, None)
-        highest = self._highest[run] = epoch if before is None else max(epoch, before)
-        if len(self._highest) > REMEMBERED:
-            del self._highest[next(iter(self._highest))]
+        before = self._highest.get(run)
+        highest = epoch if before is None else max(epoch, before)
+        remember(self._highest, run, highest, REMEMBERED)
         if self._file is not None and highest != before:
             _write(self._file, self._highest)
         return epoch >= highest

@@ -29,6 +29,7 @@ from m2pem.api import (
     raw_parameters,
 )
 from m2pem.api.latest_task import cancel_and_wait
+from m2pem.api.remember import remember
 from m2pem.errors import PluginError
 from m2pem_plugin_ros.checkpoint import goal_id, run_id
 from m2pem_plugin_ros.connections import VehicleConnection, VehicleSensors
@@ -577,19 +578,13 @@ class Vehicle:
 
     def _remember_run(self, run: UUID, behavior: BehaviorId) -> None:
         """Remember of which run a refusal may be; the newest behavior of it is named."""
-        self._runs.pop(str(run), None)
-        self._runs[str(run)] = behavior
-        if len(self._runs) > REMEMBERED:
-            del self._runs[next(iter(self._runs))]
+        remember(self._runs, str(run), behavior, REMEMBERED)
 
     def _keep(self, order: Order) -> None:
         self._order = order
         self._route, self._adopted = _route_of(order), False
         self._left, self._left_us = None, 0
-        self._behaviors.pop(order.goal, None)
-        self._behaviors[order.goal] = order.request.id
-        if len(self._behaviors) > REMEMBERED:
-            del self._behaviors[next(iter(self._behaviors))]
+        remember(self._behaviors, order.goal, order.request.id, REMEMBERED)
 
     def _behavior(self, goal: UUID) -> BehaviorId | None:
         behavior = self._behaviors.get(goal)

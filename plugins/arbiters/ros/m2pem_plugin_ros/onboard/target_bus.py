@@ -5,6 +5,7 @@ from collections.abc import AsyncIterator
 from typing import Any
 
 from m2pem.api import AsyncQueue, GeoPosition, PayloadState, ResourceId, VehicleState
+from m2pem.api.remember import remember
 from m2pem_plugin_ros.interfaces.key_values import WireError
 
 MOST_TARGETS = 1000
@@ -25,10 +26,7 @@ class TargetBus:
 
     def publish(self, state: State) -> None:
         """Publish a state to all readers."""
-        self._latest.pop(state.resource, None)
-        self._latest[state.resource] = state
-        if len(self._latest) > MOST_TARGETS:
-            del self._latest[next(iter(self._latest))]
+        remember(self._latest, state.resource, state, MOST_TARGETS)
         for reader in self._readers:
             reader.put(state)
 

@@ -7,7 +7,6 @@ is closed.
 import asyncio
 import contextlib
 import math
-from collections import OrderedDict
 from collections.abc import Mapping
 from uuid import UUID
 
@@ -25,6 +24,7 @@ from m2pem.api import (
     VehicleState,
 )
 from m2pem.api.latest_task import cancel_and_wait
+from m2pem.api.remember import remember
 from m2pem_plugin_ros.behaviors import (
     STALE_S,
     STANDING,
@@ -56,6 +56,8 @@ POSE_WITHIN_S = 2.0
 
 FARTHEST_M = 100_000.0
 
+REMEMBERED = 1000
+
 
 class BaseDriver:
     """Implements `Driver` for a base that takes velocities."""
@@ -68,7 +70,7 @@ class BaseDriver:
         self._bounds = setup.settings.bounds
         self._surroundings = Surroundings(setup.context, setup.connection.fence)
         self._pilot = Pilot(self._bounds, self._surroundings.outside_m)
-        self._ended = EndedGoals()
+        self._ended: dict[UUID, Outcome] = {}
         self._progress_reported: UUID | None = None
         self._interrupted: UUID | None = None
         self._warned_goal: UUID | None = None
@@ -136,7 +138,7 @@ class BaseDriver:
             motion = self._motion(order.request)
         except RefusedError as error:
             outcome = Outcome(BehaviorState.REJECTED, "REJECTED", str(error))
-            self._loop.call_soon(self._report_ended, order.goal, outcome)
+            self._loop.call_soon(self._setup.events.ended, order.goal, outcome)
             return
         if order.goal == self._interrupted:
             motion.take_up()
@@ -150,14 +152,14 @@ class BaseDriver:
         if goal == self._pilot.goal:
             self._pilot.end(goal)
             return
-        ended = self._ended.outcome(goal)
+        ended = self._ended.get(goal)
         if ended is None and self._pilot.goal is None:
             self._pilot.stop_for(goal)
             return
         if ended is None:
             reason = "the base no longer executed this goal"
             ended = Outcome(BehaviorState.CANCELLED, "", reason)
-        self._loop.call_soon(self._report_ended, goal, ended)
+        self._loop.call_soon(self._setup.events.ended, goal, ended)
 
     def adjust(self, goal: UUID, parameters: Mapping[str, ResolvedValue]) -> None:
         """Change the speed, `tolerance` of goto, or `offset` and `bearing` of follow."""
@@ -175,7 +177,7 @@ class BaseDriver:
         stands at its end. If it is begun again, it continues from where the base stands."""
         if order.goal == self._pilot.goal:
             return Outcome(BehaviorState.RUNNING)
-        ended = self._ended.outcome(order.goal)
+        ended = self._ended.get(order.goal)
         if ended is not None:
             return ended
         deadline_s = self._timer.now_s + POSE_WITHIN_S
@@ -241,17 +243,14 @@ class BaseDriver:
         if step.goal is not None and step.ending is not None:
             ending = step.ending
             outcome = Outcome(ending.state, ending.code, ending.reason)
-            self._ended.add(step.goal, outcome)
-            self._report_ended(step.goal, outcome)
+            remember(self._ended, step.goal, outcome, REMEMBERED)
+            self._setup.events.ended(step.goal, outcome)
 
     def _report_progress(self) -> None:
         goal = self._pilot.goal
         if goal is not None and goal != self._progress_reported:
             self._progress_reported = goal
             self._setup.events.progress(goal)
-
-    def _report_ended(self, goal: UUID, outcome: Outcome) -> None:
-        self._setup.events.ended(goal, outcome)
 
     def _broken(self, error: Exception) -> None:
         problem = f"internal error of m2pem: {type(error).__name__}: {error}"
@@ -300,25 +299,6 @@ def _stands(twist: Twist | None) -> bool:
     return (
         twist is not None and abs(twist.forward_m_s) < STANDING and abs(twist.yaw_rad_s) < STANDING
     )
-
-
-KEPT = 1000
-
-
-class EndedGoals:
-    """The outcomes of the latest goals."""
-
-    def __init__(self) -> None:
-        self._outcomes: OrderedDict[UUID, Outcome] = OrderedDict()
-
-    def add(self, goal: UUID, outcome: Outcome) -> None:
-        self._outcomes[goal] = outcome
-        if len(self._outcomes) > KEPT:
-            self._outcomes.popitem(last=False)
-
-    def outcome(self, goal: UUID) -> Outcome | None:
-        """Return how a goal ended; None if it is not known."""
-        return self._outcomes.get(goal)
 
 
 LEAST_S = 0.02

@@ -11,8 +11,9 @@ from lifecycle_msgs.msg import State
 from lifecycle_msgs.srv import GetState
 
 from m2pem.api import BehaviorState
+from m2pem_plugin_ros.drivers.goal_services import ACTIVE
 from m2pem_plugin_ros.drivers.nav2.errors import NavigationError, aborted, taken_over
-from m2pem_plugin_ros.drivers.nav2.goal_client import ACTIVE, GoalClient, number_of
+from m2pem_plugin_ros.drivers.nav2.goal_client import GoalClient, number_of
 from m2pem_plugin_ros.installation import require_interfaces
 from m2pem_plugin_ros.runtime import RosRuntime, RosTimeoutError, qos
 

@@ -5,12 +5,12 @@ before anything else is sent. A cancelled call may still have reached Nav2, and 
 """
 
 import asyncio
-from collections import OrderedDict
 from collections.abc import Mapping
 from dataclasses import dataclass
 from uuid import UUID
 
 from m2pem.api import BehaviorRequest, BehaviorState, LatestTask, ResolvedValue
+from m2pem.api.remember import remember
 from m2pem_plugin_ros.drivers.driver import DriverSetup, Health, Order, Outcome
 from m2pem_plugin_ros.drivers.nav2.client import Nav2
 from m2pem_plugin_ros.drivers.nav2.errors import NavigationError, taken_over
@@ -62,7 +62,7 @@ class Nav2Driver:
         self._nav2: Nav2 | None = None
         self._drive: _Drive | None = None
         self._held = False
-        self._ended: OrderedDict[UUID, Outcome] = OrderedDict()
+        self._ended: dict[UUID, Outcome] = {}
         self._work = LatestTask()
         self._polling: list[asyncio.Task[None]] = []
         self._given_up: dict[UUID, asyncio.Task[None]] = {}
@@ -313,9 +313,7 @@ class Nav2Driver:
         if self._drive is not drive:
             return
         self._drive = None
-        self._ended[drive.order.goal] = outcome
-        if len(self._ended) > REMEMBERED:
-            self._ended.popitem(last=False)
+        remember(self._ended, drive.order.goal, outcome, REMEMBERED)
         if self._nav2 is not None:
             self._nav2.limit_speed(None)
         self._events.ended(drive.order.goal, outcome)

@@ -1,8 +1,4 @@
-"""A client of one Nav2 action: sends, observes and cancels goals, also those of other clients.
-
-It uses the services and topics of the action directly. The client of rclpy knows only the goals
-that it has sent, but goals of other processes matter after a restart or a takeover.
-"""
+"""A client of one Nav2 action: sends, observes and cancels goals, also those of other clients."""
 
 import asyncio
 from collections.abc import Callable
@@ -10,10 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 from uuid import UUID
 
-from action_msgs.msg import GoalStatus
-from action_msgs.srv import CancelGoal
-from unique_identifier_msgs import msg as unique_identifier
-
+from m2pem.api.latest_task import cancel_and_wait
+from m2pem_plugin_ros.drivers.goal_services import ACTIVE, GoalServices, uuid_of
 from m2pem_plugin_ros.runtime import RosRuntime, RosTimeoutError, qos
 
 ANSWER_S = 3.0
@@ -24,10 +18,6 @@ CANCEL_S = 2.0
 
 FOREVER_S = 1e9
 """A result is awaited as long as the vehicle drives."""
-
-ACTIVE = frozenset(
-    {GoalStatus.STATUS_ACCEPTED, GoalStatus.STATUS_EXECUTING, GoalStatus.STATUS_CANCELING}
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,21 +46,16 @@ class GoalClient:
         self._open: set[UUID] = set()
         self._writers: frozenset[bytes] = frozenset()
         self._renewed = asyncio.Event()
-        impl = action.Impl
-        self._send_client = ros.client(impl.SendGoalService, f"{name}/_action/send_goal")
-        self._result_client = ros.client(impl.GetResultService, f"{name}/_action/get_result")
-        self._cancel_client = ros.client(CancelGoal, f"{name}/_action/cancel_goal")
-        ros.subscribe(
-            impl.FeedbackMessage, f"{name}/_action/feedback", self._on_feedback, qos.EVENTS
+        self._services = GoalServices(
+            ros, action, name, self._on_statuses, self._on_feedback, qos.EVENTS
         )
-        ros.subscribe(impl.GoalStatusMessage, self._status_topic, self._on_status, qos.STATUS)
 
     # --- what is known --------------------------------------------------------------------------
 
     @property
     def there(self) -> bool:
         """Whether a server of the action is discovered."""
-        return bool(self._send_client.service_is_ready())
+        return self._services.there
 
     @property
     def statuses(self) -> dict[UUID, int]:
@@ -90,7 +75,7 @@ class GoalClient:
 
     def refresh_server(self) -> None:
         """Detect another server than before. It does not know the goals of the old one."""
-        endpoints = self._ros.node.get_publishers_info_by_topic(self._status_topic)
+        endpoints = self._ros.node.get_publishers_info_by_topic(self._services.status_topic)
         writers = frozenset(bytes(endpoint.endpoint_gid) for endpoint in endpoints)
         if not writers:
             self._statuses = {}
@@ -110,7 +95,7 @@ class GoalClient:
         Raises:
             RosError: no answer came.
         """
-        task = asyncio.get_running_loop().create_task(self._send(goal_id, goal))
+        task = asyncio.get_running_loop().create_task(self._services.send(goal_id, goal, ANSWER_S))
         self._sending[goal_id] = task
         self._open.add(goal_id)
         task.add_done_callback(lambda done: self._sent(goal_id, done))
@@ -144,23 +129,11 @@ class GoalClient:
         goals = self.active if goal_id is None else {goal_id} & self.active
         if goal_id is not None and not goals:
             return
-        request = CancelGoal.Request()
-        if goal_id is not None:
-            request.goal_info.goal_id = _uuid(goal_id)
-        answer = await self._ros.call(self._cancel_client, request, CANCEL_S)
-        stopping = {UUID(bytes=bytes(info.goal_id.uuid)) for info in answer.goals_canceling}
+        answer = await self._services.cancel(goal_id, CANCEL_S)
+        stopping = {uuid_of(info.goal_id) for info in answer.goals_canceling}
         await asyncio.gather(*(self.result(goal, CANCEL_S) for goal in goals | stopping))
 
     # --- inside ---------------------------------------------------------------------------------
-
-    @property
-    def _status_topic(self) -> str:
-        return f"{self.name}/_action/status"
-
-    async def _send(self, goal_id: UUID, goal: Any) -> bool:
-        request = self.action.Impl.SendGoalService.Request(goal_id=_uuid(goal_id), goal=goal)
-        answer = await self._ros.call(self._send_client, request, ANSWER_S)
-        return bool(answer.accepted)
 
     def _sent(self, goal_id: UUID, task: asyncio.Task[bool]) -> None:
         self._sending.pop(goal_id, None)
@@ -171,35 +144,25 @@ class GoalClient:
             self._open.discard(goal_id)
 
     async def _ask_for_result(self, goal_id: UUID) -> Any:
-        request = self.action.Impl.GetResultService.Request(goal_id=_uuid(goal_id))
         loop = asyncio.get_running_loop()
         while True:
-            ask = loop.create_task(self._ros.call(self._result_client, request, FOREVER_S))
+            ask = loop.create_task(self._services.result(goal_id, FOREVER_S))
             renewed = loop.create_task(self._renewed.wait())
             try:
                 await asyncio.wait([ask, renewed], return_when=asyncio.FIRST_COMPLETED)
                 if ask.done():
                     return ask.result()
             finally:
-                ask.cancel()
-                renewed.cancel()
-                await asyncio.gather(ask, renewed, return_exceptions=True)
+                await cancel_and_wait(ask, renewed)
 
-    def _on_status(self, message: Any) -> None:
+    def _on_statuses(self, statuses: dict[UUID, int]) -> None:
         self._on_activity()
-        self._statuses = {
-            UUID(bytes=bytes(status.goal_info.goal_id.uuid)): int(status.status)
-            for status in message.status_list
-        }
-        self._open -= {goal for goal, status in self._statuses.items() if status not in ACTIVE}
+        self._statuses = statuses
+        self._open -= {goal for goal, status in statuses.items() if status not in ACTIVE}
 
-    def _on_feedback(self, message: Any) -> None:
+    def _on_feedback(self, goal: UUID, feedback: Any) -> None:
         self._on_activity()
-        self.feedback(UUID(bytes=bytes(message.goal_id.uuid)), message.feedback)
-
-
-def _uuid(goal_id: UUID) -> Any:
-    return unique_identifier.UUID(uuid=list(goal_id.bytes))
+        self.feedback(goal, feedback)
 
 
 _NUMBERS = (1 << 32) - 1

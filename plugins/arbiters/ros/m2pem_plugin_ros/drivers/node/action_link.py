@@ -1,7 +1,7 @@
 """Commands an m2pem node by the action `execute_behavior`."""
 
 import asyncio
-from collections.abc import Callable, Coroutine
+from collections.abc import Coroutine, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 from uuid import UUID
@@ -9,14 +9,16 @@ from uuid import UUID
 from action_msgs import msg as action
 from action_msgs import srv as action_services
 from m2pem_interfaces.action import ExecuteBehavior
-from unique_identifier_msgs import msg as unique_identifier
 
 from m2pem.api import BehaviorState
 from m2pem.api.latest_task import cancel_and_wait
+from m2pem.api.remember import remember
 from m2pem_plugin_ros.drivers.driver import DriverSetup, Order, Outcome
+from m2pem_plugin_ros.drivers.goal_services import ACTIVE, GoalServices
 from m2pem_plugin_ros.drivers.node.link import (
     QUERY_WITHIN_S,
     REMEMBERED,
+    REPLACED,
     RESTARTED,
     STILL_S,
     Retries,
@@ -25,7 +27,7 @@ from m2pem_plugin_ros.interfaces.behavior_command import start_command
 from m2pem_plugin_ros.interfaces.behavior_status import ENDS, read_status
 from m2pem_plugin_ros.interfaces.key_values import WireError
 from m2pem_plugin_ros.log_throttle import LogThrottle
-from m2pem_plugin_ros.runtime import RosRuntime, RosTimeoutError, qos
+from m2pem_plugin_ros.runtime import RosTimeoutError, qos
 
 CALL_S = 2.0
 """Timeout of a service that answers at once, in real seconds."""
@@ -62,7 +64,9 @@ class ActionLink:
     def __init__(self, setup: DriverSetup, name: str, log_throttle: LogThrottle) -> None:
         self._setup = setup
         self._log_throttle = log_throttle
-        self._client = GoalClient(setup.ros, name, Listeners(self._status, self._feedback))
+        self._client = GoalServices(
+            setup.ros, ExecuteBehavior, name, self._statuses, self._feedback, qos.COMMANDS
+        )
         self._pauses = Retries(setup.context.clock, setup.context.may_send)
         self._current: _PendingGoal | None = None
         self._pending: dict[UUID, _PendingGoal] = {}
@@ -117,15 +121,15 @@ class ActionLink:
             if not asked.done():
                 self._adopt(order)
                 return Outcome(BehaviorState.RUNNING)
-            number, status = asked.result()
+            ended = asked.result()
         except RosTimeoutError:
             reason = f"the vehicle's node did not answer within {QUERY_WITHIN_S:g} s"
             return Outcome(BehaviorState.UNKNOWN, reason=reason)
         finally:
             await cancel_and_wait(asked, shown)
-        if number == action.GoalStatus.STATUS_UNKNOWN:
+        if ended.status == action.GoalStatus.STATUS_UNKNOWN:
             return Outcome(BehaviorState.UNKNOWN, reason=RESTARTED)
-        return self._outcome(order.goal, number, status)
+        return self._outcome(order.goal, ended)
 
     async def _shown_active(self, goal: UUID) -> None:
         while self._shown.get(goal) not in ACTIVE:
@@ -170,17 +174,15 @@ class ActionLink:
         elif pending.acknowledged:
             pending.news.set()
 
-    def _status(self, goal: UUID, number: int) -> None:
-        self._shown.pop(goal, None)
-        self._shown[goal] = number
-        if len(self._shown) > REMEMBERED:
-            del self._shown[next(iter(self._shown))]
-        self._goals_shown.set()
-        pending = self._pending.get(goal)
-        if pending is not None:
-            pending.acknowledged = True
-            if number not in ACTIVE:
-                pending.news.set()
+    def _statuses(self, statuses: Mapping[UUID, int]) -> None:
+        for goal, number in statuses.items():
+            remember(self._shown, goal, number, REMEMBERED)
+            self._goals_shown.set()
+            pending = self._pending.get(goal)
+            if pending is not None:
+                pending.acknowledged = True
+                if number not in ACTIVE:
+                    pending.news.set()
 
     def _feedback(self, goal: UUID, message: Any) -> None:
         pending = self._pending.get(goal)
@@ -188,7 +190,7 @@ class ActionLink:
             return
         self._setup.events.alive()
         try:
-            status = read_status(message)
+            status = read_status(message.status)
         except WireError as error:
             self._log_throttle.log("invalid feedback", str(error))
             return
@@ -205,6 +207,7 @@ class ActionLink:
     async def _give(self, pending: _PendingGoal, order: Order) -> None:
         now_us = self._setup.context.clock.now_us()
         command = start_command(order, self._setup.ros.stamp_us(now_us))
+        content = ExecuteBehavior.Goal(command=command)
         attempts = 0
         while not (pending.acknowledged or pending.over):
             if pending.cancelled and attempts:
@@ -212,7 +215,7 @@ class ActionLink:
             while not self._setup.context.may_send():
                 await self._pauses.pause()
             try:
-                accepted = await self._client.send(pending.goal, command, CALL_S)
+                accepted = await self._client.send(pending.goal, content, CALL_S)
             except RosTimeoutError:
                 attempts += self._node_is_received
                 if attempts >= ATTEMPTS and not pending.cancelled:
@@ -237,10 +240,10 @@ class ActionLink:
         if goal in self._shown:
             return True
         try:
-            number, _ = await self._client.result(goal, CALL_S)
+            ended = await self._client.result(goal, CALL_S)
         except RosTimeoutError:
             return True  # the goal is active: for others, the node answers at once
-        return bool(number != action.GoalStatus.STATUS_UNKNOWN)
+        return bool(ended.status != action.GoalStatus.STATUS_UNKNOWN)
 
     async def _attend(self, pending: _PendingGoal) -> None:
         """Request the result of a goal whenever there is news, until it has ended."""
@@ -248,13 +251,13 @@ class ActionLink:
             await pending.news.wait()
             pending.news.clear()
             try:
-                number, status = await self._client.result(pending.goal, CALL_S)
+                ended = await self._client.result(pending.goal, CALL_S)
             except RosTimeoutError:
                 if self._shown.get(pending.goal, action.GoalStatus.STATUS_EXECUTING) not in ACTIVE:
                     pending.news.set()  # it has ended, but its outcome is not known yet
                 continue
-            if number != action.GoalStatus.STATUS_UNKNOWN:
-                self._over(pending, self._outcome(pending.goal, number, status))
+            if ended.status != action.GoalStatus.STATUS_UNKNOWN:
+                self._over(pending, self._outcome(pending.goal, ended))
             elif self._goes_on(pending):
                 cause = "another node in its namespace does not have its behavior"
                 self._log_throttle.log(cause, str(pending.goal))
@@ -274,18 +277,14 @@ class ActionLink:
     async def _cancel(self, pending: _PendingGoal) -> None:
         while not pending.over:
             try:
-                code = await self._client.cancel(pending.goal, CALL_S)
+                answer = await self._client.cancel(pending.goal, CALL_S)
             except RosTimeoutError:
                 continue
-            if code != CANCELS and pending.answered:
+            if answer.return_code != CANCELS and pending.answered:
                 pending.news.set()  # it has ended, or was never there
             await self._pauses.pause()
 
     # --- inside ---------------------------------------------------------------------------------
-
-    @property
-    def _name(self) -> str:
-        return self._setup.connection.resource
 
     def _add_pending(self, goal: UUID, order: Order | None) -> _PendingGoal:
         self._ended.pop(goal, None)
@@ -294,15 +293,9 @@ class ActionLink:
 
     def _let_go(self) -> None:
         """Drop all goals, as another order replaces them."""
-        for goal, pending in self._pending.items():
-            pending.over = True
-            self._remember(
-                goal, Outcome(BehaviorState.CANCELLED, reason="another behavior has replaced it")
-            )
-        for task in self._tasks:
-            task.cancel()
-        self._pending.clear()
-        self._current = None
+        for goal in self._pending:
+            remember(self._ended, goal, REPLACED, REMEMBERED)
+        self.abandon()
 
     def _over(self, pending: _PendingGoal, outcome: Outcome) -> None:
         if pending.over:
@@ -312,26 +305,21 @@ class ActionLink:
         self._pending.pop(pending.goal, None)
         if self._current is pending:
             self._current = None
-        self._remember(pending.goal, outcome)
+        remember(self._ended, pending.goal, outcome, REMEMBERED)
         self._setup.events.ended(pending.goal, outcome)
 
-    def _remember(self, goal: UUID, outcome: Outcome) -> None:
-        self._ended[goal] = outcome
-        if len(self._ended) > REMEMBERED:
-            del self._ended[next(iter(self._ended))]
-
-    def _outcome(self, goal: UUID, number: int, message: Any) -> Outcome:
+    def _outcome(self, goal: UUID, ended: Any) -> Outcome:
         """Return the outcome that the status of the behavior says; without a valid one, that of the
         action."""
         try:
-            status = read_status(message)
+            status = read_status(ended.result.status)
             if status.id == str(goal) and status.state in ENDS:
                 return Outcome(status.state, status.code, status.reason, status.outputs)
             wrong = f"the result of {goal} is a status of {status.id} with state {status.state}"
         except WireError as error:
             wrong = str(error)
         self._log_throttle.log("an invalid result", wrong)
-        return Outcome(_ENDS.get(number, BehaviorState.FAILED), reason=wrong)
+        return Outcome(_ENDS.get(ended.status, BehaviorState.FAILED), reason=wrong)
 
     def _run(self, work: Coroutine[Any, Any, None]) -> None:
         task = asyncio.get_running_loop().create_task(work)
@@ -342,97 +330,3 @@ class ActionLink:
         self._tasks.discard(task)
         if not task.cancelled() and (error := task.exception()) is not None:
             self._log_throttle.log("internal error of m2pem", repr(error))
-
-
-Status = action.GoalStatus
-
-ACTIVE = frozenset({Status.STATUS_ACCEPTED, Status.STATUS_EXECUTING, Status.STATUS_CANCELING})
-
-
-@dataclass(frozen=True, slots=True)
-class Listeners:
-    """Callbacks on the event loop: `status` with a goal and its GoalStatus, `feedback` with a goal
-    and its feedback."""
-
-    status: Callable[[UUID, int], None]
-    feedback: Callable[[UUID, Any], None]
-
-
-class GoalClient:
-    """A client of the action `execute_behavior`, by its services and topics.
-
-    The client of rclpy knows only the goals that it has sent. After a restart, goals are found by
-    their UUID.
-    """
-
-    def __init__(self, ros: RosRuntime, name: str, listeners: Listeners) -> None:
-        self._ros = ros
-        self._listeners = listeners
-        parts = ExecuteBehavior.Impl
-        self._send = ros.client(parts.SendGoalService, f"{name}/_action/send_goal")
-        self._result = ros.client(parts.GetResultService, f"{name}/_action/get_result")
-        self._cancel = ros.client(action_services.CancelGoal, f"{name}/_action/cancel_goal")
-        ros.subscribe(
-            action.GoalStatusArray,
-            f"{name}/_action/status",
-            self._on_statuses,
-            qos.STATUS,
-        )
-        ros.subscribe(
-            parts.FeedbackMessage, f"{name}/_action/feedback", self._on_feedback, qos.COMMANDS
-        )
-
-    @property
-    def missing(self) -> str:
-        services = (self._send, self._result, self._cancel)
-        names = [str(each.srv_name) for each in services if not each.service_is_ready()]
-        return f"the service {' and '.join(names)}" if names else ""
-
-    async def send(self, goal: UUID, command: Any, timeout_s: float) -> bool:
-        """Send a goal, and return whether it was accepted. A goal that the node has already is not
-        accepted.
-
-        Raises:
-            RosTimeoutError: no answer in time; the goal may still have arrived.
-        """
-        request = ExecuteBehavior.Impl.SendGoalService.Request(
-            goal_id=_message(goal), goal=ExecuteBehavior.Goal(command=command)
-        )
-        return bool((await self._ros.call(self._send, request, timeout_s)).accepted)
-
-    async def result(self, goal: UUID, timeout_s: float) -> tuple[int, Any]:
-        """Return the GoalStatus of a goal, and the status of its behavior. The node answers when
-        the goal has ended, or at once with STATUS_UNKNOWN.
-
-        Raises:
-            RosTimeoutError: no answer in time: the goal is active, or no node answers.
-        """
-        request = ExecuteBehavior.Impl.GetResultService.Request(goal_id=_message(goal))
-        response = await self._ros.call(self._result, request, timeout_s)
-        return response.status, response.result.status
-
-    async def cancel(self, goal: UUID, timeout_s: float) -> int:
-        """Cancel a goal, and return the code of CancelGoal.
-
-        Raises:
-            RosTimeoutError: no answer in time.
-        """
-        request = action_services.CancelGoal.Request()
-        request.goal_info.goal_id = _message(goal)
-        response = await self._ros.call(self._cancel, request, timeout_s)
-        return int(response.return_code)
-
-    def _on_statuses(self, message: Any) -> None:
-        for status in message.status_list:
-            self._listeners.status(_uuid(status.goal_info.goal_id), status.status)
-
-    def _on_feedback(self, message: Any) -> None:
-        self._listeners.feedback(_uuid(message.goal_id), message.feedback.status)
-
-
-def _message(goal: UUID) -> Any:
-    return unique_identifier.UUID(uuid=list(goal.bytes))
-
-
-def _uuid(message: Any) -> UUID:
-    return UUID(bytes=bytes(message.uuid))

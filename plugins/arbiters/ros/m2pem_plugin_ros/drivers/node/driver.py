@@ -1,6 +1,5 @@
 """The driver of a vehicle with an m2pem node."""
 
-from collections import OrderedDict
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -9,6 +8,7 @@ from uuid import UUID
 from m2pem_interfaces import msg as interfaces
 
 from m2pem.api import BehaviorRequest, BehaviorState, ResolvedValue
+from m2pem.api.remember import remember
 from m2pem_plugin_ros.drivers.driver import DriverSetup, Health, Order, Outcome
 from m2pem_plugin_ros.drivers.node.action_link import ActionLink
 from m2pem_plugin_ros.drivers.node.link import REMEMBERED, STILL_S, NodeLink, Retries
@@ -37,7 +37,7 @@ class NodeDriver:
         self._received_us = 0
         self._publisher: Any = None
         self._link: NodeLink | None = None
-        self._claims: OrderedDict[UUID, int] = OrderedDict()
+        self._claims: dict[UUID, int] = {}
 
     # --- life -----------------------------------------------------------------------------------
 
@@ -139,10 +139,7 @@ class NodeDriver:
 
     def claim(self, run: UUID, epoch: int) -> None:
         """Send CLAIM now, and again whenever the node is received again."""
-        self._claims[run] = epoch
-        self._claims.move_to_end(run)
-        if len(self._claims) > REMEMBERED:
-            self._claims.popitem(last=False)
+        remember(self._claims, run, epoch, REMEMBERED)
         self._send(vehicle_command(Verb.CLAIM, run, epoch, self._stamp_us()))
 
     def abandon(self) -> None:

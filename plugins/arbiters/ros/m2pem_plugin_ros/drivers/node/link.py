@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Protocol
 from uuid import UUID
 
-from m2pem.api import Clock
+from m2pem.api import BehaviorState, Clock
 from m2pem_plugin_ros.drivers.driver import Order, Outcome
 
 REPEAT_S = 0.5
@@ -24,6 +24,8 @@ REMEMBERED = 100
 STILL_S = 2.5
 """A node reports its behavior once a second. If it was reported within this time, an UNKNOWN came
 from a second node, and the first was not restarted."""
+
+REPLACED = Outcome(BehaviorState.CANCELLED, reason="another behavior has replaced it")
 
 RESTARTED = "the vehicle's node was restarted and does not have the behavior"
 

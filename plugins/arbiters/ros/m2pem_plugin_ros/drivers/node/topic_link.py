@@ -2,18 +2,19 @@
 
 import asyncio
 import logging
-from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 from uuid import UUID
 
 from m2pem.api import BehaviorState
+from m2pem.api.remember import remember
 from m2pem_plugin_ros.drivers.driver import DriverSetup, Order, Outcome
 from m2pem_plugin_ros.drivers.node.link import (
     ANSWER_WITHIN_S,
     QUERY_WITHIN_S,
     REMEMBERED,
+    REPLACED,
     RESTARTED,
     STILL_S,
     Retries,
@@ -57,7 +58,7 @@ class TopicLink:
         self._ended: dict[str, Outcome] = {}
         self._queries: dict[str, asyncio.Future[Status]] = {}
         self._node_received_us: int | None = None
-        self._orders: OrderedDict[UUID, Order] = OrderedDict()
+        self._orders: dict[UUID, Order] = {}
 
     @property
     def order(self) -> Order | None:
@@ -98,7 +99,7 @@ class TopicLink:
         if pending.cancelled:
             return
         pending.cancelled = True
-        self._retry(pending, self._cancel_of(pending))
+        self._retries.start(f"cancel {goal}", self._cancel_of(pending))
 
     def _cancel_of(self, pending: _PendingGoal) -> Callable[[], bool]:
         said = 0
@@ -224,10 +225,6 @@ class TopicLink:
 
     # --- inside ---------------------------------------------------------------------------------
 
-    @property
-    def _name(self) -> str:
-        return self._setup.connection.resource
-
     def _now_us(self) -> int:
         return self._setup.context.clock.now_us()
 
@@ -252,13 +249,7 @@ class TopicLink:
 
     def _know(self, order: Order) -> None:
         """Keep an order, so that later messages about its goal name its run."""
-        self._orders[order.goal] = order
-        self._orders.move_to_end(order.goal)
-        if len(self._orders) > REMEMBERED:
-            self._orders.popitem(last=False)
-
-    def _retry(self, pending: _PendingGoal, send_again: Callable[[], bool]) -> None:
-        self._retries.start(f"cancel {pending.goal}", send_again)
+        remember(self._orders, order.goal, order, REMEMBERED)
 
     def _let_go(self) -> None:
         """Drop all goals, as another order replaces them."""
@@ -266,24 +257,17 @@ class TopicLink:
         self._retries.stop("query")
         for id_, pending in list(self._pending.items()):
             self._retries.stop(f"cancel {pending.goal}")
-            self._remember(
-                id_, Outcome(BehaviorState.CANCELLED, reason="another behavior has replaced it")
-            )
+            remember(self._ended, id_, REPLACED, REMEMBERED)
         self._pending.clear()
         self._current = None
 
     def _over(self, pending: _PendingGoal, outcome: Outcome) -> None:
         id_ = str(pending.goal)
-        self._remember(id_, outcome)
+        remember(self._ended, id_, outcome, REMEMBERED)
         del self._pending[id_]
         if self._current is pending:
             self._current = None
         self._setup.events.ended(pending.goal, outcome)
-
-    def _remember(self, id_: str, outcome: Outcome) -> None:
-        self._ended[id_] = outcome
-        if len(self._ended) > REMEMBERED:
-            del self._ended[next(iter(self._ended))]
 
 
 def _outcome(status: Status) -> Outcome:

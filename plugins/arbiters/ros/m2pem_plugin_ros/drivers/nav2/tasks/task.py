@@ -11,10 +11,10 @@ from geometry_msgs.msg import PoseStamped
 
 from m2pem.api import BehaviorState, ResolvedValue
 from m2pem_plugin_ros.drivers.driver import DriverSetup, Order, Outcome
+from m2pem_plugin_ros.drivers.goal_services import ACTIVE
 from m2pem_plugin_ros.drivers.nav2.client import Nav2
 from m2pem_plugin_ros.drivers.nav2.errors import NavigationError
 from m2pem_plugin_ros.drivers.nav2.goal_client import (
-    ACTIVE,
     GoalClient,
     GoalResult,
     number_of,
