@@ -10,12 +10,12 @@ import math
 from collections import OrderedDict
 from collections.abc import Coroutine
 from dataclasses import replace
+from logging import Logger
 from typing import Any, Protocol
 from uuid import UUID, uuid4
 
 from m2pem.api import (
     Arbiter,
-    ArbiterCapabilities,
     ArbiterContext,
     BehaviorReport,
     BehaviorState,
@@ -28,10 +28,12 @@ from m2pem.api import (
     VehicleState,
     WhenCutOff,
 )
+from m2pem.api.arbiter import adjusts, fences, reclaims
+from m2pem.api.epoch_fence import run_of
 from m2pem.api.latest_task import cancel_and_wait
 from m2pem.errors import StaleCommandError
 from m2pem_plugin_zenoh import messages as m
-from m2pem_plugin_zenoh.store import HostStore, Kept, run_of
+from m2pem_plugin_zenoh.store import HostStore, Kept
 
 LOST_AFTER_S = 3.0
 """Of a vehicle for which neither the fleet nor its arbiter states one."""
@@ -80,6 +82,7 @@ class ArbiterHost:
     ) -> None:
         self._hosted = hosted
         self._context = context
+        self._log = context.logger
         self._store = store
         self._outlet = outlet
         self._arbiter: Arbiter | None = None
@@ -294,8 +297,9 @@ class ArbiterHost:
                 return await self._query(arbiter, body)
             case m.Adjust():
                 self._require("adjust", body.behavior, body.epoch)
+                assert adjusts(arbiter)  # its capabilities say so at the other end
                 parameters = m.resolved_parameters(body.parameters)
-                await _adjusting(arbiter)(body.behavior, body.epoch, parameters)
+                await arbiter.adjust(body.behavior, body.epoch, parameters)
             case m.Resume():
                 resource = ResourceId(body.resource)
                 self._held_for_executive.discard(resource)
@@ -303,10 +307,11 @@ class ArbiterHost:
                 await arbiter.resume(resource)
             case m.Fence():
                 self._store.admit(body.run, body.epoch)
-                if _capabilities(arbiter).fences:
-                    await _fencing(arbiter)(body.run, body.epoch)
+                if fences(arbiter):
+                    await arbiter.fence(body.run, body.epoch)
             case m.Reclaim():
-                text = await _reclaiming(arbiter)(ResourceId(body.resource))
+                assert reclaims(arbiter)  # its capabilities say so at the other end
+                text = await arbiter.reclaim(ResourceId(body.resource))
                 return m.Done(self._now_us, text)
         return self._done()
 
@@ -478,10 +483,6 @@ class ArbiterHost:
         return self._context.clock.now_us()
 
     @property
-    def _log(self) -> Any:
-        return self._context.logger
-
-    @property
     def _silence_s(self) -> float:
         """The shortest silence after which one of its resources counts as lost."""
         arbiter, connections = self._arbiter, self._hosted.connections.values()
@@ -494,27 +495,16 @@ class ArbiterHost:
         return self._silence_s + self._hosted.host.round_trip_s
 
     def _create(self, job: Coroutine[Any, Any, None], name: str) -> asyncio.Task[None]:
-        task = asyncio.get_running_loop().create_task(job, name=f"host: {name}")
-        task.add_done_callback(self._broke_off)
-        return task
+        return create_task(job, f"host: {name}", self._log)
 
-    def _broke_off(self, task: "asyncio.Task[None]") -> None:
+
+def create_task(job: Coroutine[Any, Any, None], name: str, log: Logger) -> asyncio.Task[None]:
+    """Create a task. Its error is logged."""
+
+    def ended(task: asyncio.Task[None]) -> None:
         if not task.cancelled() and (error := task.exception()) is not None:
-            self._log.error("%s broke off", task.get_name(), exc_info=error)
+            log.error("%s broke off", name, exc_info=error)
 
-
-def _capabilities(arbiter: Arbiter) -> ArbiterCapabilities:
-    declared = getattr(arbiter, "capabilities", None)
-    return declared if isinstance(declared, ArbiterCapabilities) else ArbiterCapabilities()
-
-
-def _adjusting(arbiter: Arbiter) -> Any:
-    return arbiter.adjust  # type: ignore[attr-defined]  # its capabilities say so at the other end
-
-
-def _fencing(arbiter: Arbiter) -> Any:
-    return arbiter.fence  # type: ignore[attr-defined]  # its capabilities say so
-
-
-def _reclaiming(arbiter: Arbiter) -> Any:
-    return arbiter.reclaim  # type: ignore[attr-defined]  # its capabilities say so at the other end
+    task = asyncio.get_running_loop().create_task(job, name=name)
+    task.add_done_callback(ended)
+    return task

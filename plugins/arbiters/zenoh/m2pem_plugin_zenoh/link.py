@@ -120,7 +120,6 @@ class Link:
         self._urgent = ThreadPoolExecutor(1, f"{what}: stop")
         self._others = ThreadPoolExecutor(2, what)
         self._session: zenoh.Session | None = None
-        self._opening: asyncio.Task[zenoh.Session] | None = None
         self._declared: list[Any] = []
         self._loop = asyncio.get_running_loop()
         self._closed = False
@@ -229,13 +228,7 @@ class Link:
             content = query.payload.to_bytes() if query.payload is not None else b""
             self._soon(begin, query, content)
 
-        def declare() -> None:
-            import zenoh  # noqa: PLC0415  # a check of a fleet needs no Zenoh
-
-            handler = zenoh.handlers.Callback(received, indirect=False)
-            self._declared.append(self._opened().declare_queryable(key, handler))
-
-        await self._run(declare)
+        await self._declare(lambda session: session.declare_queryable(key, _handler(received)))
 
     # --- states, and who is there ---------------------------------------------------------------
 
@@ -262,21 +255,11 @@ class Link:
         def received(sample: Any) -> None:
             self._soon(take, sample.payload.to_bytes())
 
-        def declare() -> None:
-            import zenoh  # noqa: PLC0415  # a check of a fleet needs no Zenoh
-
-            handler = zenoh.handlers.Callback(received, indirect=False)
-            self._declared.append(self._opened().declare_subscriber(key, handler))
-
-        await self._run(declare)
+        await self._declare(lambda session: session.declare_subscriber(key, _handler(received)))
 
     async def be_there(self, key: str) -> None:
         """Be there, for those who `watch` the key, as long as the session is connected."""
-
-        def declare() -> None:
-            self._declared.append(self._opened().liveliness().declare_token(key))
-
-        await self._run(declare)
+        await self._declare(lambda session: session.liveliness().declare_token(key))
 
     async def watch(self, key: str, appeared: Callable[[], None]) -> None:
         """Have `appeared` called when someone is there, at first too."""
@@ -287,16 +270,16 @@ class Link:
             if sample.kind == zenoh.SampleKind.PUT:
                 self._soon(appeared)
 
-        def declare() -> None:
-            import zenoh  # noqa: PLC0415  # a check of a fleet needs no Zenoh
-
-            handler = zenoh.handlers.Callback(received, indirect=False)
-            declare = self._opened().liveliness().declare_subscriber
-            self._declared.append(declare(key, handler, history=True))
-
-        await self._run(declare)
+        await self._declare(
+            lambda session: session.liveliness().declare_subscriber(
+                key, _handler(received), history=True
+            )
+        )
 
     # --- inside ---------------------------------------------------------------------------------
+
+    async def _declare(self, declare: "Callable[[zenoh.Session], Any]") -> None:
+        await self._run(lambda: self._declared.append(declare(self._opened())))
 
     def _opened(self) -> "zenoh.Session":
         if self._session is None:
@@ -328,6 +311,12 @@ def _open(configured: dict[str, Any]) -> "zenoh.Session":
     for name, value in configured.items():
         config.insert_json5(name, json.dumps(value))
     return zenoh.open(config)
+
+
+def _handler(received: Callable[[Any], None]) -> Any:
+    import zenoh  # noqa: PLC0415  # a check of a fleet needs no Zenoh
+
+    return zenoh.handlers.Callback(received, indirect=False)
 
 
 def _resolve(answer: "asyncio.Future[bytes]", content: bytes) -> None:

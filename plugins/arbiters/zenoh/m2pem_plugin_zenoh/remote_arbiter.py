@@ -26,10 +26,11 @@ from m2pem.api import (
     Telemetry,
     VehicleState,
 )
+from m2pem.api.epoch_fence import run_of
 from m2pem.api.latest_task import cancel_and_wait
 from m2pem.errors import PluginError, StaleCommandError
 from m2pem_plugin_zenoh import messages as m
-from m2pem_plugin_zenoh.arbiter_host import LinkError, lost_after_s
+from m2pem_plugin_zenoh.arbiter_host import LinkError, create_task, lost_after_s
 from m2pem_plugin_zenoh.link import Endpoints, Link, settings
 
 APPEARS_WITHIN_S = 3.0
@@ -56,7 +57,7 @@ LATE_ANSWERS = 4
 
 
 def _stale(what: str, behavior: BehaviorId, epoch: int, newest: int) -> StaleCommandError:
-    return StaleCommandError(f"{what} of {behavior}", behavior.partition(".")[0], epoch, newest)
+    return StaleCommandError(f"{what} of {behavior}", run_of(behavior), epoch, newest)
 
 
 class HostError(PluginError):
@@ -84,6 +85,7 @@ class RemoteArbiter:
         self._hosted = hosted
         self._host = hosted.host
         self._context = context
+        self._log = context.logger
         self._key = key
         self._local = hosted.make(context)
         declared = getattr(self._local, "capabilities", ArbiterCapabilities())
@@ -291,7 +293,7 @@ class RemoteArbiter:
         The host's arbiter keeps them: the executive that drives the run now has the same one.
         """
         for id_, behavior in self._behaviors.items():
-            if id_.partition(".")[0] == run:
+            if run_of(id_) == run:
                 behavior.ended = True
 
     # --- requests -------------------------------------------------------------------------------
@@ -587,17 +589,8 @@ class RemoteArbiter:
     def _now_us(self) -> int:
         return self._context.clock.now_us()
 
-    @property
-    def _log(self) -> Any:
-        return self._context.logger
-
     def _create(self, job: Coroutine[Any, Any, None], name: str) -> "asyncio.Task[None]":
-        task = asyncio.get_running_loop().create_task(job, name=f"host {self._host.name}: {name}")
+        task = create_task(job, f"host {self._host.name}: {name}", self._log)
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
-        task.add_done_callback(self._broke_off)
         return task
-
-    def _broke_off(self, task: "asyncio.Task[None]") -> None:
-        if not task.cancelled() and (error := task.exception()) is not None:
-            self._log.error("%s broke off", task.get_name(), exc_info=error)

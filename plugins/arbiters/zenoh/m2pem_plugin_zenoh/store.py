@@ -11,14 +11,9 @@ from pathlib import Path
 from uuid import uuid4
 
 from m2pem.api import BehaviorId, BehaviorReport, BehaviorRequest, ResourceId
+from m2pem.api.epoch_fence import run_of
 from m2pem.errors import PluginError
 from m2pem_plugin_zenoh.messages import NOTE, REPORT, STATE, Item, decode_report, encode_report
-
-
-def run_of(behavior: BehaviorId) -> str:
-    """Return the run of a behavior, or of a team's part of one."""
-    return behavior.partition(".")[0]
-
 
 MOST_ITEMS = 10_000
 """Items that wait for the executive. The oldest that matters least gives way to the newest."""
