@@ -13,8 +13,8 @@ from m2pem.api.latest_task import cancel_and_wait
 from m2pem.errors import PluginError
 from m2pem_plugin_vda5050.settings import ARBITER, Settings
 from m2pem_plugin_vda5050.simulator.agv import AgvSpec
-from m2pem_plugin_vda5050.simulator.faults import GRAMMAR, FaultTarget
-from m2pem_plugin_vda5050.simulator.simulation import Simulation, read_specs
+from m2pem_plugin_vda5050.simulator.faults import GRAMMAR
+from m2pem_plugin_vda5050.simulator.simulation import SimulatedVehicle, Simulation, read_specs
 
 
 @click.command()
@@ -34,7 +34,9 @@ from m2pem_plugin_vda5050.simulator.simulation import Simulation, read_specs
     help='What goes wrong, such as "agv1: mode manual at 20 s for 5 s": [VEHICLES:] ACTION '
     "[at SECONDS s] [for SECONDS s]. May be given more than once; also a line of standard input.",
 )
-def vda5050(fleet_file: Path, speed: float, faults: tuple[PlannedFault[FaultTarget], ...]) -> None:
+def vda5050(
+    fleet_file: Path, speed: float, faults: tuple[PlannedFault[SimulatedVehicle], ...]
+) -> None:
     """Simulate vehicles that speak VDA 5050, at the MQTT broker of the fleet, until Ctrl-C.
 
     Example: m2pem sim vda5050 --fleet fleet.yaml --speed 10
@@ -60,7 +62,7 @@ def vda5050(fleet_file: Path, speed: float, faults: tuple[PlannedFault[FaultTarg
 async def _run(
     specs: list[tuple[AgvSpec, Settings, float]],
     speed: float,
-    faults: Iterable[PlannedFault[FaultTarget]],
+    faults: Iterable[PlannedFault[SimulatedVehicle]],
 ) -> None:
     stop = interrupted()
     simulation = Simulation(specs, speed, faults, click.echo)

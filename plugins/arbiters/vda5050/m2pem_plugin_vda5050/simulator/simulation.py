@@ -30,7 +30,6 @@ from m2pem_plugin_vda5050.messages import (
 from m2pem_plugin_vda5050.settings import ARBITER, Settings, read_settings
 from m2pem_plugin_vda5050.simulator.agv import ACTION_S, NODE_ACTIONS, Agv, AgvSpec
 from m2pem_plugin_vda5050.simulator.factsheet import factsheet
-from m2pem_plugin_vda5050.simulator.faults import FaultTarget
 from m2pem_plugin_vda5050.simulator.motion import Chassis
 
 STEP_S = 0.05
@@ -116,7 +115,7 @@ def _actions(settings: Settings, durations: Mapping[str, Any]) -> dict[str, floa
     }
 
 
-class SimulatedVehicle(FaultTarget):
+class SimulatedVehicle:
     """A vehicle and its client at the broker."""
 
     def __init__(
@@ -131,7 +130,7 @@ class SimulatedVehicle(FaultTarget):
         self._settings, self._clock = settings, clock
         self._state_every_s = state_every_s
         self._headers = Headers(spec.manufacturer, spec.serial_number, spec.version)
-        self._is_cut = self._is_mute = self._is_offline = False
+        self.is_cut = self.is_mute = self._is_offline = False
         self._state_s = self._visualization_s = -math.inf
         prefix = settings.prefix
         will = aiomqtt.Will(
@@ -174,20 +173,10 @@ class SimulatedVehicle(FaultTarget):
 
     # --- faults ---------------------------------------------------------------------------------
 
-    def set(self, name: str, value: object) -> None:
-        self.agv.set(name, value)
-
-    def set_mode(self, mode: str) -> None:
-        self.agv.set_mode(mode)
-
-    def cut(self, is_cut: bool) -> None:
-        self._is_cut, self.agv.news = is_cut, True
-
-    def mute(self, is_mute: bool) -> None:
-        self._is_mute, self.agv.news = is_mute, True
-
-    def stick(self, is_stuck: bool) -> None:
-        self.agv.motion.stuck = is_stuck
+    def turn(self, name: str, on: bool) -> None:
+        """Set `is_cut` or `is_mute`, and say so in the next state."""
+        setattr(self, name, on)
+        self.agv.news = True
 
     def go_offline(self) -> None:
         self._publish("connection", self._connection("OFFLINE"))
@@ -201,7 +190,7 @@ class SimulatedVehicle(FaultTarget):
     # --- inside ---------------------------------------------------------------------------------
 
     def _received(self, topic: str, payload: bytes) -> None:
-        if not (self._is_cut or self._is_offline):
+        if not (self.is_cut or self._is_offline):
             self.agv.receive(topic.rpartition("/")[2], payload)
 
     def _connected(self) -> None:
@@ -215,7 +204,7 @@ class SimulatedVehicle(FaultTarget):
         return ConnectionMessage(**self._header("connection"), connection_state=state)
 
     def _publish(self, topic: str, message: Any) -> None:
-        if self._is_cut or self._is_mute or self._is_offline:
+        if self.is_cut or self.is_mute or self._is_offline:
             return
         payload = message if isinstance(message, bytes) else encode(message)
         name = f"{self._settings.prefix}/{topic}"
@@ -229,7 +218,7 @@ class Simulation:
         self,
         specs: Iterable[tuple[AgvSpec, Settings, float]],
         speed: float = 1.0,
-        faults: Iterable[PlannedFault[FaultTarget]] = (),
+        faults: Iterable[PlannedFault[SimulatedVehicle]] = (),
         say: Callable[[str], object] = lambda _: None,
     ) -> None:
         clock = SystemClock(speed)
@@ -244,7 +233,7 @@ class Simulation:
         for fault in faults:
             self.plan(fault)
 
-    def plan(self, fault: PlannedFault[FaultTarget]) -> None:
+    def plan(self, fault: PlannedFault[SimulatedVehicle]) -> None:
         """Plan a fault; without a time, it begins now.
 
         Raises:
