@@ -181,6 +181,14 @@ class RemainingRoute(RemainingWork):
         super().__init__(parameters, frame, line)
         self._route = route
 
+    @classmethod
+    def of(cls, parameters: Mapping[str, ResolvedValue]) -> "RemainingRoute | None":
+        """Return the account of a route; None: there is none, or of a loop all is always left."""
+        route = parameters.get("route")
+        if not isinstance(route, Route) or parameters.get("loop") is True:
+            return None
+        return cls(raw_parameters(parameters), route, LocalFrame(route.waypoints[0][:2]))
+
     def part(self, from_m: float, to_m: float = math.inf) -> Mapping[str, Value] | None:
         """Return the parameters with that part of the route."""
         part = part_of_route(self._route, self.line, self.frame, from_m, to_m)

@@ -25,7 +25,6 @@ LEVEL = tuple(
 PAYLOAD = tuple(spec for (_, type_), spec in SHARED.items() if type_ is BehaviorType.PAYLOAD)
 """The behaviors of payloads with a node of their own."""
 
-REVERSE_M = 5.0
 
 OFFSET_M = 15.0
 BEHIND_RAD = math.pi

@@ -43,7 +43,6 @@ USUAL = tuple(
 STOPS = ("hold", "drive_stop")
 """Behaviors that pause the vehicle; all others are orders or actions."""
 
-REVERSE_M = 5.0
 CONTROL = ("startPause", "stopPause", "cancelOrder", "stateRequest", "factsheetRequest")
 """Actions with which the arbiter itself controls the vehicle: no behaviors."""
 

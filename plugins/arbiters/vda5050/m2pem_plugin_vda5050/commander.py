@@ -129,16 +129,12 @@ class CancelControl:
         return status
 
 
-def parameters_of(values: dict[str, Any]) -> list[ActionParameter]:
-    """Return the parameters of an action."""
-    return [ActionParameter(key=key, value=value) for key, value in values.items()]
-
-
 def action_of(action_type: str, action_id: str, blocking: Any, values: dict[str, Any]) -> Action:
     """Return an action of an order, or an instant action."""
+    parameters = [ActionParameter(key=key, value=value) for key, value in values.items()]
     return Action(
         action_type=action_type,
         action_id=action_id,
         blocking_type=blocking,
-        action_parameters=parameters_of(values) if values else UNSET,
+        action_parameters=parameters or UNSET,
     )

@@ -7,7 +7,7 @@ and edges of an order are numbered together: node N has the sequence id 2 N.
 import math
 from dataclasses import dataclass, field
 
-from msgspec import UNSET, UnsetType
+from msgspec import UNSET
 
 from m2pem_plugin_vda5050.map_frame import MapPoint
 from m2pem_plugin_vda5050.messages import Action, Edge, Node, NodePosition
@@ -61,15 +61,13 @@ class OrderPlan:
         else:
             assert self.start is not None, "node 0 is sent once, from where the vehicle stands"
             point, deviation_m = self.start, self.start_deviation_m
-        has_theta = is_last and number > 0 and self.theta_rad is not None
-        theta: float | UnsetType = UNSET
-        if has_theta and self.theta_rad is not None:
-            theta = round(self.theta_rad, 5)
+        has_theta = is_last and number > 0
+        theta = None if self.theta_rad is None or not has_theta else round(self.theta_rad, 5)
         position = NodePosition(
             x=round(point.x, 3),
             y=round(point.y, 3),
             map_id=self.map_id,
-            theta=theta,
+            theta=UNSET if theta is None else theta,
             allowed_deviation_x_y=deviation_m,
             allowed_deviation_xy=deviation_m if self.both_spellings else UNSET,
         )

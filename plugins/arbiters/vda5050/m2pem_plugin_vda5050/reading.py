@@ -1,6 +1,6 @@
 """What the state of a vehicle says: readiness, pauses, orders, errors."""
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection
 
 from msgspec import UNSET
 
@@ -87,12 +87,14 @@ def base_end(state: State) -> int:
     return max([state.last_node_sequence_id, *released]) // 2
 
 
-def errors_about(state: State, ids: Collection[str]) -> Iterator[Error]:
-    """Yield the errors that refer to an order or an action by its id."""
-    for error in state.errors:
-        references = [] if error.error_references is UNSET else error.error_references
-        if any(each.reference_value in ids for each in references):
-            yield error
+def said_about(state: State, ids: Collection[str]) -> list[str]:
+    """Return the errors that refer to an order or an action by its id, as text."""
+    return [
+        describe(error)
+        for error in state.errors
+        if error.error_references is not UNSET
+        and any(each.reference_value in ids for each in error.error_references)
+    ]
 
 
 def not_ready_reasons(state: State, map_id: str) -> tuple[str, ...]:

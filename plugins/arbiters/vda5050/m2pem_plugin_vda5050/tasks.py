@@ -12,16 +12,14 @@ from msgspec import UNSET
 
 from m2pem.api import (
     ArbiterContext,
+    BehaviorParameters,
     BehaviorRequest,
     BehaviorSpec,
     BehaviorState,
     BehaviorTracker,
     GeoPosition,
-    LocalFrame,
     RemainingRoute,
-    Route,
     Value,
-    raw_parameters,
 )
 from m2pem_plugin_vda5050.commander import CancelControl, Commander, PauseControl, Repeater
 from m2pem_plugin_vda5050.messages import Action, State
@@ -32,9 +30,9 @@ from m2pem_plugin_vda5050.reading import (
     action_state,
     base_end,
     describe,
-    errors_about,
     is_executing,
     is_paused,
+    said_about,
     text_of,
     traversed,
 )
@@ -154,7 +152,7 @@ class OrderTask(Task):
         self._sent_us: int | None = None
         self._has_begun = False
         self._old_errors: set[str] = set()
-        self._route = _route_of(setup.request)
+        self._route = RemainingRoute.of(setup.request.parameters)
 
     # --- calls of the vehicle -------------------------------------------------------------------
 
@@ -230,9 +228,8 @@ class OrderTask(Task):
 
     def _refusal(self, state: State) -> str:
         """Return the error with which the vehicle refuses the order; "" without one."""
-        ids = {self.id, *(action.action_id for action in self._actions)}
-        for error in errors_about(state, ids):
-            return describe(error)
+        if said := said_about(state, self._ids()):
+            return said[0]
         for error in state.errors:
             is_about_orders = error.error_type in ORDER_ERRORS and not error.error_references
             if is_about_orders and describe(error) not in self._old_errors:
@@ -278,8 +275,8 @@ class OrderTask(Task):
             self._report_left(LEAST_PROGRESS_M)
             self._end(BehaviorState.CANCELLED)
         elif "FAILED" in statuses:
-            said = [describe(error) for error in errors_about(state, self._ids())]
-            reason = "; ".join(said) or f"the action {self._actions[0].action_type} has failed"
+            said = "; ".join(said_about(state, self._ids()))
+            reason = said or f"the action {self._actions[0].action_type} has failed"
             self._end(BehaviorState.FAILED, reason=reason)
         elif is_there and self._actions:
             return False  # the vehicle has not entered its action yet
@@ -296,7 +293,7 @@ class OrderTask(Task):
         if order is None or not self._setup.context.may_send():
             return
         if state.order_update_id < order.update_id:
-            refusals = [describe(error) for error in errors_about(state, {self.id})]
+            refusals = said_about(state, {self.id})
             if refusals and self._repeater.is_due:
                 self._leave(cancel=True)
                 self._report_left(LEAST_PROGRESS_M)
@@ -377,15 +374,6 @@ class OrderTask(Task):
 ORDER_ERRORS = ("validationError", "orderError", "orderUpdateError", "noRouteError")
 
 
-def _route_of(request: BehaviorRequest) -> RemainingRoute | None:
-    """Return the account of a route; None: it has none, or of a loop all is always left."""
-    route = request.parameters.get("route")
-    if not isinstance(route, Route) or request.parameters.get("loop") is True:
-        return None
-    frame = LocalFrame(route.waypoints[0][:2])
-    return RemainingRoute(raw_parameters(request.parameters), route, frame)
-
-
 class InstantTask(Task):
     """An instant action. It cannot be cancelled: VDA 5050 has nothing for that."""
 
@@ -405,16 +393,15 @@ class InstantTask(Task):
         if known.action_status == "FINISHED":
             self._end(BehaviorState.SUCCEEDED, outputs=self._outputs(state, self.id))
         elif known.action_status == "FAILED":
-            said = [describe(error) for error in errors_about(state, {self.id})]
-            reason = "; ".join(said) or f"the action {self._action.action_type} has failed"
+            said = "; ".join(said_about(state, {self.id}))
+            reason = said or f"the action {self._action.action_type} has failed"
             self._end(BehaviorState.FAILED, reason=reason)
 
     def cancel(self) -> None:
         """Nothing is sent: the executive waits for the end of the action."""
 
     def _step_sent(self, state: State) -> None:
-        said = [describe(error) for error in errors_about(state, {self.id})]
-        if said:
+        if said := said_about(state, {self.id}):
             self._end(BehaviorState.FAILED, REFUSED, f"the vehicle refuses it: {'; '.join(said)}")
         elif self._has_begun:
             self._end(BehaviorState.FAILED, reason="the vehicle has dropped the action")
@@ -435,8 +422,7 @@ class StopTask(Task):
 
     def __init__(self, setup: TaskSetup, may_release: Callable[[], bool]) -> None:
         super().__init__(setup)
-        duration = setup.request.parameters.get("duration")
-        self._duration_s = float(duration) if isinstance(duration, int | float) else 0.0
+        self._duration_s = BehaviorParameters(setup.request.parameters).duration_s or 0.0
         self._may_release = may_release
         self._rests_since_us: int | None = None
         setup.pause.want(True)

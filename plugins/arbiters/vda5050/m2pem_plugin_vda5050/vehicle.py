@@ -11,6 +11,7 @@ from msgspec import UNSET
 from m2pem.api import (
     ArbiterContext,
     BehaviorId,
+    BehaviorParameters,
     BehaviorRequest,
     BehaviorState,
     BehaviorTracker,
@@ -23,12 +24,10 @@ from m2pem.api import (
     ParameterKind,
     Point,
     ResolvedValue,
-    Route,
     VehicleState,
 )
 from m2pem_plugin_vda5050.catalogue import (
     DRIVING_PARAMETERS,
-    REVERSE_M,
     STOPS,
     USUAL,
     OwnBehavior,
@@ -547,21 +546,20 @@ class Vehicle:
         points, loop = self._points(request, state)
         if points is None:
             return None
-        parameters = request.parameters
-        speed, heading = parameters.get("speed"), parameters.get("heading")
-        tolerance = parameters.get("tolerance")
-        actions = () if own is None else (_action(own, f"{setup.id}.action", parameters),)
+        parameters = BehaviorParameters(request.parameters)
+        heading_rad, tolerance_m = parameters.heading_rad, parameters.tolerance_m
+        actions = () if own is None else (_action(own, f"{setup.id}.action", request.parameters),)
         return OrderPlan(
             setup.id,
             settings.map.id,
             start,
             points,
             loop,
-            float(speed) if isinstance(speed, int | float) else None,
-            self._frame.to_theta(float(heading)) if isinstance(heading, int | float) else None,
+            parameters.speed_m_s,
+            None if heading_rad is None else self._frame.to_theta(heading_rad),
             request.behavior == "reverse",
             settings.deviation_m,
-            float(tolerance) if isinstance(tolerance, int | float) else settings.deviation_m,
+            settings.deviation_m if tolerance_m is None else tolerance_m,
             settings.start_deviation_m,
             actions,
             self._headers.is_2_0,
@@ -571,23 +569,19 @@ class Vehicle:
         self, request: BehaviorRequest, state: State | None
     ) -> tuple[tuple[MapPoint, ...] | None, bool]:
         """Return the waypoints, and whether they are a loop. None: they are not known."""
-        route, target = request.parameters.get("route"), request.parameters.get("target")
-        if isinstance(route, Route):
+        parameters = BehaviorParameters(request.parameters)
+        route, target = parameters.route, parameters.target
+        if route is not None:
             points = tuple(self._frame.to_map(each[:2]) for each in route.waypoints)
-            return points, request.parameters.get("loop") is True
+            return points, parameters.loop
         if isinstance(target, Point):
             return (self._frame.to_map(target.position[:2]),), False
         if request.behavior == "reverse":
             if state is None or state.agv_position is UNSET:
                 return None, False
-            back = request.parameters.get("distance")
-            back_m = float(back) if isinstance(back, int | float) else REVERSE_M
-            place = state.agv_position
-            x, y = (
-                place.x - back_m * math.cos(place.theta),
-                place.y - back_m * math.sin(place.theta),
-            )
-            return (MapPoint(x, y),), False
+            place, back_m = state.agv_position, parameters.distance_m
+            x, y = back_m * math.cos(place.theta), back_m * math.sin(place.theta)
+            return (MapPoint(place.x - x, place.y - y),), False
         is_whole = request.behavior in self._own and not any(
             each.required and each.kind is ParameterKind.ROUTE
             for each in self._own[request.behavior].spec.parameters
@@ -609,11 +603,12 @@ class Vehicle:
             return ""
         position = self.position()
         start = None if position is None else position.latlon
-        route, target = request.parameters.get("route"), request.parameters.get("target")
+        parameters = BehaviorParameters(request.parameters)
+        route, target = parameters.route, parameters.target
         way: list[LatLon] = []
-        if isinstance(route, Route):
+        if route is not None:
             way = [each[:2] for each in route.waypoints]
-            if request.parameters.get("loop") is True:
+            if parameters.loop:
                 way.append(way[0])
         elif isinstance(target, Point):
             way = [target.position[:2]]
