@@ -43,7 +43,7 @@ async def test_a_camera_that_shows_nothing_is_an_error(ros_domain, tmp_path, mon
     async with world(ros_domain, tmp_path) as it:
         await it.ready()
         await it.fault("blind")
-        with pytest.raises(CameraError, match="its publisher sends none"):
+        with pytest.raises(CameraError, match=r"its publisher sends none$"):
             await it.driver.take_picture()
 
 

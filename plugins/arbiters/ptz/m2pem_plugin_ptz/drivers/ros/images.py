@@ -94,7 +94,6 @@ class ImageTopic:
             cause = "its publisher sends none" if self.has_publisher else "it has no publisher"
             raise CameraError(
                 f"no image was received on {self.topic} within {WITHIN_S:g} s: {cause}"
-                f"{', but sends none' if self.has_publisher else ''}"
             ) from None
         finally:
             end()
