@@ -15,7 +15,6 @@ from m2pem_plugin_ptz.behaviors.behavior import (
     REPORTED_SHARE,
     TICK_S,
     Behavior,
-    BehaviorFailedError,
 )
 from m2pem_plugin_ptz.camera_model.model import CameraModel
 from m2pem_plugin_ptz.drivers.driver import FOUND_WITHIN_S, CameraError, Discovering
@@ -131,7 +130,7 @@ class CameraController:
             self._tracker.progress(task.id)
             await self._steps(task)
             await task.behavior.leave()
-        except (BehaviorFailedError, CameraError) as error:
+        except CameraError as error:
             await self._fail(task, error.reason, error.code)
         except asyncio.CancelledError:
             raise

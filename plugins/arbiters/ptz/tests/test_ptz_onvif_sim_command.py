@@ -12,14 +12,14 @@ import click
 import m2pem_plugin_ptz
 import pytest
 from click.testing import CliRunner
-from m2pem_plugin_ptz.commands import add_commands
+from m2pem_plugin_ptz.hooks import add_commands
 from m2pem_plugin_ptz.simulator.onvif.faults import GRAMMAR
 from onvif_bench import camera, until, write_credentials
 
 ROOT = Path(m2pem_plugin_ptz.__file__).parents[1]
 COMMAND = """
 import click
-from m2pem_plugin_ptz.commands import add_commands
+from m2pem_plugin_ptz.hooks import add_commands
 cli = click.Group("m2pem")
 add_commands(cli.commands)
 cli()

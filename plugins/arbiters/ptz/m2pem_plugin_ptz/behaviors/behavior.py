@@ -7,6 +7,7 @@ from typing import ClassVar
 
 from m2pem.api import BehaviorId, BehaviorParameters, BehaviorState, Value
 from m2pem_plugin_ptz.camera_model.model import CameraModel
+from m2pem_plugin_ptz.drivers.driver import CameraError
 
 TICK_S = 0.05
 """Period of the commands to a camera while a behavior points it."""
@@ -19,14 +20,8 @@ LEAST_SHARE = 0.01
 """The same of the last report, when a behavior fails or its camera is lost."""
 
 
-class BehaviorFailedError(Exception):
-    """The behavior cannot be done, or cannot be continued. `code` is an error code of
-    docs/missions.md."""
-
-    def __init__(self, reason: str, code: str = "FAILED") -> None:
-        super().__init__(reason)
-        self.reason = reason
-        self.code = code
+class BehaviorFailedError(CameraError):
+    """The behavior cannot be done, or cannot be continued."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +36,7 @@ class BehaviorContext:
 class Behavior(ABC):
     """One behavior. `refusal` is called first, then `begin` once, then `step` every `TICK_S` until
     it returns True, except during a hold. `leave` is called at the end of any kind, unless the
-    camera is lost. `begin` and `step` raise BehaviorFailedError or CameraError on failure.
+    camera is lost. `begin` and `step` raise CameraError on failure.
 
     `turns`: the behavior turns or zooms the camera.
     """

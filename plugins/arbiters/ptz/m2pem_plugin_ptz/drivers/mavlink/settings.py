@@ -1,6 +1,6 @@
 """The settings of a MAVLink camera in the fleet file."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import StrEnum
 
 from m2pem.api import Connection, ConnectionReader
@@ -46,19 +46,7 @@ class MavlinkSettings:
         return CAMERA_COMPONENT, self.component_id
 
 
-_KEYS = (
-    "url",
-    "system_id",
-    "component_id",
-    "gcs_system_id",
-    "own_component",
-    "gimbal",
-    "gimbal_component",
-    "gimbal_device",
-    "camera_component",
-    "camera_device",
-    "yaw",
-)
+_KEYS = ("url", *(each.name for each in fields(MavlinkSettings) if each.name != "urls"))
 
 
 def read_settings(connection: Connection) -> MavlinkSettings:

@@ -8,7 +8,7 @@ import re
 from collections.abc import Awaitable, Callable
 
 from m2pem.api.faults import NUMBER, Effect, FaultGrammar, FaultKind, PlannedFault, fixed
-from m2pem.api.latest_task import cancel_and_wait
+from m2pem.api.latest_task import LatestTask
 from m2pem_plugin_ptz.simulator.onvif.camera import Camera
 
 REBOOT_S = 5.0
@@ -22,7 +22,7 @@ class Faults:
     def __init__(self, camera: Camera, switch_on: Switch, switch_off: Switch) -> None:
         self._camera = camera
         self._on, self._off = switch_on, switch_off
-        self._tasks: set[asyncio.Task[None]] = set()
+        self._planned = LatestTask()
 
     def silent(self, on: bool) -> None:
         """Take requests, and do not answer them."""
@@ -61,13 +61,11 @@ class Faults:
 
     def plan(self, fault: PlannedFault["Faults"]) -> None:
         """Plan a fault. Its time counts from now."""
-        task = asyncio.get_running_loop().create_task(_happen(fault, self))
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
+        self._planned.add(_happen(fault, self))
 
     async def close(self) -> None:
         """Cancel all planned faults."""
-        await cancel_and_wait(*self._tasks)
+        await self._planned.close()
 
 
 async def _happen(fault: PlannedFault[Faults], faults: Faults) -> None:

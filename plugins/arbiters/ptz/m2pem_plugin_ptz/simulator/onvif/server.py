@@ -9,7 +9,6 @@ import asyncio
 import io
 import math
 from collections.abc import Mapping
-from types import TracebackType
 from typing import Self
 
 from aiohttp import web
@@ -93,12 +92,7 @@ class OnvifServer:
         await self._open()
         return self
 
-    async def __aexit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    async def __aexit__(self, *_: object) -> None:
         await self.faults.close()
         await self._close()
 
@@ -150,7 +144,7 @@ class OnvifServer:
         operation = operations.get(asked.name)
         if operation is None:
             raise FaultError(f"no {asked.name} here", "ActionNotSupported", receiver=True)
-        answer = operation(self.camera, asked, base)
+        answer = soap.response(asked, operation(self.camera, asked, base))
         self.camera.calls[asked.name] += 1
         return answer
 

@@ -108,6 +108,12 @@ def read(content: bytes) -> tuple[Element | None, Element]:
     return envelope.child("Header"), asked
 
 
+def response(asked: Element, content: str) -> str:
+    """Return the response to an operation."""
+    prefix = next(prefix for prefix, uri in _PREFIXES.items() if uri == asked.namespace)
+    return f"<{prefix}:{asked.name}Response>{content}</{prefix}:{asked.name}Response>"
+
+
 def answer(content: str) -> bytes:
     """Return an envelope with a body."""
     text = (

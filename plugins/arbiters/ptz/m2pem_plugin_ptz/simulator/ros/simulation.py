@@ -4,11 +4,11 @@ import asyncio
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from m2pem_plugin_ros import RosRuntime
+from m2pem_plugin_ros import OnboardNode, RosRuntime
 
 from m2pem.api import Clock
 from m2pem.api.latest_task import cancel_and_wait
-from m2pem_plugin_ptz.onboard import CameraNode
+from m2pem_plugin_ptz.onboard import camera_node
 from m2pem_plugin_ptz.simulator.ros.camera import CameraSpec, NodeSpec, SimulatedCamera
 
 TICK_S = 0.02
@@ -21,7 +21,7 @@ async def simulate(
     """Simulate until cancelled. `ready` is called when all cameras are subscribed. `domain_id`: for
     cameras whose fleet has none; None takes ROS_DOMAIN_ID."""
     runtimes: dict[int | None, RosRuntime] = {}
-    nodes: list[CameraNode] = []
+    nodes: list[OnboardNode] = []
     moving: asyncio.Task[None] | None = None
     try:
         cameras = []
@@ -45,12 +45,12 @@ async def simulate(
             await runtime.close()
 
 
-def _node(ros: RosRuntime, spec: NodeSpec, domain: int | None, clock: Clock) -> CameraNode:
+def _node(ros: RosRuntime, spec: NodeSpec, domain: int | None, clock: Clock) -> OnboardNode:
     settings = dict(spec.connection.settings)
     if domain is not None:
         settings["domain_id"] = domain
     connection = replace(spec.connection, settings=settings)
-    return CameraNode(ros, connection, spec.namespace, clock, spec.origin)
+    return camera_node(ros, connection, spec.namespace, clock, spec.origin)
 
 
 async def _move(cameras: Sequence[SimulatedCamera]) -> None:

@@ -12,7 +12,7 @@ NODE = "node_1"
 SOURCE = "video_1"
 
 Operation: TypeAlias = Callable[[Camera, Element, str], str]
-"""Returns the answer for the camera, the request, and the camera's own URL."""
+"""Returns the content of the response for the camera, the request, and the camera's own URL."""
 
 Operations: TypeAlias = Mapping[str, Operation]
 

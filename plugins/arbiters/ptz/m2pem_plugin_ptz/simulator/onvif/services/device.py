@@ -44,20 +44,19 @@ def _time(camera: Camera, _asked: Element, _base: str) -> str:
         f"<tt:Day>{now.day}</tt:Day></tt:Date>"
     )
     return (
-        "<tds:GetSystemDateAndTimeResponse><tds:SystemDateAndTime>"
+        "<tds:SystemDateAndTime>"
         "<tt:DateTimeType>Manual</tt:DateTimeType><tt:DaylightSavings>false</tt:DaylightSavings>"
         f"<tt:TimeZone><tt:TZ>UTC0</tt:TZ></tt:TimeZone><tt:UTCDateTime>{moment}</tt:UTCDateTime>"
-        "</tds:SystemDateAndTime></tds:GetSystemDateAndTimeResponse>"
+        "</tds:SystemDateAndTime>"
     )
 
 
 def _services(camera: Camera, _asked: Element, base: str) -> str:
-    each = "".join(
+    return "".join(
         f"<tds:Service><tds:Namespace>{uri}</tds:Namespace><tds:XAddr>{base}{PATHS[uri]}</tds:XAddr>"
         "<tds:Version><tt:Major>2</tt:Major><tt:Minor>60</tt:Minor></tds:Version></tds:Service>"
         for uri in offered(camera)
     )
-    return f"<tds:GetServicesResponse>{each}</tds:GetServicesResponse>"
 
 
 def _capabilities(camera: Camera, _asked: Element, base: str) -> str:
@@ -68,19 +67,17 @@ def _capabilities(camera: Camera, _asked: Element, base: str) -> str:
             "<tt:StreamingCapabilities/></tt:Media>"
         )
     return (
-        "<tds:GetCapabilitiesResponse><tds:Capabilities>"
-        f"<tt:Device><tt:XAddr>{base}{PATHS[soap.DEVICE]}</tt:XAddr></tt:Device>{media}"
+        f"<tds:Capabilities><tt:Device><tt:XAddr>{base}{PATHS[soap.DEVICE]}</tt:XAddr></tt:Device>{media}"
         f"<tt:PTZ><tt:XAddr>{base}{PATHS[soap.PTZ]}</tt:XAddr></tt:PTZ>"
-        "</tds:Capabilities></tds:GetCapabilitiesResponse>"
+        "</tds:Capabilities>"
     )
 
 
 def _information(camera: Camera, _asked: Element, _base: str) -> str:
     return (
-        "<tds:GetDeviceInformationResponse><tds:Manufacturer>m2pem</tds:Manufacturer>"
-        f"<tds:Model>{escape(camera.spec.name)}</tds:Model>"
+        f"<tds:Manufacturer>m2pem</tds:Manufacturer><tds:Model>{escape(camera.spec.name)}</tds:Model>"
         "<tds:FirmwareVersion>1.0</tds:FirmwareVersion><tds:SerialNumber>1</tds:SerialNumber>"
-        "<tds:HardwareId>simulated</tds:HardwareId></tds:GetDeviceInformationResponse>"
+        "<tds:HardwareId>simulated</tds:HardwareId>"
     )
 
 

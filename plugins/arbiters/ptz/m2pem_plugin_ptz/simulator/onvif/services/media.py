@@ -23,22 +23,22 @@ def _profile(tag: str, camera: Camera) -> str:
 
 
 def _profiles(camera: Camera, _asked: Element, _base: str) -> str:
-    return f"<trt:GetProfilesResponse>{_profile('trt:Profiles', camera)}</trt:GetProfilesResponse>"
+    return _profile("trt:Profiles", camera)
 
 
 def _one_profile(camera: Camera, asked: Element, _base: str) -> str:
     know(asked.says("ProfileToken"), PROFILE)
-    return f"<trt:GetProfileResponse>{_profile('trt:Profile', camera)}</trt:GetProfileResponse>"
+    return _profile("trt:Profile", camera)
 
 
 def _snapshot(camera: Camera, asked: Element, base: str) -> str:
     know(asked.says("ProfileToken"), PROFILE)
     _see_that_there_are_snapshots(camera)
     return (
-        f"<trt:GetSnapshotUriResponse><trt:MediaUri><tt:Uri>{base}{SNAPSHOT}</tt:Uri>"
+        f"<trt:MediaUri><tt:Uri>{base}{SNAPSHOT}</tt:Uri>"
         "<tt:InvalidAfterConnect>false</tt:InvalidAfterConnect>"
         "<tt:InvalidAfterReboot>false</tt:InvalidAfterReboot><tt:Timeout>PT0S</tt:Timeout>"
-        "</trt:MediaUri></trt:GetSnapshotUriResponse>"
+        "</trt:MediaUri>"
     )
 
 
@@ -56,18 +56,15 @@ def _profiles2(camera: Camera, asked: Element, _base: str) -> str:
         inner += configuration(camera, "tr2:PTZ")
     configurations = f"<tr2:Configurations>{inner}</tr2:Configurations>" if inner else ""
     return (
-        f'<tr2:GetProfilesResponse><tr2:Profiles token="{PROFILE}" fixed="true">'
-        f"<tr2:Name>main</tr2:Name>{configurations}</tr2:Profiles></tr2:GetProfilesResponse>"
+        f'<tr2:Profiles token="{PROFILE}" fixed="true">'
+        f"<tr2:Name>main</tr2:Name>{configurations}</tr2:Profiles>"
     )
 
 
 def _snapshot2(camera: Camera, asked: Element, base: str) -> str:
     know(asked.says("ProfileToken"), PROFILE)
     _see_that_there_are_snapshots(camera)
-    return (
-        f"<tr2:GetSnapshotUriResponse><tr2:Uri>{base}{SNAPSHOT}</tr2:Uri>"
-        "</tr2:GetSnapshotUriResponse>"
-    )
+    return f"<tr2:Uri>{base}{SNAPSHOT}</tr2:Uri>"
 
 
 MEDIA: Operations = {

@@ -132,23 +132,21 @@ def _node(camera: Camera, tag: str) -> str:
 
 
 def _nodes(camera: Camera, _asked: Element, _base: str) -> str:
-    return f"<tptz:GetNodesResponse>{_node(camera, 'tptz:PTZNode')}</tptz:GetNodesResponse>"
+    return _node(camera, "tptz:PTZNode")
 
 
 def _one_node(camera: Camera, asked: Element, _base: str) -> str:
     know(asked.says("NodeToken"), NODE, what="node")
-    return f"<tptz:GetNodeResponse>{_node(camera, 'tptz:PTZNode')}</tptz:GetNodeResponse>"
+    return _node(camera, "tptz:PTZNode")
 
 
 def _configurations(camera: Camera, _asked: Element, _base: str) -> str:
-    inner = configuration(camera, "tptz:PTZConfiguration")
-    return f"<tptz:GetConfigurationsResponse>{inner}</tptz:GetConfigurationsResponse>"
+    return configuration(camera, "tptz:PTZConfiguration")
 
 
 def _one_configuration(camera: Camera, asked: Element, _base: str) -> str:
     know(asked.says("PTZConfigurationToken"), CONFIGURATION, what="configuration")
-    inner = configuration(camera, "tptz:PTZConfiguration")
-    return f"<tptz:GetConfigurationResponse>{inner}</tptz:GetConfigurationResponse>"
+    return configuration(camera, "tptz:PTZConfiguration")
 
 
 def _status(camera: Camera, asked: Element, _base: str) -> str:
@@ -167,9 +165,9 @@ def _status(camera: Camera, asked: Element, _base: str) -> str:
     )
     now = datetime.fromtimestamp(camera.now_s, UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
     return (
-        f"<tptz:GetStatusResponse><tptz:PTZStatus>{position if spec.positions else ''}"
+        f"<tptz:PTZStatus>{position if spec.positions else ''}"
         f"<tt:MoveStatus><tt:PanTilt>{turning}</tt:PanTilt><tt:Zoom>{zooming}</tt:Zoom>"
-        f"</tt:MoveStatus><tt:UtcTime>{now}</tt:UtcTime></tptz:PTZStatus></tptz:GetStatusResponse>"
+        f"</tt:MoveStatus><tt:UtcTime>{now}</tt:UtcTime></tptz:PTZStatus>"
     )
 
 
@@ -211,7 +209,7 @@ def _absolute(camera: Camera, asked: Element, _base: str) -> str:
     if zoom is not None:
         uri = zoom.attribute("space") or ZOOM
         gimbal.zoom.go(meaning(spec, uri, _number(zoom, "x"), "zoom"))
-    return "<tptz:AbsoluteMoveResponse/>"
+    return ""
 
 
 def _continuous(camera: Camera, asked: Element, _base: str) -> str:
@@ -235,7 +233,7 @@ def _continuous(camera: Camera, asked: Element, _base: str) -> str:
     if zoom is not None:
         uri = zoom.attribute("space") or ZOOM_VELOCITY
         gimbal.zoom.run(meaning(spec, uri, _number(zoom, "x"), "zoom"), until_s)
-    return "<tptz:ContinuousMoveResponse/>"
+    return ""
 
 
 def _stop(camera: Camera, asked: Element, _base: str) -> str:
@@ -246,7 +244,7 @@ def _stop(camera: Camera, asked: Element, _base: str) -> str:
         camera.gimbal.tilt.stop()
     if asked.says("Zoom") not in ("false", "0"):
         camera.gimbal.zoom.stop()
-    return "<tptz:StopResponse/>"
+    return ""
 
 
 OPERATIONS: Operations = {

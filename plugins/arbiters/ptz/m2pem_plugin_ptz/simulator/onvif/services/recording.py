@@ -10,10 +10,8 @@ MOST_JOBS = 2
 
 def _capabilities(_camera: Camera, _asked: Element, _base: str) -> str:
     return (
-        "<trc:GetServiceCapabilitiesResponse>"
         '<trc:Capabilities DynamicRecordings="false" MaxRecordings="1" '
         f'MaxRecordingJobs="{MOST_JOBS}"/>'
-        "</trc:GetServiceCapabilitiesResponse>"
     )
 
 
@@ -23,13 +21,12 @@ def _recordings(_camera: Camera, _asked: Element, _base: str) -> str:
         "<tt:Location/><tt:Description/><tt:Address>urn:m2pem:camera</tt:Address></tt:Source>"
     )
     return (
-        f"<trc:GetRecordingsResponse><trc:RecordingItem>"
-        f"<tt:RecordingToken>{RECORDING}</tt:RecordingToken>"
+        f"<trc:RecordingItem><tt:RecordingToken>{RECORDING}</tt:RecordingToken>"
         f"<tt:Configuration>{source}<tt:Content>all</tt:Content>"
         "<tt:MaximumRetentionTime>PT0S</tt:MaximumRetentionTime></tt:Configuration>"
         "<tt:Tracks><tt:Track><tt:TrackToken>video</tt:TrackToken><tt:Configuration>"
         "<tt:TrackType>Video</tt:TrackType><tt:Description/></tt:Configuration></tt:Track></tt:Tracks>"
-        "</trc:RecordingItem></trc:GetRecordingsResponse>"
+        "</trc:RecordingItem>"
     )
 
 
@@ -42,12 +39,11 @@ def _settings(tag: str, active: bool) -> str:
 
 
 def _jobs(camera: Camera, _asked: Element, _base: str) -> str:
-    items = "".join(
+    return "".join(
         f"<trc:JobItem><tt:JobToken>{job.token}</tt:JobToken>"
         f"{_settings('tt:JobConfiguration', job.active)}</trc:JobItem>"
         for job in camera.jobs.values()
     )
-    return f"<trc:GetRecordingJobsResponse>{items}</trc:GetRecordingJobsResponse>"
 
 
 def _create(camera: Camera, asked: Element, _base: str) -> str:
@@ -61,10 +57,8 @@ def _create(camera: Camera, asked: Element, _base: str) -> str:
     if len(camera.jobs) >= MOST_JOBS:
         raise FaultError("there are too many jobs", "Action", "MaxRecordingJobs", receiver=True)
     job = camera.add_job(active)
-    return (
-        f"<trc:CreateRecordingJobResponse><trc:JobToken>{job.token}</trc:JobToken>"
-        f"{_settings('trc:JobConfiguration', active)}</trc:CreateRecordingJobResponse>"
-    )
+    configuration = _settings("trc:JobConfiguration", active)
+    return f"<trc:JobToken>{job.token}</trc:JobToken>{configuration}"
 
 
 def _mode(text: str) -> bool:
@@ -81,20 +75,19 @@ def _job(camera: Camera, asked: Element) -> Job:
 
 def _set_mode(camera: Camera, asked: Element, _base: str) -> str:
     camera.set_job(_job(camera, asked), _mode(asked.says("Mode")))
-    return "<trc:SetRecordingJobModeResponse/>"
+    return ""
 
 
 def _delete(camera: Camera, asked: Element, _base: str) -> str:
     camera.remove_job(_job(camera, asked))
-    return "<trc:DeleteRecordingJobResponse/>"
+    return ""
 
 
 def _state(camera: Camera, asked: Element, _base: str) -> str:
     state = "Active" if _job(camera, asked).active else "Idle"
     return (
-        f"<trc:GetRecordingJobStateResponse><trc:State><tt:RecordingToken>{RECORDING}"
-        f"</tt:RecordingToken><tt:State>{state}</tt:State></trc:State>"
-        "</trc:GetRecordingJobStateResponse>"
+        f"<trc:State><tt:RecordingToken>{RECORDING}</tt:RecordingToken>"
+        f"<tt:State>{state}</tt:State></trc:State>"
     )
 
 
