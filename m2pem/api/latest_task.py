@@ -7,9 +7,10 @@ from typing import Any
 
 class LatestTask:
     """Runs work in the order in which it is given: new work cancels the work before it, and begins
-    when that has ended."""
+    when that has ended. `failed` gets the error of work that fails."""
 
-    def __init__(self) -> None:
+    def __init__(self, failed: Callable[[BaseException], None] | None = None) -> None:
+        self._failed = failed
         self._tasks: set[asyncio.Task[None]] = set()
 
     @property
@@ -26,7 +27,7 @@ class LatestTask:
         """Do this beside other work; what replaces that replaces this, too."""
         task = asyncio.get_running_loop().create_task(work)
         self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
+        task.add_done_callback(self._done)
         return task
 
     def cancel(self) -> None:
@@ -37,6 +38,11 @@ class LatestTask:
     async def close(self) -> None:
         """Cancel all work, and wait for its end."""
         await cancel_and_wait(*self._tasks)
+
+    def _done(self, task: asyncio.Task[None]) -> None:
+        self._tasks.discard(task)
+        if self._failed is not None and not task.cancelled() and (error := task.exception()):
+            self._failed(error)
 
     async def _after(
         self, before: set[asyncio.Task[None]], work: Callable[[], Awaitable[None]]

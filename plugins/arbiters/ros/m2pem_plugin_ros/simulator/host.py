@@ -2,17 +2,15 @@
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any
 
 from m2pem.api.clock import Clock, RateTimer
-from m2pem.api.latest_task import cancel_and_wait
+from m2pem.api.latest_task import LatestTask
 from m2pem_plugin_ros.runtime import RosRuntime
 from m2pem_plugin_ros.settings import DriverName
 from m2pem_plugin_ros.simulator.faults import TrafficFaults
 from m2pem_plugin_ros.simulator.onboard_control import (
     ControlContext,
-    NoOnboardControl,
     OnboardControl,
     SimulatedLocalization,
     make_onboard_control,
@@ -42,11 +40,13 @@ class SimulatedVehicle:
         self._topics: BaseTopics | None = None
         self._steering: FilteredRuntime | None = None
         self._traffic_filter: NodeTrafficFilter | None = None
-        self._onboard_control: OnboardControl = NoOnboardControl()
+        self._onboard_control: OnboardControl | None = None
         self._localization = SimulatedLocalization(vehicle.spec, clock)
         self._rate_timer = RateTimer(ODOMETRY_HZ)
         self._turn = asyncio.Lock()
-        self._tasks: set[asyncio.Task[None]] = set()
+        self._tasks = LatestTask(
+            lambda error: logger.error("%s: %s", vehicle.spec.name, error, exc_info=error)
+        )
 
     @property
     def driver(self) -> DriverName:
@@ -64,9 +64,9 @@ class SimulatedVehicle:
 
     async def close(self) -> None:
         """Stop the nodes in order: the vehicle stops, and the end of its behavior is published."""
-        await cancel_and_wait(*self._tasks)
+        await self._tasks.close()
         try:
-            await self._end_steering(self._onboard_control.close)
+            await self._end_steering()
         finally:
             self._end_base()
 
@@ -93,7 +93,7 @@ class SimulatedVehicle:
 
     def start(self) -> None:
         """Start the nodes that are missing. The vehicle is where it was."""
-        self._do(self._start())
+        self._tasks.add(self._start())
 
     def _kill(self, *, base: bool, steering: bool) -> None:
         if steering and self._steering is not None:
@@ -101,27 +101,13 @@ class SimulatedVehicle:
         if base:
             self._end_base()
         if steering:
-            self._do(self._end_dead_node())
-
-    def _do(self, what: Coroutine[Any, Any, None]) -> None:
-        task = asyncio.get_running_loop().create_task(what)
-        self._tasks.add(task)
-        task.add_done_callback(self._done)
-
-    def _done(self, task: asyncio.Task[None]) -> None:
-        self._tasks.discard(task)
-        if not task.cancelled() and (error := task.exception()) is not None:
-            logger.error("%s: %s", self.vehicle.spec.name, error, exc_info=error)
+            self._tasks.add(self._end_dead_node())
 
     async def _end_dead_node(self) -> None:
         """End the tasks of a killed node."""
         async with self._turn:
-            way = self._onboard_control
-            # An m2pem node can be ended without a word. Whatever else wants to say something at
-            # its end finds its entities gone.
-            end = getattr(way, "drop", way.close)
             try:
-                await self._end_steering(end)
+                await self._end_steering(is_dead=True)
             except Exception as error:
                 logger.debug("%s: its node is gone: %r", self.vehicle.spec.name, error)
 
@@ -140,10 +126,8 @@ class SimulatedVehicle:
         if self._steering is None and self.driver is not DriverName.BASE:
             traffic_filter = NodeTrafficFilter(self.traffic_faults)
             name = f"{self.driver}_node"
-            self._steering, self._traffic_filter = (
-                FilteredRuntime(self._ros, traffic_filter, name, namespace),
-                traffic_filter,
-            )
+            self._steering = FilteredRuntime(self._ros, traffic_filter, name, namespace)
+            self._traffic_filter = traffic_filter
             context = ControlContext(
                 self.vehicle, self._steering, self._localization, self._clock, self.traffic_faults
             )
@@ -152,24 +136,24 @@ class SimulatedVehicle:
                 await self._onboard_control.open()
             except BaseException:  # nothing half open stays, so that it can be begun again
                 self._steering.destroy()
-                self._onboard_control, self._steering, self._traffic_filter = (
-                    NoOnboardControl(),
-                    None,
-                    None,
-                )
+                self._onboard_control = self._steering = self._traffic_filter = None
                 raise
 
-    async def _end_steering(self, end: Callable[[], Awaitable[None]]) -> None:
-        steering = self._steering
-        self._onboard_control, self._steering, self._traffic_filter = NoOnboardControl(), None, None
+    async def _end_steering(self, *, is_dead: bool = False) -> None:
+        control, steering = self._onboard_control, self._steering
+        self._onboard_control = self._steering = self._traffic_filter = None
+        if control is None or steering is None:
+            return
+        # A dead m2pem node ends without a word. Whatever else wants to say something at its end
+        # finds its entities gone.
+        end = getattr(control, "drop", control.close) if is_dead else control.close
         try:
             async with asyncio.timeout(CLOSED_WITHIN_S):
                 await end()
         except TimeoutError:
             logger.error("%s: what steers it on board does not end", self.vehicle.spec.name)
         finally:
-            if steering is not None:
-                steering.destroy()
+            steering.destroy()
 
     def _end_base(self) -> None:
         if self._base is not None:

@@ -1,4 +1,4 @@
-"""The onboard control of a simulated vehicle: none, an m2pem node, or Nav2."""
+"""The onboard control of a simulated vehicle: an m2pem node, or Nav2."""
 
 import logging
 import math
@@ -47,14 +47,6 @@ class OnboardControl(Protocol):
         ...
 
 
-class NoOnboardControl:
-    """A plain base has no control on board."""
-
-    async def open(self) -> None: ...
-
-    async def close(self) -> None: ...
-
-
 @dataclass(frozen=True, slots=True)
 class ControlContext:
     """The arguments of an onboard control."""
@@ -81,18 +73,13 @@ class ControlContext:
 
 
 def make_onboard_control(context: ControlContext) -> OnboardControl:
-    """Make the onboard control for the driver of the vehicle.
+    """Make the onboard control for the driver of the vehicle, which is not a plain base.
 
     Raises:
         RosError: a package that it needs, such as nav2_msgs, is not there.
     """
-    match context.vehicle.spec.settings.driver:
-        case DriverName.NODE:
-            return _node(context)
-        case DriverName.NAV2:
-            return _nav2(context)
-        case _:
-            return NoOnboardControl()
+    is_node = context.vehicle.spec.settings.driver is DriverName.NODE
+    return _node(context) if is_node else _nav2(context)
 
 
 def _node(context: ControlContext) -> OnboardControl:

@@ -1,7 +1,7 @@
 """Commands an m2pem node by the action `execute_behavior`."""
 
 import asyncio
-from collections.abc import Coroutine, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 from uuid import UUID
@@ -11,7 +11,7 @@ from action_msgs import srv as action_services
 from m2pem_interfaces.action import ExecuteBehavior
 
 from m2pem.api import BehaviorState
-from m2pem.api.latest_task import cancel_and_wait
+from m2pem.api.latest_task import LatestTask, cancel_and_wait
 from m2pem.api.remember import remember
 from m2pem_plugin_ros.drivers.driver import DriverSetup, Order, Outcome
 from m2pem_plugin_ros.drivers.goal_services import ACTIVE, GoalServices
@@ -73,7 +73,9 @@ class ActionLink:
         self._shown: dict[UUID, int] = {}
         self._goals_shown = asyncio.Event()
         self._ended: dict[UUID, Outcome] = {}
-        self._tasks: set[asyncio.Task[None]] = set()
+        self._tasks = LatestTask(
+            lambda error: log_throttle.log("internal error of m2pem", repr(error))
+        )
         self._node_is_received = False
 
     @property
@@ -93,7 +95,7 @@ class ActionLink:
         pending = self._add_pending(order.goal, order)
         self._current = pending
         self._node_is_received = False
-        self._run(self._give(pending, order))
+        self._tasks.add(self._give(pending, order))
 
     def end(self, goal: UUID) -> None:
         """Cancel the goal until it has ended."""
@@ -106,10 +108,10 @@ class ActionLink:
             pending.answered = (
                 True  # a goal of an earlier process; if the node does not have it, it has ended
             )
-            self._run(self._attend(pending))
+            self._tasks.add(self._attend(pending))
         if not pending.cancelled:
             pending.cancelled = True
-            self._run(self._cancel(pending))
+            self._tasks.add(self._cancel(pending))
 
     async def query(self, order: Order) -> Outcome:
         """Return the state of a goal by the status topic, or by its result."""
@@ -141,20 +143,18 @@ class ActionLink:
             self._let_go()
             pending = self._current = self._add_pending(order.goal, order)
             pending.acknowledged = pending.answered = True
-            self._run(self._attend(pending))
+            self._tasks.add(self._attend(pending))
 
     def abandon(self) -> None:
         for pending in self._pending.values():
             pending.over = True
-        for task in self._tasks:
-            task.cancel()
+        self._tasks.cancel()
         self._pending.clear()
         self._current = None
 
     async def close(self) -> None:
-        tasks = list(self._tasks)
         self.abandon()
-        await asyncio.gather(*tasks, return_exceptions=True)
+        await self._tasks.close()
 
     # --- messages of the vehicle ----------------------------------------------------------------
 
@@ -320,13 +320,3 @@ class ActionLink:
             wrong = str(error)
         self._log_throttle.log("an invalid result", wrong)
         return Outcome(_ENDS.get(ended.status, BehaviorState.FAILED), reason=wrong)
-
-    def _run(self, work: Coroutine[Any, Any, None]) -> None:
-        task = asyncio.get_running_loop().create_task(work)
-        self._tasks.add(task)
-        task.add_done_callback(self._done)
-
-    def _done(self, task: asyncio.Task[None]) -> None:
-        self._tasks.discard(task)
-        if not task.cancelled() and (error := task.exception()) is not None:
-            self._log_throttle.log("internal error of m2pem", repr(error))
