@@ -135,6 +135,15 @@ class Nav2:
         """Return the action that Nav2 executes for another client; "" if there is none."""
         return self._other_client((self.waypoints, self.through_poses, self.to_pose))
 
+    def expect_no_other_client(self) -> None:
+        """Check that Nav2 executes no goal of another client.
+
+        Raises:
+            NavigationError: it does.
+        """
+        if other_client := self.other_client():
+            raise taken_over(f"another client has given Nav2 a goal: {other_client}")
+
     def was_cancelled(self, order: UUID) -> bool:
         """Whether goals of an order were cancelled, and none of them goes on."""
         found = {

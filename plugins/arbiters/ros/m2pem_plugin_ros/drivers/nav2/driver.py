@@ -13,7 +13,7 @@ from m2pem.api import BehaviorRequest, BehaviorState, LatestTask, ResolvedValue
 from m2pem.api.remember import remember
 from m2pem_plugin_ros.drivers.driver import DriverSetup, Health, Order, Outcome
 from m2pem_plugin_ros.drivers.nav2.client import Nav2
-from m2pem_plugin_ros.drivers.nav2.errors import NavigationError, taken_over
+from m2pem_plugin_ros.drivers.nav2.errors import NavigationError
 from m2pem_plugin_ros.drivers.nav2.goal_client import number_of
 from m2pem_plugin_ros.drivers.nav2.tasks import (
     CANCELLED_THERE,
@@ -273,9 +273,10 @@ class Nav2Driver:
                 self._logger.error("%s: cannot be held: %s", self._name, error)
                 await self._setup.context.clock.sleep(AGAIN_S)
         while drive is not None and self._nav2 is not None:
-            if other_client := self._nav2.other_client():
-                taken = taken_over(f"another client has given Nav2 a goal: {other_client}")
-                self._end_drive(drive, Outcome(taken.state, taken.code, taken.reason))
+            try:
+                self._nav2.expect_no_other_client()
+            except NavigationError as taken:
+                self._end_drive(drive, taken.outcome)
                 return
             await self._setup.context.clock.sleep(AGAIN_S)
 

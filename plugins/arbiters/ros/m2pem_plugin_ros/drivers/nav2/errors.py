@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from m2pem.api import BehaviorState
+from m2pem_plugin_ros.drivers.driver import Outcome
 
 _BLOCKED = {
     104: "the controller exceeded its time for retries",
@@ -68,6 +69,10 @@ class NavigationError(Exception):
         self.reason = reason
         self.code = code
         self.state = state
+
+    @property
+    def outcome(self) -> Outcome:
+        return Outcome(self.state, self.code, self.reason)
 
 
 def taken_over(reason: str) -> NavigationError:

@@ -10,7 +10,7 @@ from typing import Any
 from m2pem.api import BehaviorState, ResolvedValue
 from m2pem_plugin_ros.catalogue import BEHIND_RAD, OFFSET_M
 from m2pem_plugin_ros.drivers.driver import Outcome
-from m2pem_plugin_ros.drivers.nav2.errors import NavigationError, taken_over
+from m2pem_plugin_ros.drivers.nav2.errors import NavigationError
 from m2pem_plugin_ros.drivers.nav2.goal_client import GoalClient
 from m2pem_plugin_ros.drivers.nav2.parameters import apart_m, towards_rad
 from m2pem_plugin_ros.drivers.nav2.tasks.task import (
@@ -25,6 +25,7 @@ MOVED_M = 1.0
 """When the target has moved by this distance, a new goal is sent, for which Nav2 plans again."""
 
 AGAIN_S = 1.0
+ANOTHER_EXPECTED = "parameter 'target': another vehicle is expected"
 
 
 class Pursuit(Nav2GoalTask):
@@ -56,6 +57,16 @@ class Pursuit(Nav2GoalTask):
             NavigationError: the target was not reached.
         """
 
+    def refusal(self) -> str:
+        """Return why the target is not known; "" if it is."""
+        if self.parameters.target_vehicle == self.context.setup.connection.resource:
+            return ANOTHER_EXPECTED
+        try:
+            self.aim()
+        except NavigationError as error:
+            return f"parameter 'target': {error}"
+        return super().refusal()
+
     def adjust(self, parameters: Mapping[str, ResolvedValue]) -> None:
         super().adjust(parameters)
         self._changed = self._changed or bool(parameters.keys() - {"speed"})
@@ -71,13 +82,9 @@ class Pursuit(Nav2GoalTask):
                     way.result()
                     if not self._moved() and self.arrived():
                         return
-                    if other_client := self.nav2.other_client():
-                        raise taken_over(f"another client has given Nav2 a goal: {other_client}")
+                    self.nav2.expect_no_other_client()
                 if self._moved():
-                    if other_client := self.nav2.other_client():
-                        raise taken_over(
-                            f"another client has given Nav2 another goal: {other_client}"
-                        )
+                    self.nav2.expect_no_other_client()
                     # Send the new goal only now: it must not arrive after the end of the old one.
                     before, way = way, self._set_out()
                     before.cancel()
@@ -114,16 +121,6 @@ class Pursuit(Nav2GoalTask):
 class Goto(Pursuit):
     """Go to a position, or to the current position of another vehicle."""
 
-    def refusal(self) -> str:
-        """Return why the target is not known; "" if it is."""
-        if self.parameters.target_vehicle == self.context.setup.connection.resource:
-            return "parameter 'target': another vehicle is expected"
-        try:
-            self.aim()
-        except NavigationError as error:
-            return f"parameter 'target': {error}"
-        return super().refusal()
-
     def aim(self) -> Pose:
         """Return the target, with the requested heading or else the direction of travel."""
         place, yaw = self.parameters.target_pose(), self.parameters.yaw_rad
@@ -152,14 +149,7 @@ class Follow(Pursuit):
 
     def refusal(self) -> str:
         """Return why the target is not another vehicle with a recent position."""
-        vehicle = self.parameters.target_vehicle
-        if vehicle is None or vehicle == self.context.setup.connection.resource:
-            return "parameter 'target': another vehicle is expected"
-        try:
-            self.aim()
-        except NavigationError as error:
-            return f"parameter 'target': {error}"
-        return super().refusal()
+        return ANOTHER_EXPECTED if self.parameters.target_vehicle is None else super().refusal()
 
     def aim(self) -> Pose:
         """Return the position relative to the target, with the target's heading."""

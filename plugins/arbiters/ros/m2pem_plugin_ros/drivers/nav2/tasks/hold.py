@@ -4,7 +4,7 @@ from typing import ClassVar
 
 from m2pem.api import BehaviorState
 from m2pem_plugin_ros.drivers.driver import Outcome
-from m2pem_plugin_ros.drivers.nav2.errors import NavigationError, taken_over
+from m2pem_plugin_ros.drivers.nav2.errors import NavigationError
 from m2pem_plugin_ros.drivers.nav2.tasks.task import Nav2Task, TaskContext
 from m2pem_plugin_ros.sensors.localization import moves, stands
 
@@ -30,8 +30,7 @@ class Hold(Nav2Task):
         since_us = self.clock.now_us()
         left_s = self._left_s
         while self._left_s > 0:
-            if other_client := self.nav2.other_client():
-                raise taken_over(f"another client has given Nav2 a goal: {other_client}")
+            self.nav2.expect_no_other_client()
             await self.clock.sleep(min(LOOK_EVERY_S, self._left_s))
             self._left_s = left_s - (self.clock.now_us() - since_us) / 1e6
 

@@ -69,8 +69,7 @@ class Route(Nav2GoalTask):
         """Return RUNNING for a lap that ended while this process did not run: the vehicle
         stands."""
         if waypoints := getattr(result, "missed_waypoints", ()):
-            error = missed(waypoints)
-            return Outcome(error.state, error.code, error.reason)
+            return missed(waypoints).outcome
         if self._loops:
             return Outcome(BehaviorState.UNKNOWN, reason="it is at rest at the end of a lap")
         return Outcome(BehaviorState.SUCCEEDED)

@@ -172,8 +172,7 @@ class Nav2GoalTask(Nav2Task):
         if ended.status == GoalStatus.STATUS_SUCCEEDED:
             return self.after_success(ended.result)
         if ended.status == GoalStatus.STATUS_ABORTED:
-            error = await self.nav2.why_aborted(self.client, ended.result)
-            return Outcome(error.state, error.code, error.reason)
+            return (await self.nav2.why_aborted(self.client, ended.result)).outcome
         return CANCELLED_THERE
 
     def _on_message(self, goal: UUID, feedback: Any) -> None:
