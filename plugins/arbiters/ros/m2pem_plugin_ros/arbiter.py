@@ -245,7 +245,7 @@ class RosArbiter(UnitArbiter[Vehicle]):
         absent = [
             resource
             for resource, vehicle in self._units.items()
-            if not vehicle.first_contact.is_set() and not vehicle.is_listed
+            if not vehicle.first_contact.is_set() and not vehicle.endpoints.is_listed
         ]
         left_s = min(NAMED_WITHIN_S, FIRST_CONTACT_WITHIN_S) - (loop.time() - began_s)
         if absent and left_s > 0 and self._vehicle_connections is not None:
@@ -263,7 +263,7 @@ class RosArbiter(UnitArbiter[Vehicle]):
         for resource, vehicle in self._units.items():
             if not vehicle.first_contact.is_set():
                 self._context.logger.warning(
-                    "%s: no message from the vehicle yet: %s", resource, vehicle.absence
+                    "%s: no message from the vehicle yet: %s", resource, vehicle.endpoints.absence
                 )
 
     async def _disconnect(self) -> None:

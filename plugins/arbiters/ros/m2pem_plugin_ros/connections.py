@@ -3,7 +3,6 @@ vehicle."""
 
 import asyncio
 import math
-import os
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
@@ -28,11 +27,10 @@ from m2pem_plugin_ros.sensors.health import Battery, Diagnostics
 from m2pem_plugin_ros.sensors.localization import Localization, TopicLocalization
 from m2pem_plugin_ros.sensors.payload import PayloadSensors, PayloadStatusTopic
 from m2pem_plugin_ros.sensors.tf_topics import TfTopics
-from m2pem_plugin_ros.settings import DetectorSettings, DriverName, Settings, Topics
+from m2pem_plugin_ros.settings import DetectorSettings, DriverName, Settings, Topics, domain_of
 
 if TYPE_CHECKING:
     from m2pem_plugin_ros.runtime import RosRuntime
-    from m2pem_plugin_ros.sensors.payload import PayloadStatusTopic
 
 
 class VehicleSensors(Protocol):
@@ -49,23 +47,6 @@ class VehicleSensors(Protocol):
     @property
     def errors(self) -> tuple[str, ...]:
         """Errors of components of the vehicle, as text."""
-        ...
-
-    @property
-    def refusal(self) -> str:
-        """Why the vehicle must not be commanded: its endpoints are ambiguous, or its pose cannot be
-        known. "" if it may be commanded."""
-        ...
-
-    @property
-    def absence(self) -> str:
-        """The expected topic of the vehicle, its publishers, and what is there instead, as
-        text."""
-        ...
-
-    @property
-    def is_listed(self) -> bool:
-        """Whether DDS lists a publisher of the expected topic of the vehicle."""
         ...
 
     @property
@@ -87,8 +68,15 @@ class VehicleConnection:
 
     ros: "RosRuntime"
     sensors: VehicleSensors
+    endpoints: Endpoints
     publish_target: Callable[[VehicleState], None]
-    payload_status: "PayloadStatusTopic | None" = None
+    payload_status: PayloadStatusTopic | None = None
+
+    @property
+    def refusal(self) -> str:
+        """Why the vehicle must not be commanded: its endpoints are ambiguous, or its pose cannot be
+        known. "" if it may be commanded."""
+        return self.endpoints.problem or self.sensors.localization.wrong_frame
 
 
 class VehicleConnections(Protocol):
@@ -103,7 +91,7 @@ class VehicleConnections(Protocol):
         ...
 
     async def search(self, absent: Collection[ResourceId], within_s: float) -> None:
-        """Search other ROS domains for absent vehicles. `absence` of those says what was found."""
+        """Search other ROS domains for absent vehicles. Their `Endpoints` say what was found."""
         ...
 
     def retry(self) -> None:
@@ -137,10 +125,8 @@ class TopicSensors:
         battery: Battery,
         diagnostics: Diagnostics,
         hardware_id: str,
-        endpoints: Endpoints,
     ) -> None:
         self.localization = localization
-        self._endpoints = endpoints
         self._battery = battery
         self._diagnostics = diagnostics
         self._hardware_id = hardware_id
@@ -153,18 +139,6 @@ class TopicSensors:
     @property
     def errors(self) -> tuple[str, ...]:
         return self._diagnostics.errors(self._hardware_id)
-
-    @property
-    def refusal(self) -> str:
-        return self._endpoints.problem or self.localization.wrong_frame
-
-    @property
-    def absence(self) -> str:
-        return self._endpoints.absence
-
-    @property
-    def is_listed(self) -> bool:
-        return self._endpoints.is_listed
 
     @property
     def problems(self) -> tuple[str, ...]:
@@ -214,7 +188,7 @@ class DdsConnections:
         return vehicles
 
     async def search(self, absent: Collection[ResourceId], within_s: float) -> None:
-        domains = {0, *self._runtimes, _domain(None)}
+        domains = {0, *self._runtimes, domain_of(None)}
         endpoints = [self._endpoints[resource] for resource in absent]
         await search_domains(endpoints, domains, self._runtimes, within_s)
 
@@ -238,15 +212,14 @@ class DdsConnections:
             )
             endpoints = self._endpoints_of(ros, settings, is_payload=True)
             self._endpoints[resource] = endpoints
-            sensors = PayloadSensors(payload_status, endpoints)
-            return VehicleConnection(
-                ros, sensors, TargetPublisher(ros, settings).show, payload_status
-            )
+            show = TargetPublisher(ros, settings).show
+            sensors = PayloadSensors(payload_status)
+            return VehicleConnection(ros, sensors, endpoints, show, payload_status)
         tf = self._tf_of(resource, settings.domain_id)
         localization = TopicLocalization(ros, resource, settings, context, tf)
         self._localizations[resource] = localization
         topic = settings.topic(settings.topics.diagnostics)
-        key = (_domain(settings.domain_id), topic)
+        key = (domain_of(settings.domain_id), topic)
         if key not in self._diagnostics:
             self._diagnostics[key] = Diagnostics(ros, topic, context.clock)
         endpoints = self._endpoints_of(ros, settings)
@@ -256,17 +229,16 @@ class DdsConnections:
             Battery(ros, resource, settings, context),
             self._diagnostics[key],
             settings.hardware_id,
-            endpoints,
         )
         # Other drivers read targets from the fleet's bus.
         is_node = settings.driver is DriverName.NODE
         publish_target = TargetPublisher(ros, settings).show if is_node else _publish_nothing
-        return VehicleConnection(ros, topics, publish_target)
+        return VehicleConnection(ros, topics, endpoints, publish_target)
 
     def _endpoints_of(
         self, ros: "RosRuntime", settings: Settings, *, is_payload: bool = False
     ) -> Endpoints:
-        domain = _domain(settings.domain_id)
+        domain = domain_of(settings.domain_id)
         if domain not in self._graphs:
             self._graphs[domain] = Graph(ros.node)
         return Endpoints(ros, settings, domain, is_payload=is_payload, graph=self._graphs[domain])
@@ -274,7 +246,7 @@ class DdsConnections:
     def _runtime(self, domain_id: int | None) -> "RosRuntime":
         from m2pem_plugin_ros.runtime import RosRuntime  # noqa: PLC0415  # it needs rclpy
 
-        domain = _domain(domain_id)
+        domain = domain_of(domain_id)
         if domain not in self._runtimes:
             # The name of the journal distinguishes executives on one network.
             name = f"m2pem_{self._setup.context.journal.hex[:8]}"
@@ -291,7 +263,7 @@ class DdsConnections:
         if vehicle is not None:
             topic = vehicle.topic(vehicle.topics.tf)
             static_topic = vehicle.topic(vehicle.topics.tf_static)
-        key = (_domain(domain_id), topic, static_topic)
+        key = (domain_of(domain_id), topic, static_topic)
         if key not in self._tf:
             ros = self._runtime(domain_id)
             self._tf[key] = TfTopics(ros, topic, static_topic, self._setup.context)
@@ -320,16 +292,6 @@ class DdsConnections:
 
 def _publish_nothing(_: VehicleState) -> None:
     return
-
-
-def _domain(domain_id: int | None) -> int:
-    """Return the domain. Without one in the fleet, it is that of the environment."""
-    if domain_id is not None:
-        return domain_id
-    try:
-        return int(os.environ.get("ROS_DOMAIN_ID", ""))
-    except ValueError:
-        return 0
 
 
 TOPIC = "target"

@@ -43,7 +43,7 @@ async def check_vehicles(fleet: Fleet) -> Sequence[HealthCheck]:
     vehicles = await made.open()
     try:
         await _until_there(vehicles)
-        absent = [each for each, found in vehicles.items() if not found.sensors.is_listed]
+        absent = [each for each, found in vehicles.items() if not found.endpoints.is_listed]
         if absent:
             await made.search(absent, SEARCH_S)
         return [_check(resource, found) for resource, found in vehicles.items()]
@@ -59,18 +59,20 @@ async def _until_there(vehicles: Mapping[ResourceId, VehicleConnection]) -> None
     loop = asyncio.get_running_loop()
     until_s = loop.time() + LOOK_S
     while loop.time() < until_s:
-        sensors = [each.sensors for each in vehicles.values()]
-        if all(each.localization.pose is not None and not each.refusal for each in sensors):
+        if all(
+            each.sensors.localization.pose is not None and not each.refusal
+            for each in vehicles.values()
+        ):
             return
         await asyncio.sleep(LOOK_EVERY_S)
 
 
 def _check(resource: ResourceId, found: VehicleConnection) -> HealthCheck:
-    name, sensors = f"ros {resource}", found.sensors
-    if wrong := sensors.refusal:
+    name, sensors, endpoints = f"ros {resource}", found.sensors, found.endpoints
+    if wrong := found.refusal:
         return HealthCheck(name, HealthStatus.ERROR, wrong, REMEDY)
-    if not sensors.is_listed:
-        return HealthCheck(name, HealthStatus.WARNING, sensors.absence, "is the vehicle started?")
+    if not endpoints.is_listed:
+        return HealthCheck(name, HealthStatus.WARNING, endpoints.absence, "is the vehicle started?")
     if problems := (*sensors.errors, *sensors.problems):
         return HealthCheck(name, HealthStatus.WARNING, "; ".join(problems))
     return HealthCheck(name, HealthStatus.OK, "it is there, with one publisher of each topic")

@@ -6,6 +6,7 @@ vehicle. A payload inherits the connection of its vehicle. So a detector has a n
 `driver`, `own_behaviors`, or allowed `behaviors` say so.
 """
 
+import os
 import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, fields
@@ -27,8 +28,19 @@ from m2pem.errors import PluginError
 from m2pem_plugin_ros.installation import RosError
 from m2pem_plugin_ros.interfaces.types import MESSAGE, full_name
 
+
+def domain_of(domain_id: int | None) -> int:
+    """Return the domain. Without one in the fleet, it is that of the environment."""
+    if domain_id is not None:
+        return domain_id
+    try:
+        return int(os.environ.get("ROS_DOMAIN_ID", ""))
+    except ValueError:
+        return 0
+
+
 _TOKEN = r"[A-Za-z_][A-Za-z0-9_]*"
-_NAME = re.compile(rf"/?{_TOKEN}(/{_TOKEN})*")
+NAME = re.compile(rf"/?{_TOKEN}(/{_TOKEN})*")
 HIGHEST_DOMAIN = 232
 
 
@@ -51,14 +63,14 @@ class RosConnectionReader(ConnectionReader):
             )
         if value == "/" or (value == "" and default == ""):
             return ""
-        if not isinstance(value, str) or not _NAME.fullmatch(value):
+        if not isinstance(value, str) or not NAME.fullmatch(value):
             raise self.error("namespace", f"{value!r} is not a ROS namespace such as /evsg1")
         return f"/{value.removeprefix('/')}"
 
     def topic(self, key: str, default: str) -> str:
         """Return the name of a topic."""
         value = self.values.get(key, default)
-        if not isinstance(value, str) or not _NAME.fullmatch(value):
+        if not isinstance(value, str) or not NAME.fullmatch(value):
             raise self.error(key, f"{value!r} is not the name of a ROS topic such as {default}")
         return value
 
@@ -235,13 +247,17 @@ def read_settings(connections: Mapping[ResourceId, Connection]) -> dict[Resource
         for resource, connection in connections.items()
         if "/" not in resource
     }
+    _check_namespaces(read)
+    return read
+
+
+def _check_namespaces(read: Mapping[ResourceId, Settings]) -> None:
     reached: dict[tuple[int | None, str], ResourceId] = {}
     for resource, settings in read.items():
         other = reached.setdefault((settings.domain_id, settings.namespace), resource)
         if other != resource:
             problem = f"{other} has the same namespace, {settings.namespace or '/'}"
             raise RosConnectionReader(resource, {}).error("namespace", problem)
-    return read
 
 
 def read_detectors(
@@ -390,18 +406,12 @@ def read_payloads(
     Raises:
         PluginError: something is missing or wrong; the text names the resource and the key.
     """
-    reached = {
-        (settings.domain_id, settings.namespace): vehicle for vehicle, settings in vehicles.items()
+    read = {
+        resource: _read_payload(connection, inherited(connection, connections))
+        for resource, connection in connections.items()
+        if "/" in resource and _has_node(connection, connections)
     }
-    read: dict[ResourceId, Settings] = {}
-    for resource, connection in connections.items():
-        if "/" not in resource or not _has_node(connection, connections):
-            continue
-        settings = read[resource] = _read_payload(connection, inherited(connection, connections))
-        other = reached.setdefault((settings.domain_id, settings.namespace), resource)
-        if other != resource:
-            problem = f"{other} has the same namespace, {settings.namespace or '/'}"
-            raise RosConnectionReader(resource, {}).error("namespace", problem)
+    _check_namespaces({**vehicles, **read})
     return read
 
 

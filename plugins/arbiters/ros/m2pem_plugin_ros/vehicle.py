@@ -3,7 +3,7 @@ link."""
 
 import asyncio
 import math
-from collections.abc import Callable, Collection, Coroutine, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from uuid import UUID
@@ -15,20 +15,17 @@ from m2pem.api import (
     BehaviorState,
     BehaviorTracker,
     Connection,
+    LatestTask,
     Limits,
     LinkState,
-    LocalFrame,
     PayloadState,
     RemainingRoute,
     ResolvedValue,
     ResourceId,
-    Route,
     Value,
     VehiclePosition,
     VehicleState,
-    raw_parameters,
 )
-from m2pem.api.latest_task import cancel_and_wait
 from m2pem.api.remember import remember
 from m2pem.errors import PluginError
 from m2pem_plugin_ros.checkpoint import goal_id, run_id
@@ -104,6 +101,7 @@ class Vehicle:
         self._tracker = setup.tracker
         self._limits = setup.limits
         self._ros_connection = ros_connection
+        self._sensors, self.endpoints = ros_connection.sensors, ros_connection.endpoints
         fence = setup.connection.fence
         self._fence_check = None if fence is None else FenceCheck(fence, setup.context.bus)
         self._log_throttle = LogThrottle(setup.context.logger, self.resource)
@@ -126,17 +124,11 @@ class Vehicle:
         self._last_contact_us = setup.context.clock.now_us()
         self._contacts = 0
         self._reported: tuple[object, ...] = ()
-        self._tasks: set[asyncio.Task[None]] = set()
-        localization = ros_connection.sensors.localization
+        self._work = LatestTask()
+        connection, settings, context = setup.connection, setup.settings, setup.context
+        ros, localization = ros_connection.ros, self._sensors.localization
         self.driver = make_driver(
-            DriverSetup(
-                setup.connection,
-                setup.settings,
-                setup.context,
-                ros_connection.ros,
-                localization,
-                self,
-            )
+            DriverSetup(connection, settings, context, ros, localization, self)
         )
 
     @property
@@ -158,7 +150,7 @@ class Vehicle:
         self._waiting, self._is_held = "", False
         if self._is_to_be_found(request):
             self._waiting = request.id
-            self._run(self._give_when_found(order.goal, query_first=query_first))
+            self._work.add(self._give_when_found(order.goal, query_first=query_first))
         else:
             await self._give(order, query_first=query_first)
 
@@ -226,7 +218,7 @@ class Vehicle:
             self._tracker.end(behavior, BehaviorState.CANCELLED, reason="it was not sent yet")
             return
         self._cancelled = behavior
-        self._run(self._fail_cancel_after_limit(behavior))
+        self._work.add(self._fail_cancel_after_limit(behavior))
         if wrong := self._call_driver("end", lambda: self.driver.end(goal)):
             self._mark_unresolved(behavior)
             self._tracker.end(behavior, BehaviorState.FAILED, reason=wrong)
@@ -273,31 +265,20 @@ class Vehicle:
         return ""
 
     @property
-    def absence(self) -> str:
-        """The expected topic of the vehicle, its publishers, and what is there instead, as
-        text."""
-        return self._ros_connection.sensors.absence
-
-    @property
-    def is_listed(self) -> bool:
-        """Whether DDS lists a publisher of the expected topic of the vehicle."""
-        return self._ros_connection.sensors.is_listed
-
-    @property
     def problem(self) -> str:
         """Why it must not be commanded, of what its topics show; "" if it may. A vehicle that was
         never received, and that DDS does not list, is not there."""
-        if wrong := self._ros_connection.sensors.refusal:
+        if wrong := self._ros_connection.refusal:
             return wrong
-        is_there = self._contacts or self.is_listed
-        return "" if is_there else f"no message ever: {self.absence}"
+        is_there = self._contacts or self.endpoints.is_listed
+        return "" if is_there else f"no message ever: {self.endpoints.absence}"
 
     def refusal(self, request: BehaviorRequest) -> str:
         """Return why a request cannot be done now; "" if it can."""
         if self._broken:
             return self._broken
         try:
-            if wrong := self._ros_connection.sensors.refusal:
+            if wrong := self._ros_connection.refusal:
                 return wrong
             if self._is_to_be_found(request):
                 return ""  # it waits
@@ -376,7 +357,7 @@ class Vehicle:
 
     async def close(self) -> None:
         """Close the driver. The vehicle goes on with what it does."""
-        await cancel_and_wait(*self._tasks)
+        await self._work.close()
         try:
             async with asyncio.timeout(CLOSE_WITHIN_S):
                 await self.driver.close()
@@ -457,13 +438,7 @@ class Vehicle:
             holder = None
         self._publish_targets()
         self._check_for_other_publishers()
-        news = (
-            self._contacts,
-            self._ros_connection.sensors.changes,
-            self.link,
-            holder,
-            self._refusal,
-        )
+        news = (self._contacts, self._sensors.changes, self.link, holder, self._refusal)
         unchanged = (self.link, self._refusal)
         still_lost = self.link is LinkState.LOST and self._reported[2::2] == unchanged
         if still_lost or (news == self._reported and not is_awaited):
@@ -472,8 +447,8 @@ class Vehicle:
         behavior = self._order.request.behavior if self._order else ""
         if self._ros_connection.payload_status is not None:
             return self._ros_connection.payload_status.state(now_us, self.link, behavior)
-        health, sensors = self._health(), self._ros_connection.sensors
-        state = vehicle_state(self.resource, now_us, sensors, health, self.link, behavior)
+        health = self._health()
+        state = vehicle_state(self.resource, now_us, self._sensors, health, self.link, behavior)
         if not self._refusal:
             return state
         reasons = dict.fromkeys((self._refusal, *state.not_ready_reasons))
@@ -483,8 +458,8 @@ class Vehicle:
 
     def _missing(self, request: BehaviorRequest) -> str:
         """Return what of the vehicle is not discovered yet, and needed; "" if nothing is."""
-        if not (self._contacts or self.is_listed):
-            return self.absence
+        if not (self._contacts or self.endpoints.is_listed):
+            return self.endpoints.absence
         if not isinstance(self.driver, Discovering):
             return ""
         for value in request.parameters.values():
@@ -509,11 +484,6 @@ class Vehicle:
             await asyncio.sleep(LOOK_EVERY_S)
         return missing
 
-    def _run(self, work: Coroutine[None, None, None]) -> None:
-        task = asyncio.get_running_loop().create_task(work)
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
-
     def _check_for_other_publishers(self) -> None:
         """Check the endpoints periodically, so that operators know of a conflict early."""
         now_s = asyncio.get_running_loop().time()
@@ -537,7 +507,7 @@ class Vehicle:
                 self._tracker.remains(behavior, self._left)
                 self._left = None
             return
-        position, route = self._ros_connection.sensors.localization.position, self._route
+        position, route = self._sensors.localization.position, self._route
         if route is None or position is None:
             return
         place = route.frame.to_local((position.latitude_deg, position.longitude_deg))
@@ -551,7 +521,7 @@ class Vehicle:
         self._call_driver("forget", self.driver.abandon)
         reason = f"no message for {silent_s:.1f} s"
         if not self._contacts:
-            reason = f"no message ever: {self.absence}"
+            reason = f"no message ever: {self.endpoints.absence}"
         self._tracker.lose(self.resource, reason)
 
     def _mark_unresolved(self, behavior: BehaviorId) -> None:
@@ -582,7 +552,9 @@ class Vehicle:
 
     def _keep(self, order: Order) -> None:
         self._order = order
-        self._route, self._adopted = _route_of(order), False
+        request, self._adopted = order.request, False
+        is_routing = request.behavior == "single_vehicle_routing"
+        self._route = RemainingRoute.of(request.parameters) if is_routing else None
         self._left, self._left_us = None, 0
         remember(self._behaviors, order.goal, order.request.id, REMEMBERED)
 
@@ -605,7 +577,7 @@ class Vehicle:
         """Return where the request would leave the fence of the fleet; "" if it does not."""
         if self._fence_check is None:
             return ""
-        where = self._ros_connection.sensors.localization
+        where = self._sensors.localization
         yaw_rad = None if where.pose is None else where.pose.yaw_rad
         return self._fence_check.refusal(request, where.position, yaw_rad)
 
@@ -628,17 +600,6 @@ class Vehicle:
             state = self._context.bus.latest(ResourceId(name))
             if isinstance(state, VehicleState):
                 self._ros_connection.publish_target(state)
-
-
-def _route_of(order: Order) -> RemainingRoute | None:
-    """Return the account of a route; None: it has none, or of a loop all is always left."""
-    parameters = order.request.parameters
-    route = parameters.get("route")
-    routing = order.request.behavior == "single_vehicle_routing"
-    if not routing or not isinstance(route, Route) or parameters.get("loop") is True:
-        return None
-    frame = LocalFrame(route.waypoints[0][:2])
-    return RemainingRoute(raw_parameters(parameters), route, frame)
 
 
 def _bug(error: Exception) -> str:

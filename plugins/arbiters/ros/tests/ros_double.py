@@ -207,8 +207,6 @@ class DoubleSenses:
         self.age_s = 0.0
         self.wrong_frame = ""
         self.problems = ()
-        self.refusal = self.absence = ""
-        self.is_listed = True
 
     @property
     def pose(self) -> Pose:
@@ -235,6 +233,13 @@ class DoubleSenses:
         return len(self.body.calls)
 
 
+class DoubleEndpoints:
+    """Implements `Endpoints` of a vehicle that is there."""
+
+    problem = absence = ""
+    is_listed = True
+
+
 class DoubleStation:
     """Implements `VehicleConnections`."""
 
@@ -248,7 +253,9 @@ class DoubleStation:
     async def open(self) -> dict[ResourceId, VehicleConnection]:
         self.is_open = True
         return {
-            resource: VehicleConnection(None, DoubleSenses(body), body.shown.append)
+            resource: VehicleConnection(
+                None, DoubleSenses(body), DoubleEndpoints(), body.shown.append
+            )
             for resource, body in self.bodies.items()
         }
 

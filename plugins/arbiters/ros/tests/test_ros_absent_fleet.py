@@ -60,7 +60,7 @@ async def test_vehicles_in_other_namespaces_are_looked_for_together(
 
             await until(known)
             monkeypatch.setattr(Node, "get_publishers_info_by_topic", counted)
-            said = [each.sensors.absence for each in vehicles.values()]
+            said = [each.endpoints.absence for each in vehicles.values()]
         finally:
             await connections.close()
     assert all("the same topic is in the namespace /robot0, " in each for each in said)

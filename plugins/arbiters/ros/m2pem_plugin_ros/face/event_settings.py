@@ -3,7 +3,6 @@
 Reading them loads the types that they name, so that a wrong one is found before anything begins.
 """
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -14,6 +13,7 @@ from m2pem.errors import ExpressionError
 from m2pem_plugin_ros.installation import RosError
 from m2pem_plugin_ros.interfaces.fill_fields import FieldError, fill
 from m2pem_plugin_ros.interfaces.types import MESSAGE, SERVICE, find_type, full_name
+from m2pem_plugin_ros.settings import NAME
 
 if TYPE_CHECKING:
     from m2pem.api import FaceSettings
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 TIMEOUT_S, LONGEST_TIMEOUT_S = 10.0, 600.0
 """How long a service has for its answer, by default and at most."""
 
-_TOPIC = re.compile(r"/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
 _SUCCESS = "success != false"
 """The usual condition for `done`: responses without the field `success` are one."""
 
@@ -113,7 +112,7 @@ def _sent(given: "FaceSettings") -> SentTopic | CalledService:
 
 def _name(given: "FaceSettings", key: str) -> str:
     value = given.text(key, "")
-    if not _TOPIC.fullmatch(value) or "__" in value:
+    if not NAME.fullmatch(value) or "__" in value:
         raise given.error(key, f"{value!r} is not the name of a ROS {key} such as /alarm")
     return value
 

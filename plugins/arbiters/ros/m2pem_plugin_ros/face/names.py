@@ -4,7 +4,6 @@
 vehicle. Names of a fleet may have characters that names of ROS may not: these become "_".
 """
 
-import os
 import re
 from collections.abc import Collection, Mapping
 
@@ -14,6 +13,7 @@ from m2pem_plugin_ros.settings import (
     DriverName,
     OdomFrame,
     Settings,
+    domain_of,
     in_namespace,
     read_payloads,
     read_settings,
@@ -112,7 +112,7 @@ def _settings_here(fleet: Fleet, options: Options) -> Mapping[ResourceId, Settin
     return {
         resource: settings
         for resource, settings in {**read, **read_payloads(connections, read)}.items()
-        if _domain(settings.domain_id) == _domain(options.domain_id)
+        if domain_of(settings.domain_id) == domain_of(options.domain_id)
     }
 
 
@@ -122,10 +122,3 @@ def _names_of(settings: Settings) -> set[str]:
     if settings.driver is DriverName.NODE:
         names.add(in_namespace(settings.namespace, ACTION))
     return names
-
-
-def _domain(domain_id: int | None) -> int:
-    if domain_id is not None:
-        return domain_id
-    said = os.environ.get("ROS_DOMAIN_ID", "")
-    return int(said) if said.isdigit() else 0

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from m2pem.api import Dimension, Fleet
+from m2pem_plugin_ros.settings import HIGHEST_DOMAIN
 
 if TYPE_CHECKING:
     from m2pem.api import FaceSettings
@@ -13,7 +14,6 @@ if TYPE_CHECKING:
 _TOKEN = r"[A-Za-z][A-Za-z0-9_]*"
 _NAMESPACE = re.compile(rf"(/{_TOKEN})*")
 
-HIGHEST_DOMAIN = 232
 FASTEST_HZ, SLOWEST_HZ = 100.0, 0.01
 
 RATES: Mapping[str, float] = {

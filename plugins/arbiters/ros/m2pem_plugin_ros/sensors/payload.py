@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 from m2pem.api import GeoPosition, LinkState, PayloadState, ResourceId
 from m2pem_plugin_ros.log_throttle import LogThrottle
 from m2pem_plugin_ros.pose import Pose, Twist
-from m2pem_plugin_ros.sensors.endpoints import Endpoints
 from m2pem_plugin_ros.sensors.localization import Localization
 from m2pem_plugin_ros.settings import Settings
 
@@ -100,21 +99,8 @@ class PayloadSensors:
     age_s = math.inf
     wrong_frame = ""
 
-    def __init__(self, status: PayloadStatusTopic, endpoints: Endpoints) -> None:
+    def __init__(self, status: PayloadStatusTopic) -> None:
         self._status = status
-        self._endpoints = endpoints
-
-    @property
-    def refusal(self) -> str:
-        return self._endpoints.problem
-
-    @property
-    def absence(self) -> str:
-        return self._endpoints.absence
-
-    @property
-    def is_listed(self) -> bool:
-        return self._endpoints.is_listed
 
     @property
     def localization(self) -> Localization:
