@@ -164,7 +164,7 @@ def test_states_and_verbs_are_the_constants_of_the_messages() -> None:
 def test_a_status_comes_back_as_it_was() -> None:
     outputs = {"picture.files": ["1.jpg", "2.jpg"], "picture.time": 5, "swept": {"m": 2.5}}
     status = Status("a", 3, BehaviorState.FAILED, "ROUTE_BLOCKED", "a wall", "n1", outputs)
-    assert read_status(write_status(BehaviorStatus(), status, KeyValue)) == status
+    assert read_status(write_status(status)) == status
 
 
 @pytest.mark.parametrize(

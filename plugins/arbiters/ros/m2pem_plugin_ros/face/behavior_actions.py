@@ -5,7 +5,6 @@ import json
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
-from m2pem_interfaces import msg
 from m2pem_interfaces.action import ExecuteBehavior
 
 from m2pem.api import (
@@ -171,7 +170,7 @@ class BehaviorActions:
             native_ref=sendable(record.native_ref or ""),
             remaining=record.remaining,
         )
-        goal.publish(ExecuteBehavior.Feedback(status=_written(status)))
+        goal.publish(ExecuteBehavior.Feedback(status=write_status(status)))
         return number + 1
 
     async def _records(self, run: RunId) -> list[r.Record]:
@@ -248,9 +247,5 @@ def _sendable(outputs: Mapping[str, Value]) -> dict[str, Value]:
     return kept
 
 
-def _written(status: Status) -> Any:
-    return write_status(msg.BehaviorStatus(), status, msg.KeyValue)
-
-
 def _result(status: Status) -> Any:
-    return ExecuteBehavior.Result(status=_written(status))
+    return ExecuteBehavior.Result(status=write_status(status))

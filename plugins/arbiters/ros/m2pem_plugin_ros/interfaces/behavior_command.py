@@ -10,7 +10,7 @@ from uuid import UUID
 from m2pem.api import BehaviorRequest, BehaviorSpec, ResolvedValue, ResourceId
 from m2pem.api.behavior_parameters import refusal
 from m2pem_plugin_ros.drivers.driver import Order
-from m2pem_plugin_ros.interfaces import set_stamp
+from m2pem_plugin_ros.interfaces import own_messages, set_stamp
 from m2pem_plugin_ros.interfaces.key_values import WireError, decode_parameters, encode_parameters
 
 
@@ -35,11 +35,6 @@ class Command:
     run: str
     epoch: int
 
-    @property
-    def of_vehicle(self) -> bool:
-        """Whether the command names no behavior."""
-        return self.verb in (Verb.HOLD, Verb.RESUME, Verb.CLAIM)
-
 
 def read_command(message: Any) -> Command:
     """Read a command.
@@ -51,10 +46,9 @@ def read_command(message: Any) -> Command:
         verb = Verb(message.verb)
     except ValueError:
         raise WireError(f"a command with the unknown verb {message.verb}") from None
-    asked = Command(verb, message.id, message.run, message.epoch)
-    if not asked.id and not asked.of_vehicle:
+    if not message.id and verb not in (Verb.HOLD, Verb.RESUME, Verb.CLAIM):
         raise WireError(f"a command to {verb.name} without an id")
-    return asked
+    return Command(verb, message.id, message.run, message.epoch)
 
 
 def read_parameters(message: Any) -> dict[str, ResolvedValue]:
@@ -116,7 +110,7 @@ def start_command(order: Order, now_us: int) -> Any:
     message.behavior = order.request.behavior
     message.parameters = _parameters(order.request.parameters)
     message.allocation = [
-        _interfaces().Allocation(role=role, resources=list(resources))
+        own_messages().Allocation(role=role, resources=list(resources))
         for role, resources in _roles(order.request).items()
     ]
     message.preempts = [str(goal) for goal in order.preempts]
@@ -137,13 +131,8 @@ def adjust_command(order: Order, parameters: Mapping[str, ResolvedValue], now_us
 def behavior_command(verb: int, order: Order, now_us: int, epoch: int = 0) -> Any:
     """Return a CANCEL or QUERY. `epoch` is that of the sending executive, if known. An order from
     before a restart has the epoch of its START."""
-    return _message(
-        verb,
-        now_us,
-        id=str(order.goal),
-        run=str(order.run),
-        epoch=max(epoch, order.request.epoch),
-    )
+    epoch = max(epoch, order.request.epoch)
+    return _message(verb, now_us, id=str(order.goal), run=str(order.run), epoch=epoch)
 
 
 def goal_command(verb: int, goal: UUID, now_us: int) -> Any:
@@ -165,17 +154,11 @@ def _roles(request: BehaviorRequest) -> Mapping[str, tuple[str, ...]]:
 
 
 def _parameters(parameters: Mapping[str, ResolvedValue]) -> list[Any]:
-    key_value = _interfaces().KeyValue
+    key_value = own_messages().KeyValue
     return [key_value(key=key, value=value) for key, value in encode_parameters(parameters)]
 
 
 def _message(verb: int, now_us: int, **fields: Any) -> Any:
-    message = _interfaces().BehaviorCommand(verb=verb, **fields)
+    message = own_messages().BehaviorCommand(verb=verb, **fields)
     set_stamp(message.stamp, now_us)
     return message
-
-
-def _interfaces() -> Any:
-    from m2pem_interfaces import msg  # noqa: PLC0415  # it needs ROS
-
-    return msg

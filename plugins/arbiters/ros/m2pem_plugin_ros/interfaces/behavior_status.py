@@ -1,10 +1,11 @@
 """m2pem_interfaces/msg/BehaviorStatus, read and written."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from m2pem.api import BehaviorState, Value
+from m2pem_plugin_ros.interfaces import own_messages
 from m2pem_plugin_ros.interfaces.key_values import WireError, decode_outputs, encode_outputs
 
 STATES: Mapping[int, BehaviorState] = {
@@ -73,15 +74,16 @@ def read_status(message: Any) -> Status:
     )
 
 
-def write_status(message: Any, status: Status, make_pair: Callable[..., Any]) -> Any:
-    """Fill a message, except for its stamp, and return it. `make_pair` makes a KeyValue of `key`
-    and `value`."""
-    message.id = status.id
-    message.number = status.number
-    message.state = CONSTANTS[status.state]
-    message.code = status.code
-    message.reason = status.reason
-    message.native_ref = status.native_ref
+def write_status(status: Status) -> Any:
+    """Return a message without a stamp."""
+    messages = own_messages()
     pairs = encode_outputs(status.outputs if status.remaining is None else status.remaining)
-    message.outputs = [make_pair(key=key, value=value) for key, value in pairs]
-    return message
+    return messages.BehaviorStatus(
+        id=status.id,
+        number=status.number,
+        state=CONSTANTS[status.state],
+        code=status.code,
+        reason=status.reason,
+        native_ref=status.native_ref,
+        outputs=[messages.KeyValue(key=key, value=value) for key, value in pairs],
+    )

@@ -6,6 +6,7 @@ A node that was built before there was this message refuses without it.
 from dataclasses import dataclass
 from typing import Any
 
+from m2pem_plugin_ros.interfaces import own_messages
 from m2pem_plugin_ros.interfaces.behavior_command import Command
 
 CODE = "STALE_EPOCH"
@@ -30,11 +31,14 @@ def read_refusal(message: Any) -> Refusal:
     return Refusal(message.run, message.newest if message.code == CODE else 0, message.reason)
 
 
-def write_refusal(message: Any, command: Command, newest: int) -> Any:
-    """Fill a message, except for its stamp, and return it."""
-    message.verb = int(command.verb)
-    message.id, message.run, message.epoch = command.id, command.run, command.epoch
-    message.newest = newest
-    message.code = CODE
-    message.reason = past_reason(command.epoch, newest)
-    return message
+def write_refusal(command: Command, newest: int) -> Any:
+    """Return a message without a stamp."""
+    return own_messages().CommandRefusal(
+        verb=int(command.verb),
+        id=command.id,
+        run=command.run,
+        epoch=command.epoch,
+        newest=newest,
+        code=CODE,
+        reason=past_reason(command.epoch, newest),
+    )

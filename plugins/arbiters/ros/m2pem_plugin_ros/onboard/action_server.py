@@ -4,7 +4,6 @@ import asyncio
 from collections import defaultdict
 from typing import Any, Protocol
 
-from m2pem_interfaces import msg as interfaces
 from m2pem_interfaces.action import ExecuteBehavior
 from rclpy.action import ActionServer, CancelResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
@@ -96,8 +95,7 @@ class BehaviorActionServer:
 
     async def _follow(self, handle: Any, queue: asyncio.Queue[Status]) -> Status:
         while (status := await queue.get()).state not in ENDS:
-            feedback = _written(status)
-            handle.publish_feedback(ExecuteBehavior.Feedback(status=feedback))
+            handle.publish_feedback(ExecuteBehavior.Feedback(status=write_status(status)))
         if status.state is BehaviorState.SUCCEEDED:
             handle.succeed()
         elif status.state is BehaviorState.CANCELLED and await self._is_canceling(handle):
@@ -120,9 +118,5 @@ def _key(handle: Any) -> bytes:
     return bytes(handle.goal_id.uuid)
 
 
-def _written(status: Status) -> Any:
-    return write_status(interfaces.BehaviorStatus(), status, interfaces.KeyValue)
-
-
 def _result(status: Status) -> Any:
-    return ExecuteBehavior.Result(status=_written(status))
+    return ExecuteBehavior.Result(status=write_status(status))

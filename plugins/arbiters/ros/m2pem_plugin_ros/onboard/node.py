@@ -66,9 +66,10 @@ class OnboardNode:
     `command`, `behavior_status`, `vehicle_status` and `execute_behavior` in `namespace`, and for a
     payload `payload_status`.
 
-    `vehicle`: its name in the fleet, or that of the payload. `make_driver` gets the `DriverEvents`
-    of this node. `bus` receives the states on `target`; it must be the bus of the driver's context.
-    `catalogue`: the behaviors of the driver. `payload_state` returns the state of the payload.
+    `vehicle`: its name in the fleet, or that of the payload. `make_driver` gets this
+    node as `DriverEvents`. `bus` receives the states on `target`; it must be the bus of the
+    driver's context. `catalogue`: the behaviors of the driver. `payload_state` returns the state of
+    the payload.
     `epochs`: those of the runs; with a file, past executives are refused after a restart, too.
     `node`: serves on this node, which stays at the end; else on one of its own. `inactive`: why it
     obeys no START; "" if it does. `standstill` returns why the clock stands, "" if it does not.
@@ -114,7 +115,7 @@ class OnboardNode:
         self._node: Any = node
         self._owns_node = node is None
         self._goals: BehaviorActionServer | None = None
-        self._driver = make_driver(_Events(self))
+        self._driver = make_driver(self)
 
     # --- life -----------------------------------------------------------------------------------
 
@@ -251,9 +252,7 @@ class OnboardNode:
             reason = self._refusal(request)
         except WireError as error:
             reason = str(error)
-        except (
-            Exception
-        ) as error:  # an error of the driver must not leave a START without an answer
+        except Exception as error:  # a START must not remain without an answer
             self._logger.exception("%s: %s", self._name, message.behavior)
             reason = f"internal error of the driver: {error!r}"
         if reason:
@@ -400,17 +399,6 @@ class OnboardNode:
         tasks = [asyncio.ensure_future(each) for each in waits]
         await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         await cancel_and_wait(*tasks)
-
-
-class _Events:
-    """The part of the node that its driver may use."""
-
-    def __init__(self, node: OnboardNode) -> None:
-        self.alive = node.alive
-        self.progress = node.progress
-        self.remains = node.remains
-        self.ended = node.ended
-        self.superseded = node.superseded
 
 
 def _goal(id_: str) -> UUID:

@@ -65,14 +65,12 @@ class StatusPublisher:
     def behavior(self, status: Status) -> None:
         """Publish the status of a behavior."""
         if self._behaviors is not None:
-            message = write_status(interfaces.BehaviorStatus(), status, interfaces.KeyValue)
-            self._publish(self._behaviors, message)
+            self._publish(self._behaviors, write_status(status))
 
     def refusal(self, command: Command, newest: int) -> None:
         """Publish that a command is refused, as `newest` is the epoch of its run."""
         if self._refusals is not None:
-            message = write_refusal(interfaces.CommandRefusal(), command, newest)
-            self._publish(self._refusals, message)
+            self._publish(self._refusals, write_refusal(command, newest))
 
     def vehicle(self) -> None:
         """Publish the status of the vehicle."""
