@@ -13,7 +13,6 @@ from m2pem_plugin_ros.behaviors.motion_state import (
     MotionState,
     Place,
     RefusedError,
-    Target,
     angle_between,
     direction_to,
     point_beyond,
@@ -62,20 +61,17 @@ class Follow(Motion):
         if target is None or not target.age_s <= TARGET_SILENT_S:
             reason = f"{self.target} has sent no position for {TARGET_SILENT_S:g} s"
             return Ending(BehaviorState.FAILED, "", reason)
-        place = _now_at(target)
-        course_rad, speed = _motion(target)
-        desired = self._towards(state, target, place, course_rad, speed)
-        return self._clear(state, desired, place, speed)
-
-    def _towards(
-        self, state: MotionState, target: Target, place: Place, course_rad: float, speed: float
-    ) -> DesiredMotion:
+        place = target.place
+        speed = math.hypot(target.east_m_s, target.north_m_s)
         station = point_beyond(place, target.pose.yaw_rad - self._bearing_rad, self._offset_m)
         if speed < STANDING_M_S:
-            return self._to_rest(state, station)
-        self._in_position = False
-        self._approach = None
-        return self._keep_up(state, station, course_rad, speed)
+            desired = self._to_rest(state, station)
+        else:
+            self._in_position = False
+            self._approach = None
+            course_rad = math.atan2(target.north_m_s, target.east_m_s)
+            desired = self._keep_up(state, station, course_rad, speed)
+        return self._clear(state, desired, place, speed)
 
     def _clear(
         self, state: MotionState, desired: DesiredMotion, place: Place, speed: float
@@ -128,16 +124,3 @@ class Follow(Motion):
             return STANDSTILL  # the base is ahead of its position: wait
         point = point_beyond(station, course_rad, ahead_m)
         return self._steering.towards(state, point, wanted)
-
-
-def _now_at(target: Target) -> Place:
-    return (
-        target.pose.east_m + target.east_m_s * target.age_s,
-        target.pose.north_m + target.north_m_s * target.age_s,
-    )
-
-
-def _motion(target: Target) -> tuple[float, float]:
-    """Return the target's course and its speed over ground."""
-    speed = math.hypot(target.east_m_s, target.north_m_s)
-    return math.atan2(target.north_m_s, target.east_m_s), speed

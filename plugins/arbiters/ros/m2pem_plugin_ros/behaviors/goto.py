@@ -109,12 +109,7 @@ class Goto(Motion):
         if self.places:
             return self.places[0]
         target = state.target
-        if target is None or not target.age_s <= TARGET_SILENT_S:
-            return None
-        return (
-            target.pose.east_m + target.east_m_s * target.age_s,
-            target.pose.north_m + target.north_m_s * target.age_s,
-        )
+        return target.place if target is not None and target.age_s <= TARGET_SILENT_S else None
 
     def _aims(self) -> bool:
         return self._yaw_rad is not None and self.bounds.turn_radius_m > 0

@@ -19,6 +19,12 @@ class Target:
     north_m_s: float = 0.0
     age_s: float = 0.0
 
+    @property
+    def place(self) -> "Place":
+        """Where it is by now, at its velocity."""
+        east_m = self.pose.east_m + self.east_m_s * self.age_s
+        return east_m, self.pose.north_m + self.north_m_s * self.age_s
+
 
 @dataclass(frozen=True, slots=True)
 class Observation:

@@ -54,13 +54,10 @@ class LocalParameters(BehaviorParameters):
         return self._place("target", target.position[0], target.position[1])
 
     def _place(self, parameter: str, latitude_deg: float, longitude_deg: float) -> Place:
-        if not math.isfinite(latitude_deg + longitude_deg):
-            raise RefusedError(
-                f"parameter '{parameter}': [{latitude_deg}, {longitude_deg}] is not a position"
-            )
-        place = self._level(latitude_deg, longitude_deg)
-        if not math.isfinite(place[0] + place[1]):
-            raise RefusedError(
-                f"parameter '{parameter}': [{latitude_deg}, {longitude_deg}] is not a position"
-            )
-        return place
+        if math.isfinite(latitude_deg + longitude_deg):
+            place = self._level(latitude_deg, longitude_deg)
+            if math.isfinite(place[0] + place[1]):
+                return place
+        raise RefusedError(
+            f"parameter '{parameter}': [{latitude_deg}, {longitude_deg}] is not a position"
+        )

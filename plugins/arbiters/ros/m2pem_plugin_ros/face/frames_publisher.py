@@ -11,7 +11,7 @@ from collections import deque
 from typing import Any
 
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from tf2_msgs.msg import TFMessage
 
 from m2pem.api import LocalFrame, ResourceId, VehicleState
@@ -22,20 +22,9 @@ from m2pem_plugin_ros.face.publisher import publishers_of
 from m2pem_plugin_ros.face.rate_limiter import RateLimiter
 from m2pem_plugin_ros.face.vehicle_topics import VehicleTopics
 from m2pem_plugin_ros.frames import Quaternion
-from m2pem_plugin_ros.runtime import RosRuntime
+from m2pem_plugin_ros.runtime import RosRuntime, qos
 
 TF = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
-TF_STATIC = QoSProfile(
-    depth=1,
-    reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.TRANSIENT_LOCAL,
-)
-OF_OTHERS = QoSProfile(
-    depth=100,
-    reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.TRANSIENT_LOCAL,
-)
-"""As listeners of tf subscribe to /tf_static: several nodes latch one message each."""
 
 SENT = 100
 """Stamps that were sent of each frame are remembered, to tell our own transforms from those of
@@ -62,7 +51,7 @@ class FramesPublisher:
         self._names = names
         self._now_us = now_us
         self._publisher = self._node.create_publisher(TFMessage, "/tf", TF)
-        self._static = self._node.create_publisher(TFMessage, "/tf_static", TF_STATIC)
+        self._static = self._node.create_publisher(TFMessage, "/tf_static", qos.STATUS)
         self._topics: dict[ResourceId, VehicleTopics] = {}
         self._children: set[str] = set()
         """The frames `base_link` of the vehicles."""
@@ -110,12 +99,12 @@ class FramesPublisher:
         is_alone = self._node.count_publishers(self._publisher.topic_name) <= 1
         has_readers = self._publisher.get_subscription_count() > own
         self._is_wanted = has_readers and (is_alone or self._listened >= LISTENED)
-        for topic, hear, qos in (
+        for topic, hear, quality in (
             ("/tf", self._hear, TF),
-            ("/tf_static", self._hear_static, OF_OTHERS),
+            ("/tf_static", self._hear_static, qos.STATIC_TRANSFORMS),
         ):
             if topic not in self._subscriptions and self._node.count_publishers(topic) > 1:
-                self._subscriptions[topic] = self._ros.subscribe(TFMessage, topic, hear, qos)
+                self._subscriptions[topic] = self._ros.subscribe(TFMessage, topic, hear, quality)
 
     def close(self) -> None:
         """Publish nothing more."""

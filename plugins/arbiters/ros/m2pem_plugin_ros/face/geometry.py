@@ -2,7 +2,7 @@
 
 import math
 
-from m2pem_plugin_ros.frames import Quaternion
+from m2pem_plugin_ros.frames import Quaternion, rotated
 
 Vector = tuple[float, float, float]
 
@@ -25,14 +25,7 @@ def quaternion_of(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Quaterni
 
 def rotated_back(vector: Vector, q: Quaternion) -> Vector:
     """Return a vector of ENU in the frame of a vehicle whose rotation is `q`."""
-    x, y, z = vector
-    qx, qy, qz, w = -q.x, -q.y, -q.z, q.w
-    tx, ty, tz = 2 * (qy * z - qz * y), 2 * (qz * x - qx * z), 2 * (qx * y - qy * x)
-    return (
-        x + w * tx + qy * tz - qz * ty,
-        y + w * ty + qz * tx - qx * tz,
-        z + w * tz + qx * ty - qy * tx,
-    )
+    return rotated(vector, Quaternion(-q.x, -q.y, -q.z, q.w))
 
 
 def earth_from_enu(latitude_deg: float, longitude_deg: float) -> Quaternion:

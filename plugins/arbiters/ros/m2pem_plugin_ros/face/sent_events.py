@@ -5,7 +5,7 @@ import logging
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from m2pem.api import Fields, MissionControl, RunId, ThrownEvents
 from m2pem.errors import M2pemError, OperatorError
@@ -16,12 +16,12 @@ from m2pem_plugin_ros.interfaces.fill_fields import fill
 from m2pem_plugin_ros.interfaces.messages import time_of
 from m2pem_plugin_ros.interfaces.plain_values import MessageFields
 from m2pem_plugin_ros.interfaces.texts import one_line
-from m2pem_plugin_ros.runtime import RosRuntime
+from m2pem_plugin_ros.runtime import RosRuntime, qos
 
 DISCOVERY_S = 3.0
 """A subscriber may need that to be found, after the face has begun."""
 LOOK_EVERY_S = 0.02
-DEPTH = 100
+NOT_LATCHED = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 MOST_CALLS = 100
 """Calls that wait for an answer."""
 LONGEST = 300
@@ -54,7 +54,7 @@ class SentEvents:
             if isinstance(each, SentTopic):
                 key = _key(each)
                 if key not in self._publishers:
-                    quality = _quality(latched=each.latched)
+                    quality = qos.STATUS if each.latched else NOT_LATCHED
                     made = self._node.create_publisher(each.type, each.topic, quality)
                     self._publishers[key] = made
             elif (each.service, each.type_name) not in self._clients:
@@ -140,14 +140,6 @@ class SentEvents:
 
 def _key(sent: SentTopic) -> tuple[str, str, bool]:
     return sent.topic, sent.type_name, sent.latched
-
-
-def _quality(*, latched: bool) -> QoSProfile:
-    return QoSProfile(
-        depth=1 if latched else DEPTH,
-        reliability=ReliabilityPolicy.RELIABLE,
-        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
-    )
 
 
 def _said(response: Any) -> str:

@@ -3,18 +3,16 @@
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
-STATUS = QoSProfile(
-    depth=1,
-    reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.TRANSIENT_LOCAL,
-)
+
+def _latched(depth: int) -> QoSProfile:
+    latched = DurabilityPolicy.TRANSIENT_LOCAL
+    return QoSProfile(depth=depth, reliability=ReliabilityPolicy.RELIABLE, durability=latched)
+
+
+STATUS = _latched(1)
 """A late subscriber gets the last message: vehicle_status, status, prompts, active_elements."""
 
-BEHAVIOR_STATUS = QoSProfile(
-    depth=10,
-    reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.TRANSIENT_LOCAL,
-)
+BEHAVIOR_STATUS = _latched(10)
 """A late subscriber gets the last ten, as they are of several behaviors."""
 
 COMMANDS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
@@ -32,11 +30,7 @@ TELEMETRY = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
 TRANSFORMS = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
 """For /tf. A reliable reader never matches a best-effort writer; this one matches both."""
 
-STATIC_TRANSFORMS = QoSProfile(
-    depth=100,
-    reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.TRANSIENT_LOCAL,
-)
+STATIC_TRANSFORMS = _latched(100)
 """For /tf_static: a late subscriber gets the last message of each publisher."""
 
 SERVICES = QoSProfile(depth=2000, reliability=ReliabilityPolicy.RELIABLE)

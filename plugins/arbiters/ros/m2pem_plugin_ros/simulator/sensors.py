@@ -118,7 +118,7 @@ class Battery:
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """Something that a detector can find, in the local frame of the fleet."""
+    """Something that a detector can find, or has found, in the local frame of the fleet."""
 
     type: str
     east_m: float
@@ -138,15 +138,6 @@ class DetectorSpec:
     plain: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class Found:
-    """A detection: its type, and its position in the local frame."""
-
-    type: str
-    east_m: float
-    north_m: float
-
-
 class Detector:
     """Finds each target within its range once."""
 
@@ -159,7 +150,7 @@ class Detector:
         """The number of targets that were not found yet."""
         return len(self._hidden)
 
-    def find(self, pose: Pose) -> Iterator[Found]:
+    def find(self, pose: Pose) -> Iterator[Target]:
         """Yield the targets within the range."""
         if not self._hidden:
             return
@@ -167,4 +158,4 @@ class Detector:
             distance_m = math.hypot(target.east_m - pose.east_m, target.north_m - pose.north_m)
             if distance_m <= self.spec.range_m:
                 self._hidden.remove(target)
-                yield Found(target.type, target.east_m, target.north_m)
+                yield target

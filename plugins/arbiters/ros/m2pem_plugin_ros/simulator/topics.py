@@ -19,7 +19,7 @@ from m2pem_plugin_ros.pose import Twist
 from m2pem_plugin_ros.runtime import qos
 from m2pem_plugin_ros.settings import FixAltitude, OdomFrame
 from m2pem_plugin_ros.simulator.faults import TrafficFaults
-from m2pem_plugin_ros.simulator.sensors import Detector, Found, Reading
+from m2pem_plugin_ros.simulator.sensors import Detector, Reading, Target
 from m2pem_plugin_ros.simulator.traffic import FilteredRuntime
 from m2pem_plugin_ros.simulator.transforms import Transforms
 from m2pem_plugin_ros.simulator.vehicle import Vehicle
@@ -154,7 +154,7 @@ class BaseTopics:
         self._stamp(message.header, "")
         self._diagnostics.publish(message)
 
-    def _publish_detection(self, detector: Detector, found: Found) -> None:
+    def _publish_detection(self, detector: Detector, found: Target) -> None:
         spec, origin = detector.spec, self._vehicle.spec.origin
         publisher = self._detections[spec.topic, spec.plain]
         if spec.plain:

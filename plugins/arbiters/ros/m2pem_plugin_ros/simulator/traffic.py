@@ -6,7 +6,6 @@ A node on board gets a `FilteredRuntime` in place of the `RosRuntime`.
 
 import itertools
 from collections import deque
-from collections.abc import Callable
 from typing import Any
 
 from m2pem_interfaces.msg import BehaviorCommand, BehaviorStatus
@@ -72,12 +71,7 @@ class FilteredNode:
         )
 
     def create_subscription(
-        self,
-        message_type: Any,
-        topic: str,
-        callback: Callable[[Any], None],
-        *arguments: Any,
-        **options: Any,
+        self, message_type: Any, topic: str, callback: Any, *arguments: Any, **options: Any
     ) -> Any:
         traffic_filter, name = self._traffic_filter, leaf(topic)
 
@@ -117,19 +111,9 @@ class FilteredRuntime:
             self._made.remove(node.inner)
             self._ros.drop_node(node.inner)
 
-    def subscribe(
-        self,
-        message_type: Any,
-        topic: str,
-        callback: Callable[[Any], None],
-        qos: Any,
-        *,
-        node: Any = None,
-        **options: Any,
-    ) -> Any:
+    def subscribe(self, *arguments: Any, node: Any = None, **options: Any) -> Any:
         """Subscribe as `RosRuntime.subscribe`; without a node, on the own node."""
-        node = node or self.node
-        return self._ros.subscribe(message_type, topic, callback, qos, node=node, **options)
+        return self._ros.subscribe(*arguments, node=node or self.node, **options)
 
     def client(self, service_type: Any, name: str, *, node: Any = None) -> Any:
         """Make a client as `RosRuntime.client`; without a node, on the own node."""

@@ -8,7 +8,7 @@ from m2pem.api import GeoPosition
 from m2pem_plugin_ros.frames import to_geodetic
 from m2pem_plugin_ros.pose import Pose, Twist
 from m2pem_plugin_ros.simulator.dynamics import Dynamics
-from m2pem_plugin_ros.simulator.sensors import LOW_FRACTION, Battery, Detector, Found, Odometer
+from m2pem_plugin_ros.simulator.sensors import LOW_FRACTION, Battery, Detector, Odometer, Target
 from m2pem_plugin_ros.simulator.specification import VehicleSpec
 
 STEP_S = 0.02
@@ -28,7 +28,7 @@ class Vehicle:
         self.battery = Battery(spec.capacity, spec.battery)
         self.detectors = tuple(Detector(each) for each in spec.detectors)
         self._steps = 0
-        self._found: list[tuple[Detector, Found]] = []
+        self._found: list[tuple[Detector, Target]] = []
 
     @property
     def position(self) -> GeoPosition:
@@ -83,10 +83,10 @@ class Vehicle:
         names = {each.spec.payload.rpartition("/")[2]: each for each in self.detectors}
         detector, kind = names.get(what, self.detectors[0]), "" if what in names else what
         pose = self.body.pose
-        found = Found(kind or detector.spec.type, pose.east_m, pose.north_m)
+        found = Target(kind or detector.spec.type, pose.east_m, pose.north_m)
         self._found.append((detector, found))
 
-    def detections(self) -> Iterator[tuple[Detector, Found]]:
+    def detections(self) -> Iterator[tuple[Detector, Target]]:
         """Yield the detections since the last call."""
         while self._found:
             yield self._found.pop(0)
