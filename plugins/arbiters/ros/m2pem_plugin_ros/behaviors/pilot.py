@@ -65,10 +65,12 @@ class Pilot:
         self._gate = PoseFilter(max(bounds.speed_m_s, bounds.reverse_m_s))
         self._stuck = StuckMonitor()
         self._fence = FenceMonitor(outside_m or (lambda _: 0.0))
-        self._goal: UUID | None = None
-        self._motion: Motion | None = None
+        self.goal: UUID | None = None
+        """The goal that the base is driven for, or is being stopped for."""
+        self.motion: Motion | None = None
         self._ending: Ending | None = None
-        self._held = False
+        self.held = False
+        """Whether the base stands until `resume`."""
         self._desired = STANDSTILL
         self._stopping_s = 0.0
         self._still_s = 0.0
@@ -79,35 +81,21 @@ class Pilot:
     # --- requests -------------------------------------------------------------------------------
 
     @property
-    def goal(self) -> UUID | None:
-        """The goal that the base is driven for, or is being stopped for."""
-        return self._goal
-
-    @property
-    def motion(self) -> Motion | None:
-        return self._motion
-
-    @property
     def target(self) -> str:
         """The vehicle whose state the motion needs, or ""."""
-        return self._motion.target if self._motion is not None else ""
-
-    @property
-    def held(self) -> bool:
-        """Whether the base stands until `resume`."""
-        return self._held
+        return self.motion.target if self.motion is not None else ""
 
     @property
     def busy(self) -> bool:
         """Whether the pilot publishes commands."""
-        return self._goal is not None or self._quiet_s < QUIET_S
+        return self.goal is not None or self._quiet_s < QUIET_S
 
     # --- commands -------------------------------------------------------------------------------
 
     def begin(self, goal: UUID, motion: Motion) -> None:
         """Start a motion in place of the current one, without a stop in between."""
-        self._goal, self._motion, self._ending = goal, motion, None
-        self._held = False
+        self.goal, self.motion, self._ending = goal, motion, None
+        self.held = False
         self._desired = STANDSTILL
         self._driven_from = None
         self._fence.reset()
@@ -115,39 +103,39 @@ class Pilot:
 
     def end(self, goal: UUID) -> None:
         """Stop the motion of a goal. The ending is reported when the base stands."""
-        if goal == self._goal and self._ending is None:
+        if goal == self.goal and self._ending is None:
             self._end_with(Ending(BehaviorState.CANCELLED))
 
     def stop_for(self, goal: UUID) -> None:
         """Stop a base that may still move for a goal that was dropped. The ending is reported when
         it stands."""
-        self._goal, self._motion, self._held = goal, None, False
+        self.goal, self.motion, self.held = goal, None, False
         self._end_with(Ending(BehaviorState.CANCELLED))
 
     def fail(self, reason: str) -> None:
         """Stop the base, and let its goal fail."""
-        if self._goal is not None and self._ending is None:
+        if self.goal is not None and self._ending is None:
             self._end_with(Ending(BehaviorState.FAILED, "", reason))
 
     def hold(self) -> None:
         """Stop the base. The motion keeps its progress."""
-        self._held = True
+        self.held = True
         self._resume_publishing()
 
     def resume(self) -> None:
         """Continue the motion."""
-        self._held = False
+        self.held = False
         self._resume_publishing()
 
     def adjust(self, parameters: LocalParameters) -> None:
         """Change parameters of the motion."""
-        if self._motion is not None:
-            self._motion.adjust(parameters)
+        if self.motion is not None:
+            self.motion.adjust(parameters)
 
     def drop(self) -> None:
         """Publish and report nothing more."""
-        self._goal = self._motion = self._ending = None
-        self._held = False
+        self.goal = self.motion = self._ending = None
+        self.held = False
         self._limiter.halt()
         self._quiet_s = QUIET_S
 
@@ -156,7 +144,7 @@ class Pilot:
     def step(self, seen: Observation) -> Step:
         """Return the command, and how the motion has ended, if it has."""
         dt_s = self._passed(seen.now_s)
-        idle = self._goal is None or self._held
+        idle = self.goal is None or self.held
         pose = None
         if seen.age_s <= STALE_S:  # False for NaN
             pose = self._gate.pose(seen.pose, seen.now_s - seen.age_s, strict=not idle)
@@ -181,8 +169,8 @@ class Pilot:
     def _desired_motion(
         self, seen: Observation, pose: Pose, twist: Twist | None, stands: bool, dt_s: float
     ) -> DesiredMotion:
-        motion = self._motion
-        if motion is None or self._held or self._ending is not None:
+        motion = self.motion
+        if motion is None or self.held or self._ending is not None:
             return STANDSTILL
         if self._gate.doubts:  # outside the fence no motion ends or begins
             return self._desired
@@ -217,8 +205,8 @@ class Pilot:
             motion.found_at(position_of(pose), moved)
 
     def _check_stuck(self, pose: Pose, command: Twist, desired: DesiredMotion, dt_s: float) -> None:
-        steered = self._motion is not None and self._motion.steered
-        if not steered or self._held or self._ending is not None or not desired.moves:
+        steered = self.motion is not None and self.motion.steered
+        if not steered or self.held or self._ending is not None or not desired.moves:
             self._stuck.reset()
         elif self._stuck.stuck(pose, command, dt_s):
             reason = f"it was commanded to move for {STUCK_S:g} s, and has not moved"
@@ -230,7 +218,7 @@ class Pilot:
         silent = self._quiet_s >= QUIET_S
         self._quiet_s = self._quiet_s + dt_s if zero else 0.0
         twist = None if silent and zero else command
-        goal, ending = self._goal, self._ending
+        goal, ending = self.goal, self._ending
         if ending is None:
             return Step(twist)
         self._stopping_s += dt_s
@@ -241,7 +229,7 @@ class Pilot:
             if ending.state in (BehaviorState.CANCELLED, BehaviorState.SUCCEEDED):
                 reason = f"it has not stopped {bound:g} s after the command to stop"
                 ending = Ending(BehaviorState.FAILED, "TIMEOUT", reason)
-        self._goal = self._motion = self._ending = None
+        self.goal = self.motion = self._ending = None
         return Step(twist, goal, ending)
 
     def _stands(self, twist: Twist | None) -> bool:

@@ -101,25 +101,21 @@ STANDSTILL_M_S = 1e-6
 
 
 class VelocityLimiter:
-    """Makes commands of desired motions, within the bounds and the acceleration of the base."""
+    """Makes commands of desired motions, within the bounds and the acceleration of the base.
+    `speed_m_s`: the last commanded speed."""
 
     def __init__(self, bounds: Bounds) -> None:
         self._bounds = bounds
-        self._speed_m_s = 0.0
-
-    @property
-    def speed_m_s(self) -> float:
-        """The last commanded speed."""
-        return self._speed_m_s
+        self.speed_m_s = 0.0
 
     def halt(self) -> Twist:
         """Return the zero command at once. It is used when the state of the base is not known."""
-        self._speed_m_s = 0.0
+        self.speed_m_s = 0.0
         return Twist()
 
     def moved_by_others(self, speed_m_s: float) -> None:
         """Set the speed of a base that is not commanded here. The next command starts from it."""
-        self._speed_m_s = self._within(speed_m_s)
+        self.speed_m_s = self._within(speed_m_s)
 
     def command(self, desired: DesiredMotion, dt_s: float) -> Twist:
         """Return the possible command nearest to the desired motion, `dt_s` after the last one."""
@@ -127,10 +123,10 @@ class VelocityLimiter:
             return self.halt()
         bounds = self._bounds
         change = bounds.acceleration_m_s2 * dt_s
-        wanted = self._within(desired.speed_m_s) - self._speed_m_s
-        self._speed_m_s = speed = self._speed_m_s + max(-change, min(change, wanted))
+        wanted = self._within(desired.speed_m_s) - self.speed_m_s
+        self.speed_m_s = speed = self.speed_m_s + max(-change, min(change, wanted))
         if abs(speed) < STANDSTILL_M_S and desired.speed_m_s == 0.0:
-            self._speed_m_s = speed = 0.0
+            self.speed_m_s = speed = 0.0
         return Twist(forward_m_s=speed, yaw_rad_s=self._yaw_rate(desired, speed))
 
     def _within(self, speed_m_s: float) -> float:

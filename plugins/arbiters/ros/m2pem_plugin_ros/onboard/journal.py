@@ -20,12 +20,8 @@ class BehaviorJournal:
         self._publish_status = publish
         self._last: dict[str, Status] = {}
         self._epochs = EpochFence() if epochs is None else epochs
-        self._current = ""
-
-    @property
-    def current(self) -> str:
+        self.current = ""
         """The id of the current behavior, or ""."""
-        return self._current
 
     def last(self, id_: str) -> Status:
         """Return the last status; UNKNOWN with number 0 if there is none."""
@@ -54,7 +50,7 @@ class BehaviorJournal:
 
     def accept(self, id_: str) -> None:
         """Accept a behavior. It replaces the current one, which is cancelled."""
-        before, self._current = self._current, id_
+        before, self.current = self.current, id_
         if before:
             number = self._last[before].number + 1
             reason = f"{id_} has replaced it"
@@ -63,13 +59,13 @@ class BehaviorJournal:
 
     def progress(self, id_: str) -> None:
         """Publish RUNNING once."""
-        if id_ == self._current and self._last[id_].state is BehaviorState.ACCEPTED:
+        if id_ == self.current and self._last[id_].state is BehaviorState.ACCEPTED:
             self._note(Status(id_, 2, BehaviorState.RUNNING))
 
     def remains(self, id_: str, remaining: Mapping[str, Value]) -> None:
         """Publish what is left of the current behavior, where that has changed."""
         last = self._last.get(id_)
-        if last is None or id_ != self._current or last.state is not BehaviorState.RUNNING:
+        if last is None or id_ != self.current or last.state is not BehaviorState.RUNNING:
             return
         if last.remaining != remaining:
             self._note(replace(last, number=last.number + 1, remaining=dict(remaining)))
@@ -83,8 +79,8 @@ class BehaviorJournal:
         outputs: Mapping[str, Value] | None = None,
     ) -> None:
         """End the current behavior. An id that is not current is ignored."""
-        if id_ and id_ == self._current:
-            self._current = ""
+        if id_ and id_ == self.current:
+            self.current = ""
             number = self._last[id_].number + 1
             self._note(Status(id_, number, state, code, reason, outputs=outputs or {}))
 
@@ -92,5 +88,5 @@ class BehaviorJournal:
         self._last.pop(status.id, None)
         self._last[status.id] = status
         if len(self._last) > REMEMBERED:
-            del self._last[next(id_ for id_ in self._last if id_ != self._current)]
+            del self._last[next(id_ for id_ in self._last if id_ != self.current)]
         self._publish_status(status)

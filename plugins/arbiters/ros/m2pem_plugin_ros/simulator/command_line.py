@@ -4,7 +4,7 @@ import asyncio
 from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -27,9 +27,6 @@ from m2pem_plugin_ros.simulator.faults import DRIVER_TEXTS, GRAMMAR, FaultTarget
 from m2pem_plugin_ros.simulator.fleet import make_default_vehicles
 from m2pem_plugin_ros.simulator.sensors import Target
 from m2pem_plugin_ros.simulator.specification import FORT, SettingError, VehicleSpec
-
-if TYPE_CHECKING:
-    pass
 
 MOST = 100
 """Vehicles in one process; 20 are moderate, see docs/ros-simulation.md."""

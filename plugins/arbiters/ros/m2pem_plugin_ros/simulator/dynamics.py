@@ -40,21 +40,12 @@ class Dynamics:
         self.stuck = False
         self.motions = 0
         self.driven_m = 0.0
-        self._twist = Twist()
+        self.twist = Twist()
         self._command = Twist()
         self._commanded_s = -math.inf
         self._wanted = Twist()
-        self._stands = True
-
-    @property
-    def twist(self) -> Twist:
-        """In the frame of the base."""
-        return self._twist
-
-    @property
-    def stands(self) -> bool:
+        self.stands = True
         """Whether the base neither moves nor is commanded to."""
-        return self._stands
 
     def command(self, twist: Twist, now_s: float) -> None:
         """Process a command. Commands that are not finite are ignored."""
@@ -64,15 +55,15 @@ class Dynamics:
     def step(self, now_s: float, dt_s: float) -> None:
         """Advance by `dt_s` to `now_s`."""
         requested = self._requested_twist(now_s)
-        if self._stands:
+        if self.stands:
             if not _moves(requested):
                 return
-            self._stands = False
+            self.stands = False
             self.motions += 1
         self._follow(requested, dt_s)
         self._move(dt_s)
-        if not (_moves(requested) or _moves(self._twist) or _moves(self._wanted)):
-            self._stands, self._twist, self._wanted = True, Twist(), Twist()
+        if not (_moves(requested) or _moves(self.twist) or _moves(self._wanted)):
+            self.stands, self.twist, self._wanted = True, Twist(), Twist()
 
     def _requested_twist(self, now_s: float) -> Twist:
         """Return the bounded command; zero if it is old, or the wheels are stuck."""
@@ -93,19 +84,19 @@ class Dynamics:
             _lagged(self._wanted.yaw_rad_s, requested.yaw_rad_s, share),
         )
         forward = _towards(
-            self._twist.forward_m_s, self._wanted.forward_m_s, chassis.acceleration_m_s2 * dt_s
+            self.twist.forward_m_s, self._wanted.forward_m_s, chassis.acceleration_m_s2 * dt_s
         )
         yaw = _towards(
-            self._twist.yaw_rad_s, self._wanted.yaw_rad_s, chassis.yaw_acceleration_rad_s2 * dt_s
+            self.twist.yaw_rad_s, self._wanted.yaw_rad_s, chassis.yaw_acceleration_rad_s2 * dt_s
         )
         if chassis.turn_radius_m > 0:
             most = abs(forward) / chassis.turn_radius_m
             yaw = _within(-most, yaw, most)
-        self._twist = Twist(forward, yaw)
+        self.twist = Twist(forward, yaw)
 
     def _move(self, dt_s: float) -> None:
-        self.pose = moved(self.pose, self._twist, dt_s)
-        self.driven_m += abs(self._twist.forward_m_s) * dt_s
+        self.pose = moved(self.pose, self.twist, dt_s)
+        self.driven_m += abs(self.twist.forward_m_s) * dt_s
 
 
 def moved(pose: Pose, twist: Twist, dt_s: float) -> Pose:

@@ -167,8 +167,8 @@ class SimulatedLocalization:
 
     def __init__(self, spec: VehicleSpec, clock: Clock) -> None:
         self._spec, self._clock = spec, clock
-        self._pose: Pose | None = None
-        self._twist: Twist | None = None
+        self.pose: Pose | None = None
+        self.twist: Twist | None = None
         self._stamp_us = -1
         self._received_us: int | None = None
 
@@ -177,25 +177,17 @@ class SimulatedLocalization:
         pose = reading.pose
         if reading.time_us <= self._stamp_us or not math.isfinite(pose.east_m + pose.yaw_rad):
             return
-        self._pose = self._in_map(pose)
-        self._twist = reading.twist
+        self.pose = self._in_map(pose)
+        self.twist = reading.twist
         self._stamp_us = reading.time_us
         self._received_us = self._clock.now_us()
 
     @property
-    def pose(self) -> Pose | None:
-        return self._pose
-
-    @property
-    def twist(self) -> Twist | None:
-        return self._twist
-
-    @property
     def position(self) -> GeoPosition | None:
-        if self._pose is None:
+        if self.pose is None:
             return None
         origin = self._spec.origin
-        place = to_geodetic(self._pose.east_m, self._pose.north_m, 0.0, origin)
+        place = to_geodetic(self.pose.east_m, self.pose.north_m, 0.0, origin)
         return GeoPosition(place.latitude_deg, place.longitude_deg, origin[2])
 
     @property

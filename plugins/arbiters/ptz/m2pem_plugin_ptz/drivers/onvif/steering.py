@@ -161,7 +161,8 @@ class Steering:
     def __init__(self, reach: Reach, *, turns: bool = True, drives: bool = True) -> None:
         self.target = MovingTarget(reach)
         self._turns, self._drives = turns, drives
-        self._lag_s = FIRST_LAG_S
+        self.lag_s = FIRST_LAG_S
+        """The duration of a call."""
         self._seen: tuple[float, Pair] | None = None
         self._driven: deque[tuple[float, Pair]] = deque([(-math.inf, (0.0, 0.0))])
         self._turn: AbsoluteMove | None = None
@@ -176,11 +177,6 @@ class Steering:
         """Whether the camera was commanded repeatedly and does not turn."""
         return self._agains >= STUCK
 
-    @property
-    def lag_s(self) -> float:
-        """The duration of a call."""
-        return self._lag_s
-
     def observe(self, pan_rad: float, tilt_rad: float, at_s: float) -> None:
         """Process the direction of the camera at a time."""
         if self._seen is not None:
@@ -191,7 +187,7 @@ class Steering:
 
     def measure_call(self, seconds: float) -> None:
         """Process the duration of the last call."""
-        self._lag_s += 0.2 * (min(seconds, 2.0) - self._lag_s)
+        self.lag_s += 0.2 * (min(seconds, 2.0) - self.lag_s)
 
     def sent(self, move: AbsoluteMove | ContinuousMove, at_s: float) -> None:
         """Process a command that takes effect at a time."""
@@ -217,7 +213,7 @@ class Steering:
         request = self.target.request
         if request is None:
             return None
-        effect_s = now_s + TAKES_EFFECT * self._lag_s
+        effect_s = now_s + TAKES_EFFECT * self.lag_s
         target, velocity = self.target.at(effect_s, now_s), self.target.velocity(now_s)
         moving = max(map(abs, velocity)) > STANDS_RAD_S
         if self._seen is None:
@@ -270,7 +266,7 @@ class Steering:
     def _continuous_move(
         self, error: Pair, velocity: Pair, rate_rad_s: float, now_s: float
     ) -> ContinuousMove:
-        share = 1.0 / max(SHARE_S, LAGS * self._lag_s)
+        share = 1.0 / max(SHARE_S, LAGS * self.lag_s)
         seconds, self._bias_s = min(now_s - self._bias_s, 0.5), now_s
         driven = []
         learned = []

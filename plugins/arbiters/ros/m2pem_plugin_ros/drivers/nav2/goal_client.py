@@ -42,7 +42,8 @@ class GoalClient:
         self._ros = ros
         self._on_activity = on_activity
         self._sending: dict[UUID, asyncio.Task[bool]] = {}
-        self._statuses: dict[UUID, int] = {}
+        self.statuses: dict[UUID, int] = {}
+        """The last status of all goals, of any client."""
         self._open: set[UUID] = set()
         self._writers: frozenset[bytes] = frozenset()
         self._renewed = asyncio.Event()
@@ -58,14 +59,9 @@ class GoalClient:
         return self._services.there
 
     @property
-    def statuses(self) -> dict[UUID, int]:
-        """The last status of all goals, of any client."""
-        return self._statuses
-
-    @property
     def active(self) -> set[UUID]:
         """Goals that go on, or may go on."""
-        reported = {goal for goal, status in self._statuses.items() if status in ACTIVE}
+        reported = {goal for goal, status in self.statuses.items() if status in ACTIVE}
         return reported | self._open
 
     @property
@@ -78,9 +74,9 @@ class GoalClient:
         endpoints = self._ros.node.get_publishers_info_by_topic(self._services.status_topic)
         writers = frozenset(bytes(endpoint.endpoint_gid) for endpoint in endpoints)
         if not writers:
-            self._statuses = {}
+            self.statuses = {}
         if writers - self._writers and self._writers:
-            self._statuses = {}
+            self.statuses = {}
             renewed, self._renewed = self._renewed, asyncio.Event()
             renewed.set()
         self._writers |= writers
@@ -157,7 +153,7 @@ class GoalClient:
 
     def _on_statuses(self, statuses: dict[UUID, int]) -> None:
         self._on_activity()
-        self._statuses = statuses
+        self.statuses = statuses
         self._open -= {goal for goal, status in statuses.items() if status not in ACTIVE}
 
     def _on_feedback(self, goal: UUID, feedback: Any) -> None:
