@@ -131,9 +131,10 @@ class GoalArbiter:
         create = asyncio.get_running_loop().create_task
         self._tasks = [create(self._listen_on(resource)) for resource in self.connections]
         self._tasks += [create(self._watch(resource)) for resource in self.connections]
-        waits = [create(self._wait_for_all()), create(self._sleep(CONNECT_WITHIN_S))]
-        await asyncio.wait(waits, return_when=asyncio.FIRST_COMPLETED)
-        await cancel_and_wait(*waits)
+        all_received = create(self._all_received.wait())
+        late = asyncio.ensure_future(self.context.clock.sleep(CONNECT_WITHIN_S))
+        await asyncio.wait([all_received, late], return_when=asyncio.FIRST_COMPLETED)
+        await cancel_and_wait(all_received, late)
 
     async def start(self, request: BehaviorRequest) -> None:
         """`begin`, unless the request is known, past, refused, or for a busy resource."""
@@ -185,7 +186,7 @@ class GoalArbiter:
                 self.context.logger.info("%s: %s", resource, error)
             except Exception:  # a fault of one vehicle must not affect the others
                 self.context.logger.exception("%s: cannot be understood", resource)
-            await self._sleep(RETRY_AFTER_S)
+            await self.context.clock.sleep(RETRY_AFTER_S)
 
     async def _watch(self, resource: ResourceId) -> None:
         # A whole number: of less than a microsecond no clock would wait to the end.
@@ -197,10 +198,4 @@ class GoalArbiter:
             if silent_us >= bound_us:
                 self._ledger.lose(resource, f"no telemetry for {silent_us / 1_000_000:.1f} s")
             wait_us = bound_us - silent_us if silent_us < bound_us else bound_us
-            await self._sleep(wait_us / 1_000_000)
-
-    async def _wait_for_all(self) -> None:
-        await self._all_received.wait()
-
-    async def _sleep(self, seconds: float) -> None:
-        await self.context.clock.sleep(seconds)
+            await self.context.clock.sleep(wait_us / 1_000_000)

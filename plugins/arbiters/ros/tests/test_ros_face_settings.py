@@ -4,10 +4,9 @@ import math
 from typing import Any
 
 import pytest
-from m2pem_plugin_ros.face.geometry import earth_from_enu, quaternion_of, rotated_back
 from m2pem_plugin_ros.face.names import Names
 from m2pem_plugin_ros.face.settings import RATES, Options, read_options
-from m2pem_plugin_ros.frames import yaw_of_quaternion
+from m2pem_plugin_ros.frames import earth_from_enu, quaternion_of, rotated_back, yaw_of_quaternion
 
 from m2pem.api import FaceSettings, Fleet
 from m2pem.errors import PluginError

@@ -72,22 +72,18 @@ def test_what_was_never_heard_of_is_unknown_with_number_0() -> None:
 
 def test_a_lower_epoch_of_the_same_run_is_past() -> None:
     book = BehaviorJournal(lambda _: None)
-    assert [book.is_past(*seen) for seen in (("r", 2), ("r", 1), ("s", 1), ("r", 3), ("r", 2))] == [
-        False,
-        True,
-        False,
-        False,
-        True,
-    ]
+    seen = (("r", 2), ("r", 1), ("s", 1), ("r", 3), ("r", 2))
+    assert [book.epochs.admit_run(*each) for each in seen] == [True, False, True, True, False]
 
 
 def test_epochs_in_a_file_refuse_past_executives_after_a_restart(tmp_path: Path) -> None:
     file = tmp_path / "epochs.json"
     book = BehaviorJournal(lambda _: None, EpochFence(file))
-    assert not book.is_past("run.of.any.name", 3)
+    assert book.epochs.admit_run("run.of.any.name", 3)
     again = BehaviorJournal(lambda _: None, EpochFence(file))
-    assert again.is_past("run.of.any.name", 2)
-    assert (again.newest("run.of.any.name"), again.newest("run.of")) == (3, 0)
+    assert not again.epochs.admit_run("run.of.any.name", 2)
+    newest = again.epochs.newest_of_run
+    assert (newest("run.of.any.name"), newest("run.of")) == (3, 0)
 
 
 def test_of_very_many_the_oldest_are_forgotten_but_not_what_goes_on(
@@ -98,7 +94,7 @@ def test_of_very_many_the_oldest_are_forgotten_but_not_what_goes_on(
     book.accept("goes on")
     for number in range(5):
         book.reject(f"{number}", "REJECTED", "no")
-        book.is_past(f"{number}", 1)
+        book.epochs.admit_run(f"{number}", 1)
     assert [id_ for id_ in ("goes on", "0", "2", "3", "4") if book.knows(id_)] == [
         "goes on",
         "3",

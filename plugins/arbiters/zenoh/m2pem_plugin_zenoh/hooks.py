@@ -22,6 +22,6 @@ def m2pem_check_host(fleet: "Fleet | None") -> "Sequence[HealthCheck]":
     """Check the files of keys and passwords that the hosts of a fleet need here."""
     if fleet is None or not fleet.hosts:
         return ()
-    from m2pem_plugin_zenoh.host_checks import check_hosts  # noqa: PLC0415  # starting up must be fast
+    from m2pem_plugin_zenoh.link import check_hosts  # noqa: PLC0415  # starting up must be fast
 
     return check_hosts(fleet)

@@ -16,7 +16,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from m2pem.api import Host
+from m2pem.api import Fleet, HealthCheck, HealthStatus, Host
+from m2pem.api.latest_task import LatestTask
 from m2pem.errors import PluginError
 from m2pem_plugin_zenoh.arbiter_host import LinkError
 
@@ -110,6 +111,22 @@ def _first_user(file: str) -> tuple[str, str]:
         if user and colon:
             return user, password
     raise PluginError(f"{file}: it has no line 'user:password'")
+
+
+def check_hosts(fleet: Fleet) -> Sequence[HealthCheck]:
+    """Check that the executive of this computer can use the files of each host. Nothing is sent."""
+    checks = []
+    for host in fleet.hosts.values():
+        name = f"host {host.name}"
+        try:
+            settings(host, Endpoints(host.connect, host.listen))
+        except PluginError as error:
+            remedy = "each computer needs its own files under the names of the fleet file"
+            checks.append(HealthCheck(name, HealthStatus.ERROR, str(error), remedy))
+        else:
+            secured = "with TLS" if host.ca else "on this computer alone"
+            checks.append(HealthCheck(name, HealthStatus.OK, f"can be connected {secured}"))
+    return checks
 
 
 class Link:
@@ -211,7 +228,7 @@ class Link:
 
     async def answer(self, key: str, handle: Callable[[bytes], Awaitable[bytes]]) -> None:
         """Answer the requests at a key from now on."""
-        tasks: set[asyncio.Task[None]] = set()
+        tasks = LatestTask()
 
         async def answer(query: Any, content: bytes) -> None:
             answer = await handle(content)
@@ -220,9 +237,7 @@ class Link:
             query.drop()
 
         def begin(query: Any, content: bytes) -> None:
-            task = self._loop.create_task(answer(query, content))
-            tasks.add(task)
-            task.add_done_callback(tasks.discard)
+            tasks.add(answer(query, content))
 
         def received(query: Any) -> None:
             content = query.payload.to_bytes() if query.payload is not None else b""

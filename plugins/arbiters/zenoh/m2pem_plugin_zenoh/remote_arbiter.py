@@ -4,6 +4,7 @@ import asyncio
 import os
 import socket
 from collections.abc import AsyncIterator, Coroutine, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 from uuid import uuid4
@@ -398,16 +399,13 @@ class RemoteArbiter:
             # On a slow link several greetings are on the way, too.
             self._appeared.clear()
             self._create(self._greet(), "greet")
-            waiting = self._create(self._wait_for_host(), "wait for the host")
-            await asyncio.wait({waiting}, timeout=AGAIN_S)
-            waiting.cancel()
+            with suppress(TimeoutError):
+                async with asyncio.timeout(AGAIN_S):
+                    await self._appeared.wait()
 
     def _appears(self) -> None:
         self._is_there.set()
         self._appeared.set()
-
-    async def _wait_for_host(self) -> None:
-        await self._appeared.wait()
 
     async def _greet(self) -> None:
         going = tuple(id_ for id_, each in self._behaviors.items() if not each.ended)

@@ -9,8 +9,7 @@ from pathlib import Path
 import pytest
 from m2pem_plugin_zenoh import m2pem_check_host
 from m2pem_plugin_zenoh.arbiter_host import LinkError
-from m2pem_plugin_zenoh.host_checks import check_hosts
-from m2pem_plugin_zenoh.link import Endpoints, Link, settings
+from m2pem_plugin_zenoh.link import Endpoints, Link, check_hosts, settings
 from m2pem_plugin_zenoh.plugin import ZenohHosts
 from zenoh_world import free_port, hosted_simulation
 

@@ -12,7 +12,6 @@ from rclpy.node import Node
 from m2pem.api import (
     Fleet,
     Follower,
-    LinkState,
     MissionControl,
     PayloadState,
     ResourceId,
@@ -22,20 +21,10 @@ from m2pem_plugin_ros.face.names import Names
 from m2pem_plugin_ros.face.settings import Options
 from m2pem_plugin_ros.interfaces.messages import run_status, time_of
 from m2pem_plugin_ros.interfaces.texts import sendable
+from m2pem_plugin_ros.interfaces.vehicle_status import LINKS, READINESS
 from m2pem_plugin_ros.runtime import qos
 
 log = logging.getLogger("m2pem.face.ros")
-
-_LINKS = {
-    LinkState.CONNECTED: msg.FleetResource.CONNECTED,
-    LinkState.DEGRADED: msg.FleetResource.DEGRADED,
-    LinkState.LOST: msg.FleetResource.LOST,
-}
-_READINESS = {
-    None: msg.FleetResource.NOT_KNOWN,
-    False: msg.FleetResource.NOT_READY,
-    True: msg.FleetResource.READY,
-}
 
 
 class FleetStatePublisher:
@@ -113,7 +102,7 @@ class _Seen:
         holder, label = sendable(holder), sendable(label)
         if state is None:
             return cls(holder, label)
-        link, behavior = _LINKS[state.link], sendable(state.behavior)
+        link, behavior = LINKS[state.link], sendable(state.behavior)
         if not isinstance(state, VehicleState):
             return cls(holder, label, link, behavior)
         charge = state.battery_fraction
@@ -122,7 +111,7 @@ class _Seen:
             label,
             link,
             behavior,
-            _READINESS[state.ready],
+            READINESS[state.ready],
             tuple(sendable(each) for each in state.not_ready_reasons),
             sendable(state.mode),
             math.nan if charge is None else round(charge, 2),

@@ -16,12 +16,11 @@ from tf2_msgs.msg import TFMessage
 
 from m2pem.api import LocalFrame, ResourceId, VehicleState
 from m2pem_plugin_ros.face import telemetry_messages as messages
-from m2pem_plugin_ros.face.geometry import Vector, earth_from_enu
 from m2pem_plugin_ros.face.names import BASE, EARTH, Names
 from m2pem_plugin_ros.face.publisher import publishers_of
 from m2pem_plugin_ros.face.rate_limiter import RateLimiter
 from m2pem_plugin_ros.face.vehicle_topics import VehicleTopics
-from m2pem_plugin_ros.frames import Quaternion
+from m2pem_plugin_ros.frames import Quaternion, Vector, earth_from_enu
 from m2pem_plugin_ros.runtime import RosRuntime, qos
 
 TF = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)

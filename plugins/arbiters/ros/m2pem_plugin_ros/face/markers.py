@@ -25,10 +25,9 @@ from m2pem.api import (
     ResourceId,
     Route,
 )
-from m2pem_plugin_ros.face.geometry import Vector
 from m2pem_plugin_ros.face.names import BASE, Names
 from m2pem_plugin_ros.face.telemetry_messages import written
-from m2pem_plugin_ros.frames import Quaternion, to_local
+from m2pem_plugin_ros.frames import Quaternion, Vector, to_local
 from m2pem_plugin_ros.interfaces.texts import sendable
 from m2pem_plugin_ros.runtime import qos
 

@@ -12,8 +12,7 @@ from sensor_msgs.msg import BatteryState, Imu, JointState, NavSatFix, NavSatStat
 from std_msgs.msg import Header
 
 from m2pem.api import PayloadState, VehicleState, ellipsoidal_m
-from m2pem_plugin_ros.face.geometry import Vector, quaternion_of, rotated_back
-from m2pem_plugin_ros.frames import Quaternion
+from m2pem_plugin_ros.frames import Quaternion, Vector, quaternion_of, rotated_back
 from m2pem_plugin_ros.interfaces.messages import time_of
 from m2pem_plugin_ros.pose import known_yaw_rad
 

@@ -10,10 +10,9 @@ from sensor_msgs.msg import BatteryState, Imu, JointState, NavSatFix
 
 from m2pem.api import LocalFrame, PayloadState, ResourceId, VehicleState
 from m2pem_plugin_ros.face import telemetry_messages as messages
-from m2pem_plugin_ros.face.geometry import Vector
 from m2pem_plugin_ros.face.names import BASE, Names
 from m2pem_plugin_ros.face.publisher import TelemetryPublisher
-from m2pem_plugin_ros.frames import to_local
+from m2pem_plugin_ros.frames import Vector, to_local
 
 
 class VehicleTopics:

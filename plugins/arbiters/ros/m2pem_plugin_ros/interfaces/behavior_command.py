@@ -1,5 +1,5 @@
-"""m2pem_interfaces/msg/BehaviorCommand, read by the node on a vehicle and written by the
-executive."""
+"""m2pem_interfaces/msg/BehaviorCommand, read by the node on a vehicle and written by the executive;
+and CommandRefusal, its answer to a command of a past epoch, which older nodes do not send."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -162,3 +162,40 @@ def _message(verb: int, now_us: int, **fields: Any) -> Any:
     message = own_messages().BehaviorCommand(verb=verb, **fields)
     set_stamp(message.stamp, now_us)
     return message
+
+
+REFUSAL_CODE = "STALE_EPOCH"
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """A command of a run with a past epoch. `newest`: the epoch that was seen of the run."""
+
+    run: str
+    newest: int
+    reason: str
+
+
+def past_reason(epoch: int, newest: int) -> str:
+    """Return why a command of a past epoch is refused."""
+    return f"epoch {epoch} is past: another executive drives the run with epoch {newest}"
+
+
+def read_refusal(message: Any) -> Refusal:
+    """Read a message. Refusals for other reasons than an epoch have a `newest` of 0."""
+    return Refusal(
+        message.run, message.newest if message.code == REFUSAL_CODE else 0, message.reason
+    )
+
+
+def write_refusal(command: Command, newest: int) -> Any:
+    """Return a message without a stamp."""
+    return own_messages().CommandRefusal(
+        verb=int(command.verb),
+        id=command.id,
+        run=command.run,
+        epoch=command.epoch,
+        newest=newest,
+        code=REFUSAL_CODE,
+        reason=past_reason(command.epoch, newest),
+    )

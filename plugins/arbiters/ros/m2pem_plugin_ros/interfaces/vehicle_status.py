@@ -8,7 +8,10 @@ from m2pem.api import LinkState, PayloadState
 from m2pem_plugin_ros.drivers.driver import Health
 from m2pem_plugin_ros.interfaces.behavior_status import LONGEST_REASON
 
-_READY = {1: False, 2: True}
+READINESS = {None: 0, False: 1, True: 2}
+"""By the constants of VehicleStatus.msg and FleetResource.msg."""
+
+_READY = {number: ready for ready, number in READINESS.items()}
 MOST_REASONS = 20
 
 
@@ -37,7 +40,7 @@ def read_vehicle_status(message: Any) -> VehicleStatus:
 
 
 LINKS = {LinkState.CONNECTED: 1, LinkState.DEGRADED: 2, LinkState.LOST: 3}
-"""By the constants of PayloadStatus.msg."""
+"""By the constants of PayloadStatus.msg and FleetResource.msg."""
 
 
 def write_payload_status(messages: Any, state: PayloadState, *, to_operators: bool = False) -> Any:

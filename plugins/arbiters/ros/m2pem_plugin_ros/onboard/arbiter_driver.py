@@ -24,7 +24,7 @@ from m2pem.api import (
     VehicleState,
     adjusts,
 )
-from m2pem.api.latest_task import cancel_and_wait
+from m2pem.api.latest_task import LatestTask, cancel_and_wait
 from m2pem_plugin_ros.drivers.driver import DriverEvents, Health, Order, Outcome
 
 EPOCH = 1
@@ -55,7 +55,7 @@ class ArbiterDriver:
         self._current: UUID | None = None
         self._calls: asyncio.Queue[Coroutine[Any, Any, Awaitable[str] | None]] = asyncio.Queue()
         self._tasks: list[asyncio.Task[None]] = []
-        self._answers: set[asyncio.Task[None]] = set()
+        self._answers = LatestTask()
 
     # --- life -----------------------------------------------------------------------------------
 
@@ -67,7 +67,8 @@ class ArbiterDriver:
         self._tasks = [create(work) for work in works]
 
     async def close(self) -> None:
-        await cancel_and_wait(*self._tasks, *self._answers)
+        await cancel_and_wait(*self._tasks)
+        await self._answers.close()
         while not self._calls.empty():
             self._calls.get_nowait().close()
         await self._arbiter.close()
@@ -140,9 +141,7 @@ class ArbiterDriver:
                 self._logger.exception("%s: its arbiter failed", self._resource)
                 continue
             if answer is not None:
-                task = asyncio.get_running_loop().create_task(self._answered(answer))
-                self._answers.add(task)
-                task.add_done_callback(self._answers.discard)
+                self._answers.add(self._answered(answer))
 
     async def _answered(self, answer: Awaitable[str]) -> None:
         """Log that parameters were not taken. The next call does not wait for the answer."""

@@ -19,7 +19,7 @@ class BehaviorJournal:
     def __init__(self, publish: Callable[[Status], None], epochs: EpochFence | None = None) -> None:
         self._publish_status = publish
         self._last: dict[str, Status] = {}
-        self._epochs = EpochFence() if epochs is None else epochs
+        self.epochs = EpochFence() if epochs is None else epochs
         self.current = ""
         """The id of the current behavior, or ""."""
 
@@ -31,14 +31,6 @@ class BehaviorJournal:
     def knows(self, id_: str) -> bool:
         """Whether the behavior was accepted or rejected before."""
         return id_ in self._last
-
-    def is_past(self, run: str, epoch: int) -> bool:
-        """Return whether another executive has taken over the run. The highest epoch is stored."""
-        return not self._epochs.admit_run(run, epoch)
-
-    def newest(self, run: str) -> int:
-        """Return the highest epoch that was seen of a run."""
-        return self._epochs.newest_of_run(run)
 
     def repeat(self, id_: str) -> None:
         """Publish the last status again."""

@@ -25,16 +25,16 @@ from m2pem_plugin_ros.catalogue import LEVEL
 from m2pem_plugin_ros.drivers.driver import Driver, DriverEvents, Order, Outcome
 from m2pem_plugin_ros.installation import require_interfaces
 from m2pem_plugin_ros.interfaces.behavior_command import (
+    REFUSAL_CODE,
     Command,
     Verb,
     mismatch,
+    past_reason,
     read_command,
     read_parameters,
     read_request,
 )
 from m2pem_plugin_ros.interfaces.behavior_status import Status
-from m2pem_plugin_ros.interfaces.command_refusal import CODE as REFUSAL_CODE
-from m2pem_plugin_ros.interfaces.command_refusal import past_reason
 from m2pem_plugin_ros.interfaces.key_values import WireError
 from m2pem_plugin_ros.interfaces.vehicle_status import VehicleStatus
 from m2pem_plugin_ros.log_throttle import LogThrottle
@@ -227,9 +227,9 @@ class OnboardNode:
     def _is_past(self, command: Command) -> bool:
         """Whether another executive drives the run by now, which is said if the command is refused
         for it."""
-        if not self._journal.is_past(command.run, command.epoch):
+        if self._journal.epochs.admit_run(command.run, command.epoch):
             return False
-        newest = self._journal.newest(command.run)
+        newest = self._journal.epochs.newest_of_run(command.run)
         if command.verb is not Verb.HOLD:
             text = f"{command.verb.name} {command.id}: {past_reason(command.epoch, newest)}"
             self._log_throttle.log("a command of a past epoch", text)
@@ -244,7 +244,7 @@ class OnboardNode:
             self._journal.repeat(id_)
             return
         if is_past:
-            newest = self._journal.newest(message.run)
+            newest = self._journal.epochs.newest_of_run(message.run)
             self._journal.reject(id_, REFUSAL_CODE, past_reason(message.epoch, newest))
             return
         try:

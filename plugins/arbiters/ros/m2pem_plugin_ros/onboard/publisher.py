@@ -12,21 +12,18 @@ from rclpy.node import Node
 
 from m2pem.api import Clock, PayloadState
 from m2pem_plugin_ros.interfaces import set_stamp
-from m2pem_plugin_ros.interfaces.behavior_command import Command
+from m2pem_plugin_ros.interfaces.behavior_command import Command, write_refusal
 from m2pem_plugin_ros.interfaces.behavior_status import Status, write_status
-from m2pem_plugin_ros.interfaces.command_refusal import write_refusal
-from m2pem_plugin_ros.interfaces.vehicle_status import VehicleStatus, write_payload_status
+from m2pem_plugin_ros.interfaces.vehicle_status import (
+    READINESS,
+    VehicleStatus,
+    write_payload_status,
+)
 from m2pem_plugin_ros.runtime import qos
 
 STATUS_EVERY_S = 0.4
 FASTEST_S = 0.02
 """Shortest period in real time, so that a fast clock does not flood the network."""
-
-_READINESS = {
-    None: interfaces.VehicleStatus.NOT_KNOWN,
-    False: interfaces.VehicleStatus.NOT_READY,
-    True: interfaces.VehicleStatus.READY,
-}
 
 
 class StatusPublisher:
@@ -83,7 +80,7 @@ class StatusPublisher:
             mode=about.health.mode,
             behavior=about.behavior,
             held=about.held,
-            readiness=_READINESS[about.health.ready],
+            readiness=READINESS[about.health.ready],
             not_ready_reasons=list(about.health.not_ready_reasons),
             battery=math.nan if battery is None else battery,
         )

@@ -2,10 +2,10 @@
 
 import asyncio
 import math
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import PurePosixPath
-from typing import Any, TypeAlias
 
 from m2pem_plugin_mavlink import (
     Address,
@@ -17,9 +17,9 @@ from m2pem_plugin_mavlink import (
     message_type,
 )
 
-from m2pem.api.latest_task import cancel_and_wait
+from m2pem.api.latest_task import LatestTask, cancel_and_wait
 from m2pem_plugin_ptz.drivers.driver import CameraError
-from m2pem_plugin_ptz.drivers.mavlink.context import CameraContext
+from m2pem_plugin_ptz.drivers.mavlink.context import CameraContext, Job
 from m2pem_plugin_ptz.gimbal import CapturedImage
 
 ATTEND_S = 5.0
@@ -42,8 +42,6 @@ ignore numbers that it had before a restart."""
 
 _HEARTBEAT = message_type("HEARTBEAT").id
 
-Job: TypeAlias = Callable[[], Coroutine[Any, Any, None]]
-
 
 class CameraComponent:
     """The camera component of a vehicle. Refusals of the camera are CameraErrors with its own
@@ -60,7 +58,7 @@ class CameraComponent:
         self._images = camera_images.CapturedImages()
         self._news = asyncio.Event()
         self._began: datetime | None = None
-        self._zooming: asyncio.Task[None] | None = None
+        self._zooming = LatestTask()
         self._attending: asyncio.Task[None] | None = None
         self._stop_listening: Callable[[], None] = lambda: None
 
@@ -73,7 +71,8 @@ class CameraComponent:
     async def close(self) -> None:
         """Close. The camera stays as it is."""
         self._stop_listening()
-        await cancel_and_wait(self._attending, self._zooming)
+        await cancel_and_wait(self._attending)
+        await self._zooming.close()
 
     # --- state ----------------------------------------------------------------------------------
 
@@ -106,28 +105,18 @@ class CameraComponent:
         if found is None or most <= 1.0:
             return
         fraction = max(0.0, min(1.0, (level - 1.0) / (most - 1.0)))
-        is_on_its_way = self._zooming is not None and not self._zooming.done()
-        if fraction == self._wanted and is_on_its_way:
-            return
-        self._begin_zoom(lambda: self._zoom_to(found, fraction), fraction)
+        if fraction != self._wanted or not self._zooming.is_running:
+            self._begin_zoom(partial(self._zoom_to, found, fraction), fraction)
 
     def halt(self) -> None:
         """Stop zooming."""
         found = self._found
-        if found is not None and self._zooming is not None and not self._zooming.done():
-            self._begin_zoom(lambda: self._stop_zoom(found), None)
+        if found is not None and self._zooming.is_running:
+            self._begin_zoom(partial(self._stop_zoom, found), None)
 
     def _begin_zoom(self, job: Job, fraction: float | None) -> None:
-        if self._zooming is not None:
-            self._zooming.cancel()
         self._wanted = fraction
-        self._zooming = asyncio.get_running_loop().create_task(self._carefully(job))
-
-    async def _carefully(self, job: Job) -> None:
-        try:
-            await job()
-        except ExchangeError as error:
-            self._context.logger.warning("%s: camera: %s", self._context.resource, error)
+        self._zooming.replace(partial(self._context.carefully, "camera", job))
 
     async def _zoom_to(self, found: camera.Camera, fraction: float) -> None:
         device = self._context.settings.camera_device

@@ -7,9 +7,9 @@ pitch when the nose is down.
 
 import logging
 import math
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 from m2pem.api import Clock, FleetBus, ResourceId, VehicleState
 from m2pem_plugin_ptz.drivers.mavlink.settings import MavlinkSettings
@@ -18,6 +18,8 @@ from m2pem_plugin_ptz.gimbal import Reach
 if TYPE_CHECKING:
     from m2pem_plugin_mavlink import VehicleLink
 
+
+Job: TypeAlias = Callable[[], Awaitable[None]]
 
 Direction = tuple[float, float]
 """Pan, clockwise from the vehicle's heading, and tilt upwards, in radians."""
@@ -105,3 +107,12 @@ class CameraContext:
 
     def now_s(self) -> float:
         return self.clock.now_us() / 1e6
+
+    async def carefully(self, part: str, job: Job) -> None:
+        """Do a job. That the part refuses it, or does not answer, is logged."""
+        from m2pem_plugin_mavlink import ExchangeError  # noqa: PLC0415  # optional
+
+        try:
+            await job()
+        except ExchangeError as error:
+            self.logger.warning("%s: %s: %s", self.resource, part, error)

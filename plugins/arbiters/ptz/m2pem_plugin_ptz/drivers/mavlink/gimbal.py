@@ -2,9 +2,9 @@
 
 import asyncio
 import math
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from functools import partial
 
 from m2pem_plugin_mavlink import (
     Address,
@@ -17,7 +17,7 @@ from m2pem_plugin_mavlink import (
     message_type,
 )
 
-from m2pem.api.latest_task import cancel_and_wait
+from m2pem.api.latest_task import LatestTask, cancel_and_wait
 from m2pem_plugin_ptz.drivers.mavlink.context import CameraContext, Direction
 from m2pem_plugin_ptz.drivers.mavlink.settings import Yaw
 from m2pem_plugin_ptz.gimbal import Ramp, Reach
@@ -132,7 +132,7 @@ class GimbalDriver:
         self._found: _Found | None = None
         self._last_error = ""
         self._ordered: tuple[float, Direction] | None = None
-        self._job: asyncio.Task[None] | None = None
+        self._work = LatestTask()
         self._attending: asyncio.Task[None] | None = None
         self._stop_listening: Callable[[], None] = lambda: None
 
@@ -194,16 +194,18 @@ class GimbalDriver:
 
     def point(self, direction: Direction, rate_rad_s: float | None) -> None:
         """Turn to a direction in place of the last one."""
-        self._begin(lambda: self._turn_to(direction, rate_rad_s))
+        turn = partial(self._turn_to, direction, rate_rad_s)
+        self._work.replace(partial(self._context.carefully, "gimbal", turn))
 
     def halt(self) -> None:
         """Stop turning."""
-        self._begin(self._stop)
+        self._work.replace(partial(self._context.carefully, "gimbal", self._stop))
 
     async def close(self) -> None:
         """Close, and release the control. The gimbal stays as it is."""
         self._stop_listening()
-        await cancel_and_wait(self._attending, self._job)
+        await cancel_and_wait(self._attending)
+        await self._work.close()
         if self._found is not None:
             await self._found.control.close()
 
@@ -254,17 +256,6 @@ class GimbalDriver:
             self._context.logger.debug("%s: gimbal status: %s", self._context.resource, error)
 
     # --- turning --------------------------------------------------------------------------------
-
-    def _begin(self, job: Callable[[], Coroutine[Any, Any, None]]) -> None:
-        if self._job is not None:
-            self._job.cancel()
-        self._job = asyncio.get_running_loop().create_task(self._carefully(job))
-
-    async def _carefully(self, job: Callable[[], Coroutine[Any, Any, None]]) -> None:
-        try:
-            await job()
-        except ExchangeError as error:
-            self._context.logger.warning("%s: gimbal: %s", self._context.resource, error)
 
     async def _turn_to(self, direction: Direction, rate_rad_s: float | None) -> None:
         found = self._found

@@ -13,9 +13,13 @@ from m2pem_plugin_ros.drivers.driver import DriverSetup, Health, Order, Outcome
 from m2pem_plugin_ros.drivers.node.action_link import ActionLink
 from m2pem_plugin_ros.drivers.node.link import REMEMBERED, STILL_S, NodeLink, Retries
 from m2pem_plugin_ros.drivers.node.topic_link import TopicLink
-from m2pem_plugin_ros.interfaces.behavior_command import Verb, adjust_command, vehicle_command
+from m2pem_plugin_ros.interfaces.behavior_command import (
+    Verb,
+    adjust_command,
+    read_refusal,
+    vehicle_command,
+)
 from m2pem_plugin_ros.interfaces.behavior_status import read_status
-from m2pem_plugin_ros.interfaces.command_refusal import read_refusal
 from m2pem_plugin_ros.interfaces.key_values import WireError, encode_parameters
 from m2pem_plugin_ros.interfaces.vehicle_status import VehicleStatus, read_vehicle_status
 from m2pem_plugin_ros.log_throttle import LogThrottle
