@@ -27,7 +27,7 @@ from m2pem.api.latest_task import cancel_and_wait
 from m2pem.api.unit_arbiter import UnitArbiter
 from m2pem_plugin_ros.catalogue import LEVEL, PAYLOAD
 from m2pem_plugin_ros.checkpoint import Checkpoint, decode_checkpoint, encode_checkpoint
-from m2pem_plugin_ros.connections import ConnectionsSetup, VehicleConnections
+from m2pem_plugin_ros.connections import ConnectionsSetup, DdsConnections, VehicleConnections
 from m2pem_plugin_ros.drivers.driver import Driver, DriverSetup
 from m2pem_plugin_ros.drivers.driver import make_driver as make_fleet_driver
 from m2pem_plugin_ros.log_throttle import LogThrottle
@@ -62,12 +62,6 @@ PAYLOADS_EVERY = 5
 MakeConnections = Callable[[ConnectionsSetup], VehicleConnections]
 
 
-def _vehicle_connections(installation: ConnectionsSetup) -> VehicleConnections:
-    from m2pem_plugin_ros.connections import DdsConnections  # noqa: PLC0415  # starting up must be fast
-
-    return DdsConnections(installation)
-
-
 class RosArbiter(UnitArbiter[Vehicle]):
     """The arbiter `ros` (docs/ros.md).
 
@@ -86,7 +80,7 @@ class RosArbiter(UnitArbiter[Vehicle]):
         connections: Mapping[ResourceId, Connection],
         context: ArbiterContext,
         make_driver: Callable[[DriverSetup], Driver] = make_fleet_driver,
-        make_connections: MakeConnections = _vehicle_connections,
+        make_connections: MakeConnections = DdsConnections,
     ) -> None:
         super().__init__(connections, context, _may_be_missed)
         vehicles = read_settings(connections)

@@ -101,26 +101,15 @@ def _parameters(
         "driver", settings.driver.value, "What drives: velocities from m2pem, or Nav2.", drivers
     )
     yield _Parameter(
-        "odom_frame",
-        settings.odom_frame.value,
-        "Frame of the odometry (REP-105).",
-        tuple(each.value for each in OdomFrame),
-    )
-    yield _Parameter(
         "base_frame", settings.base_frame, "Frame of the vehicle; empty: that of its odometry."
     )
-    yield _Parameter(
-        "fix_altitude",
-        settings.fix_altitude.value,
-        "What the altitude of satellite fixes counts from.",
-        tuple(each.value for each in FixAltitude),
-    )
-    yield _Parameter(
-        "route_action",
-        settings.route_action.value,
-        "Action of Nav2 for routes.",
-        tuple(each.value for each in RouteAction),
-    )
+    for name, kind, doc in (
+        ("odom_frame", OdomFrame, "Frame of the odometry (REP-105)."),
+        ("fix_altitude", FixAltitude, "What the altitude of satellite fixes counts from."),
+        ("route_action", RouteAction, "Action of Nav2 for routes."),
+    ):
+        choices = tuple(str(each) for each in kind)
+        yield _Parameter(name, str(getattr(settings, name)), doc, choices)
     yield _Parameter("stamped", settings.stamped, "Whether cmd_vel is a TwistStamped.")
     yield _Parameter("hardware_id", settings.hardware_id, "The vehicle in /diagnostics.")
     for each in fields(Topics):

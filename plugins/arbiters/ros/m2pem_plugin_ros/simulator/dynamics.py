@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 
 from m2pem_plugin_ros.pose import Pose, Twist
+from m2pem_plugin_ros.settings import Bounds
 
 STANDS_M_S = 1e-3
 """A base slower than this, in m/s and rad/s, stands."""
@@ -25,6 +26,12 @@ class Chassis:
     turn_radius_m: float = 0.0
     lag_s: float = 0.1
     command_timeout_s: float = 0.5
+
+
+def limits(of: Chassis | Bounds) -> dict[str, float]:
+    """Return the limits that a chassis and the settings of a base have both."""
+    same = ("speed_m_s", "reverse_m_s", "acceleration_m_s2", "yaw_rate_rad_s", "turn_radius_m")
+    return {name: getattr(of, name) for name in same}
 
 
 class Dynamics:

@@ -18,7 +18,7 @@ from m2pem_plugin_ros.settings import (
     read_detectors,
     read_settings,
 )
-from m2pem_plugin_ros.simulator.dynamics import Chassis
+from m2pem_plugin_ros.simulator.dynamics import Chassis, limits
 from m2pem_plugin_ros.simulator.sensors import DetectorSpec, Target
 from m2pem_plugin_ros.simulator.specification import (
     SettingError,
@@ -79,14 +79,7 @@ def _chassis(domain: str, settings: Settings) -> Chassis:
     usual, bounds = chassis_of(domain), settings.bounds
     if settings.driver is not DriverName.BASE and bounds == Bounds():
         return usual
-    return replace(
-        usual,
-        speed_m_s=bounds.speed_m_s,
-        reverse_m_s=bounds.reverse_m_s,
-        acceleration_m_s2=bounds.acceleration_m_s2,
-        yaw_rate_rad_s=bounds.yaw_rate_rad_s,
-        turn_radius_m=bounds.turn_radius_m,
-    )
+    return replace(usual, **limits(bounds))
 
 
 def _detector(

@@ -24,8 +24,8 @@ from m2pem_plugin_ros.frames import to_geodetic
 from m2pem_plugin_ros.pose import Pose, Twist
 from m2pem_plugin_ros.runtime import RosRuntime
 from m2pem_plugin_ros.sensors.localization import Localization
-from m2pem_plugin_ros.settings import Bounds, DriverName
-from m2pem_plugin_ros.simulator.dynamics import wrapped_rad
+from m2pem_plugin_ros.settings import DriverName
+from m2pem_plugin_ros.simulator.dynamics import limits, wrapped_rad
 from m2pem_plugin_ros.simulator.faults import TrafficFaults
 from m2pem_plugin_ros.simulator.sensors import Battery, Reading
 from m2pem_plugin_ros.simulator.specification import VehicleSpec
@@ -60,9 +60,10 @@ class ControlContext:
     def make_driver(self, events: DriverEvents, bus: FleetBus) -> Driver:
         """Make the driver of the base for the m2pem node, or for Nav2."""
         spec = self.vehicle.spec
+        bounds = replace(spec.settings.bounds, **limits(spec.chassis))
         setup = DriverSetup(
             Connection(ResourceId(spec.name), spec.domain, sitl=True),
-            replace(spec.settings, driver=DriverName.BASE, bounds=_bounds(spec)),
+            replace(spec.settings, driver=DriverName.BASE, bounds=bounds),
             ArbiterContext(self.clock, bus, logger, spec.origin),
             cast(RosRuntime, self.ros),
             self.localization,
@@ -109,19 +110,6 @@ def _nav2(context: ControlContext) -> OnboardControl:
         spec.origin,
     )
     return cast(OnboardControl, made)
-
-
-def _bounds(spec: VehicleSpec) -> Bounds:
-    """Return the limits of the base that its onboard control knows."""
-    chassis = spec.chassis
-    return replace(
-        spec.settings.bounds,
-        speed_m_s=chassis.speed_m_s,
-        reverse_m_s=chassis.reverse_m_s,
-        acceleration_m_s2=chassis.acceleration_m_s2,
-        yaw_rate_rad_s=chassis.yaw_rate_rad_s,
-        turn_radius_m=chassis.turn_radius_m,
-    )
 
 
 class _NoBus:

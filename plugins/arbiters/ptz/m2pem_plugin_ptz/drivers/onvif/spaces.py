@@ -34,10 +34,9 @@ class Scale:
         """Convert from a number of the camera."""
         return (units - self.offset) / self.gain
 
-    @property
-    def values(self) -> Interval:
-        """The range of values."""
-        ends = sorted(map(self.to_value, self.units))
+    def values(self, units: Interval | None = None) -> Interval:
+        """Return the range of values of a range of numbers, or of all."""
+        ends = sorted(map(self.to_value, units or self.units))
         return ends[0], ends[1]
 
 
@@ -86,7 +85,7 @@ class Spaces:
     def position(self, pan_rad: float, tilt_rad: float) -> dict[str, object]:
         """Return a position for a command. There must be `positions`."""
         space = self.positions[0]
-        pan = wrap_into(pan_rad, space.pan.values)
+        pan = wrap_into(pan_rad, space.pan.values())
         return {
             "x": space.pan.to_units(pan),
             "y": space.tilt.to_units(tilt_rad),
@@ -267,7 +266,7 @@ def _zooms(spaces: Iterable[SpaceDescription], fleet_max: float) -> Iterable[Sca
 def _zoom_max(zooms: Sequence[ScalarSpace], fleet_max: float) -> float:
     if not zooms:
         return 1.0
-    own = zooms[0].scale.values[1]
+    own = zooms[0].scale.values()[1]
     return own if fleet_max <= 1.0 else min(own, fleet_max)
 
 
@@ -282,14 +281,9 @@ def _within_limits(
     if space is None:
         return whole
     return (
-        _shared("pan", whole[0], _values(space.pan, limits.x)),
-        _shared("tilt", whole[1], _values(space.tilt, limits.y)),
+        _shared("pan", whole[0], space.pan.values(limits.x)),
+        _shared("tilt", whole[1], space.tilt.values(limits.y)),
     )
-
-
-def _values(scale: Scale, units: Interval) -> Interval:
-    ends = sorted(map(scale.to_value, units))
-    return ends[0], ends[1]
 
 
 def _shared_pan(own: Interval, fleet: Interval) -> Interval:
