@@ -56,13 +56,12 @@ def cameras_of(
 
 def camera_heartbeat() -> Message:
     """HEARTBEAT of a camera."""
-    made: Message = message_type("HEARTBEAT").make(
+    return message_type("HEARTBEAT").make(
         type=dialect.MAV_TYPE_CAMERA,
         autopilot=dialect.MAV_AUTOPILOT_INVALID,
         system_status=dialect.MAV_STATE_ACTIVE,
         mavlink_version=MAVLINK_VERSION,
     )
-    return made
 
 
 def _text(text: str, size: int) -> bytes:
@@ -71,7 +70,7 @@ def _text(text: str, size: int) -> bytes:
 
 def _camera_information(camera: Camera) -> Message:
     name = camera.resource.partition("/")[2]
-    made: Message = message_type("CAMERA_INFORMATION").make(
+    return message_type("CAMERA_INFORMATION").make(
         time_boot_ms=_ms(camera),
         vendor_name=_array(VENDOR, 32),
         model_name=_array(_text(name, 32), 32),
@@ -81,31 +80,27 @@ def _camera_information(camera: Camera) -> Message:
         flags=dialect.CAMERA_CAP_FLAGS_CAPTURE_IMAGE if camera.takes_pictures else 0,
         gimbal_device_id=camera.gimbal_device,
     )
-    return made
 
 
 def _camera_settings(camera: Camera) -> Message:
-    made: Message = message_type("CAMERA_SETTINGS").make(
+    return message_type("CAMERA_SETTINGS").make(
         time_boot_ms=_ms(camera), zoomLevel=math.nan, focusLevel=math.nan
     )
-    return made
 
 
 def _capture_status(camera: Camera) -> Message:
-    made: Message = message_type("CAMERA_CAPTURE_STATUS").make(
+    return message_type("CAMERA_CAPTURE_STATUS").make(
         time_boot_ms=_ms(camera), image_count=camera.pictures
     )
-    return made
 
 
 def _storage(camera: Camera) -> Message:
-    made: Message = message_type("STORAGE_INFORMATION").make(
+    return message_type("STORAGE_INFORMATION").make(
         time_boot_ms=_ms(camera),
         storage_id=1,
         storage_count=1,
         status=dialect.STORAGE_STATUS_NOT_SUPPORTED,
     )
-    return made
 
 
 CAMERA_MAKERS: Makers = {
@@ -118,7 +113,7 @@ CAMERA_MAKERS: Makers = {
 
 
 def _manager_information(camera: Camera) -> Message:
-    made: Message = message_type("GIMBAL_MANAGER_INFORMATION").make(
+    return message_type("GIMBAL_MANAGER_INFORMATION").make(
         time_boot_ms=_ms(camera),
         cap_flags=_GIMBAL_CAPABILITIES,
         gimbal_device_id=camera.gimbal_device,
@@ -127,23 +122,21 @@ def _manager_information(camera: Camera) -> Message:
         yaw_min=YAW_RAD[0],
         yaw_max=YAW_RAD[1],
     )
-    return made
 
 
 def _manager_status(camera: Camera) -> Message:
-    made: Message = message_type("GIMBAL_MANAGER_STATUS").make(
+    return message_type("GIMBAL_MANAGER_STATUS").make(
         time_boot_ms=_ms(camera),
         flags=_DEVICE_FLAGS,
         gimbal_device_id=camera.gimbal_device,
         primary_control_sysid=camera.controller.system,
         primary_control_compid=camera.controller.component,
     )
-    return made
 
 
 def _device_information(camera: Camera) -> Message:
     name = _text(camera.resource.partition("/")[2], 32)
-    made: Message = message_type("GIMBAL_DEVICE_INFORMATION").make(
+    return message_type("GIMBAL_DEVICE_INFORMATION").make(
         time_boot_ms=_ms(camera),
         vendor_name=VENDOR,
         model_name=name,
@@ -155,7 +148,6 @@ def _device_information(camera: Camera) -> Message:
         yaw_max=YAW_RAD[1],
         gimbal_device_id=camera.gimbal_device,
     )
-    return made
 
 
 def _device_attitude(camera: Camera) -> Message:
@@ -164,7 +156,7 @@ def _device_attitude(camera: Camera) -> Message:
     tilt_rad = state.tilt_rad if state is not None and state.tilt_rad is not None else 0.0
     cp, sp = math.cos(tilt_rad / 2), math.sin(tilt_rad / 2)
     cy, sy = math.cos(pan_rad / 2), math.sin(pan_rad / 2)
-    made: Message = message_type("GIMBAL_DEVICE_ATTITUDE_STATUS").make(
+    return message_type("GIMBAL_DEVICE_ATTITUDE_STATUS").make(
         time_boot_ms=_ms(camera),
         flags=_DEVICE_FLAGS,
         q=(cp * cy, -sp * sy, sp * cy, cp * sy),
@@ -175,7 +167,6 @@ def _device_attitude(camera: Camera) -> Message:
         delta_yaw_velocity=math.nan,
         gimbal_device_id=camera.gimbal_device,
     )
-    return made
 
 
 GIMBAL_MAKERS: Makers = {

@@ -82,7 +82,7 @@ def made(type_: MessageType, fields: Mapping[str, Any]) -> Message:
         read = _value(name, value, types[name], lengths[name], enum)
         if read is not UNKNOWN:
             values[name] = read
-    message: Message = type_.make(**values)
+    message = type_.make(**values)
     try:
         type_.pack(message)
     except struct.error as error:

@@ -108,7 +108,7 @@ def _types() -> tuple[MessageType, MessageType]:
 def available_mode(index: int) -> Message:
     """Return AVAILABLE_MODES of one mode; `index` counts from 1."""
     mode = MODES[index - 1]
-    made: Message = _types()[0].make(
+    return _types()[0].make(
         number_modes=len(MODES),
         mode_index=index,
         standard_mode=mode.standard,
@@ -116,15 +116,13 @@ def available_mode(index: int) -> Message:
         properties=0 if mode.behavior else NOT_USER_SELECTABLE,
         mode_name=mode.name.encode(),
     )
-    return made
 
 
 def current_mode(mode: Mode) -> Message:
     """Return CURRENT_MODE."""
-    made: Message = _types()[1].make(
+    return _types()[1].make(
         standard_mode=mode.standard, custom_mode=mode.number, intended_custom_mode=mode.number
     )
-    return made
 
 
 def renumbered(heartbeat: Message) -> Message:
@@ -135,5 +133,4 @@ def renumbered(heartbeat: Message) -> Message:
     modes = modes_of(Identity(Firmware.ARDUPILOT, kind_of(heartbeat.type)))
     number = modes.for_purpose(mode.purpose)
     number = modes.number("GUIDED") if number is None else number
-    made: Message = heartbeat._replace(custom_mode=number)
-    return made
+    return heartbeat._replace(custom_mode=number)

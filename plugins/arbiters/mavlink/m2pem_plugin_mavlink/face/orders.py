@@ -388,8 +388,7 @@ def acknowledgement(command: int, result: int, to: Address) -> Any:
         command=command,
         result=result,
         progress=UNKNOWN_PROGRESS if result == IN_PROGRESS else 0,
-        target_system=to.system,
-        target_component=to.component,
+        **to.as_target,
     )
 
 

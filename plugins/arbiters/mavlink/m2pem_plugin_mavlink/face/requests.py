@@ -53,11 +53,6 @@ class Request:
         self.station.send(message, self.vehicle.autopilot)
 
 
-def addressed(to: Address) -> dict[str, int]:
-    """Return the fields of a message that has a target."""
-    return {"target_system": to.system, "target_component": to.component}
-
-
 _ONE_MESSAGE: Mapping[int, int] = {
     dialect.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
     dialect.MAV_CMD_GET_HOME_POSITION: dialect.MAVLINK_MSG_ID_HOME_POSITION,
@@ -203,7 +198,7 @@ class Requests:
             if vehicle.state is None or not vehicle.present(now_s) or not station.may_send(now_s):
                 continue
             own_ns = vehicle.state.time_us * 1000 + round((now_s - vehicle.received_s) * 1e9)
-            changed = addressed(source) if is_ping else {"tc1": own_ns}
+            changed = source.as_target if is_ping else {"tc1": own_ns}
             station.send(message._replace(**changed), vehicle.autopilot)
 
     @staticmethod
@@ -232,7 +227,7 @@ class Requests:
             error = dialect.MAV_PARAM_ERROR_DOES_NOT_EXIST
             make = message_type("PARAM_ERROR").make
             request.answer(
-                make(**addressed(request.source), param_id=name, param_index=index, error=error)
+                make(**request.source.as_target, param_id=name, param_index=index, error=error)
             )
 
     def _set_parameter(self, request: Request) -> None:
@@ -245,20 +240,20 @@ class Requests:
 
     def _list_items(self, request: Request) -> None:
         type_ = request.message.mission_type
-        items = self._items(type_, addressed(request.source), request.vehicle)
+        items = self._items(type_, request.source.as_target, request.vehicle)
         key = _download(request)
         self._downloads.pop(key, None)
         if len(self._downloads) >= MOST_DOWNLOADS:
             del self._downloads[next(iter(self._downloads))]
         self._downloads[key] = items
         make = message_type("MISSION_COUNT").make
-        request.answer(make(**addressed(request.source), count=len(items), mission_type=type_))
+        request.answer(make(**request.source.as_target, count=len(items), mission_type=type_))
 
     def _send_item(self, request: Request) -> None:
         items = self._downloads.get(_download(request))
         if items is None:
             items = self._items(
-                request.message.mission_type, addressed(request.source), request.vehicle
+                request.message.mission_type, request.source.as_target, request.vehicle
             )
         if request.message.seq < len(items):
             request.answer(items[request.message.seq])
@@ -290,8 +285,7 @@ def refusal_of_files(message: Message, to: Address) -> Message | None:
     payload = refusal_of_ftp(bytes(message.payload))
     if payload is None:
         return None
-    answer: Message = message._replace(payload=tuple(payload), **addressed(to))
-    return answer
+    return message._replace(payload=tuple(payload), **to.as_target)
 
 
 def _download(request: Request) -> tuple[str, Address, int, int]:
@@ -303,7 +297,7 @@ def _acknowledge(request: Request, result: int) -> None:
     type_ = getattr(request.message, "mission_type", MISSION)
     request.answer(
         message_type("MISSION_ACK").make(
-            **addressed(request.source), type=result, mission_type=type_
+            **request.source.as_target, type=result, mission_type=type_
         )
     )
 
@@ -313,7 +307,7 @@ def _whole(value: float) -> int:
 
 
 def _item(number: int, command: int, item: Item, **fields: float) -> Message:
-    made: Message = message_type("MISSION_ITEM_INT").make(
+    return message_type("MISSION_ITEM_INT").make(
         seq=number,
         command=command,
         frame=item.frame,
@@ -323,7 +317,6 @@ def _item(number: int, command: int, item: Item, **fields: float) -> Message:
         z=item.altitude_m,
         **fields,
     )
-    return made
 
 
 _PARAMETERS: Sequence[tuple[bytes, Callable[[ShownVehicle], float]]] = (
@@ -341,11 +334,10 @@ def _index_of(name: bytes) -> int:
 
 def _parameter(index: int, vehicle: ShownVehicle) -> Message:
     name, read = _PARAMETERS[index]
-    made: Message = message_type("PARAM_VALUE").make(
+    return message_type("PARAM_VALUE").make(
         param_id=name,
         param_value=read(vehicle),
         param_type=dialect.MAV_PARAM_TYPE_REAL32,
         param_count=len(_PARAMETERS),
         param_index=index,
     )
-    return made

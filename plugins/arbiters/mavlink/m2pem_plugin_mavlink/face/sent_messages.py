@@ -101,9 +101,8 @@ class MessageSender:
             self._commands.add(task)
             task.add_done_callback(self._commands.discard)
             return
-        targets = {"target_system": target.system, "target_component": target.component}
         has = sent.type.make._fields
-        fields |= {name: each for name, each in targets.items() if name in has}
+        fields |= {name: each for name, each in target.as_target.items() if name in has}
         link.send(made(sent.type, fields))
 
     def _link(self, vehicle: ResourceId) -> VehicleLink:

@@ -70,7 +70,7 @@ def heartbeat(vehicle: ShownVehicle) -> Message:
         base |= dialect.MAV_MODE_FLAG_GUIDED_ENABLED | dialect.MAV_MODE_FLAG_STABILIZE_ENABLED
         if mode is not modes.GUIDED:
             base |= dialect.MAV_MODE_FLAG_AUTO_ENABLED
-    made: Message = message_type("HEARTBEAT").make(
+    return message_type("HEARTBEAT").make(
         type=vehicle.type,
         autopilot=dialect.MAV_AUTOPILOT_GENERIC,
         base_mode=base,
@@ -78,7 +78,6 @@ def heartbeat(vehicle: ShownVehicle) -> Message:
         system_status=dialect.MAV_STATE_ACTIVE if armed else dialect.MAV_STATE_STANDBY,
         mavlink_version=MAVLINK_VERSION,
     )
-    return made
 
 
 def _global_position(vehicle: ShownVehicle) -> Message | None:
@@ -89,7 +88,7 @@ def _global_position(vehicle: ShownVehicle) -> Message | None:
     heading = UINT16_UNKNOWN
     if state.yaw_rad is not None:
         heading = round(wrapped_degrees(state.yaw_rad) * 100) % 36_000
-    made: Message = message_type("GLOBAL_POSITION_INT").make(
+    return message_type("GLOBAL_POSITION_INT").make(
         time_boot_ms=boot_ms(state),
         lat=_degrees_e7(state.position.latitude_deg),
         lon=_degrees_e7(state.position.longitude_deg),
@@ -100,20 +99,18 @@ def _global_position(vehicle: ShownVehicle) -> Message | None:
         vz=_int16(-up * 100),
         hdg=heading,
     )
-    return made
 
 
 def _attitude(vehicle: ShownVehicle) -> Message | None:
     state = vehicle.state
     if state is None or state.yaw_rad is None:
         return None
-    made: Message = message_type("ATTITUDE").make(
+    return message_type("ATTITUDE").make(
         time_boot_ms=boot_ms(state),
         roll=state.roll_rad,
         pitch=-state.pitch_rad,
         yaw=north_yaw_rad(state.yaw_rad),
     )
-    return made
 
 
 def _vfr_hud(vehicle: ShownVehicle) -> Message | None:
@@ -123,10 +120,9 @@ def _vfr_hud(vehicle: ShownVehicle) -> Message | None:
     east, north, up = state.velocity_enu_m_s or (0.0, 0.0, 0.0)
     speed = math.hypot(east, north)
     heading = 0 if state.yaw_rad is None else round(wrapped_degrees(state.yaw_rad)) % 360
-    made: Message = message_type("VFR_HUD").make(
+    return message_type("VFR_HUD").make(
         groundspeed=speed, heading=heading, alt=state.position.altitude_m, climb=up
     )
-    return made
 
 
 def _sys_status(vehicle: ShownVehicle) -> Message | None:
@@ -142,7 +138,7 @@ def _sys_status(vehicle: ShownVehicle) -> Message | None:
     at = state.position
     if vehicle.fence is None or at is None or vehicle.fence.outside_m(at.latlon) <= BREACH_M:
         health |= _GEOFENCE  # without a fence, too: MAVProxy says "fence breach" if it is missing
-    made: Message = message_type("SYS_STATUS").make(
+    return message_type("SYS_STATUS").make(
         onboard_control_sensors_present=present,
         onboard_control_sensors_enabled=present,
         onboard_control_sensors_health=health,
@@ -150,7 +146,6 @@ def _sys_status(vehicle: ShownVehicle) -> Message | None:
         current_battery=-1,
         battery_remaining=_percent(state),
     )
-    return made
 
 
 _GEOFENCE: int = dialect.MAV_SYS_STATUS_GEOFENCE
@@ -165,7 +160,7 @@ def _battery(vehicle: ShownVehicle) -> Message | None:
     state = vehicle.state
     if state is None or state.battery_fraction is None:
         return None
-    made: Message = message_type("BATTERY_STATUS").make(
+    return message_type("BATTERY_STATUS").make(
         temperature=0x7FFF,
         voltages=(UINT16_UNKNOWN,) * 10,
         current_battery=-1,
@@ -173,7 +168,6 @@ def _battery(vehicle: ShownVehicle) -> Message | None:
         energy_consumed=-1,
         battery_remaining=_percent(state),
     )
-    return made
 
 
 def _gps(vehicle: ShownVehicle) -> Message | None:
@@ -183,16 +177,13 @@ def _gps(vehicle: ShownVehicle) -> Message | None:
     unknown = {"eph": UINT16_UNKNOWN, "epv": UINT16_UNKNOWN, "satellites_visible": 255}
     make = message_type("GPS_RAW_INT").make
     if state.position is None:
-        bare: Message = make(
-            time_usec=state.time_us, vel=UINT16_UNKNOWN, cog=UINT16_UNKNOWN, **unknown
-        )
-        return bare
+        return make(time_usec=state.time_us, vel=UINT16_UNKNOWN, cog=UINT16_UNKNOWN, **unknown)
     east, north, _ = state.velocity_enu_m_s or (0.0, 0.0, 0.0)
     speed = math.hypot(east, north)
     course = UINT16_UNKNOWN
     if speed > SLOWEST_M_S:
         course = round(wrapped_degrees(math.atan2(north, east)) * 100) % 36_000
-    made: Message = make(
+    return make(
         time_usec=state.time_us,
         fix_type=dialect.GPS_FIX_TYPE_3D_FIX,
         lat=_degrees_e7(state.position.latitude_deg),
@@ -205,7 +196,6 @@ def _gps(vehicle: ShownVehicle) -> Message | None:
         cog=course,
         **unknown,
     )
-    return made
 
 
 def _landed(vehicle: ShownVehicle) -> Message | None:
@@ -221,15 +211,14 @@ def _landed(vehicle: ShownVehicle) -> Message | None:
     else:
         in_air = vehicle.airborne
         landed = dialect.MAV_LANDED_STATE_IN_AIR if in_air else dialect.MAV_LANDED_STATE_ON_GROUND
-    made: Message = message_type("EXTENDED_SYS_STATE").make(landed_state=landed)
-    return made
+    return message_type("EXTENDED_SYS_STATE").make(landed_state=landed)
 
 
 def _home(vehicle: ShownVehicle) -> Message | None:
     home = vehicle.home
     if home is None:
         return None
-    made: Message = message_type("HOME_POSITION").make(
+    return message_type("HOME_POSITION").make(
         latitude=_degrees_e7(home.latitude_deg),
         longitude=_degrees_e7(home.longitude_deg),
         altitude=_int32(home.altitude_m * 1000),
@@ -239,7 +228,6 @@ def _home(vehicle: ShownVehicle) -> Message | None:
         approach_z=math.nan,
         time_usec=vehicle.state.time_us if vehicle.state is not None else 0,
     )
-    return made
 
 
 def _mission_current(vehicle: ShownVehicle) -> Message:
@@ -248,13 +236,12 @@ def _mission_current(vehicle: ShownVehicle) -> Message:
         state = dialect.MISSION_STATE_NO_MISSION
     else:
         state = dialect.MISSION_STATE_ACTIVE
-    made: Message = message_type("MISSION_CURRENT").make(
+    return message_type("MISSION_CURRENT").make(
         seq=plan.current,
         total=len(plan.items) if plan.items else UINT16_UNKNOWN,
         mission_state=state,
         mission_mode=1 if vehicle.mode is modes.MISSION else 2,
     )
-    return made
 
 
 def _current_mode(vehicle: ShownVehicle) -> Message:
@@ -265,17 +252,15 @@ def _system_time(vehicle: ShownVehicle) -> Message | None:
     state = vehicle.state
     if state is None:
         return None
-    made: Message = message_type("SYSTEM_TIME").make(
+    return message_type("SYSTEM_TIME").make(
         time_unix_usec=state.time_us, time_boot_ms=boot_ms(state)
     )
-    return made
 
 
 def _version(vehicle: ShownVehicle) -> Message:
-    made: Message = message_type("AUTOPILOT_VERSION").make(
+    return message_type("AUTOPILOT_VERSION").make(
         capabilities=CAPABILITIES, uid=vehicle.system, vendor_id=0, product_id=0
     )
-    return made
 
 
 _ON_REQUEST: Mapping[str, Maker] = {

@@ -212,13 +212,12 @@ class Hub:
 
 
 def _heartbeat() -> Message:
-    made: Message = message_type("HEARTBEAT").make(
+    return message_type("HEARTBEAT").make(
         type=MAV_TYPE_GCS,
         autopilot=MAV_AUTOPILOT_INVALID,
         system_status=MAV_STATE_ACTIVE,
         mavlink_version=MAVLINK_VERSION,
     )
-    return made
 
 
 _HEARTBEAT = _heartbeat()

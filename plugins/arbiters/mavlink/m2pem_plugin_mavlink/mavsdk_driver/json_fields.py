@@ -22,8 +22,7 @@ def read(type_: MessageType, fields_json: str) -> Message:
     names: tuple[str, ...] = type_.make._fields
     texts = {names[index] for index in type_.texts}
     given = {name: _read(fields[name], name in texts) for name in names if name in fields}
-    made: Message = type_.make(**given)
-    return made
+    return type_.make(**given)
 
 
 def _read(value: Any, is_text: bool) -> Any:

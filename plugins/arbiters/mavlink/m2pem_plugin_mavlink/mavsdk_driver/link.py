@@ -15,9 +15,9 @@ from m2pem_plugin_mavlink.mavsdk_driver import json_fields, library
 from m2pem_plugin_mavlink.microservices.mission_items import (
     MissionItem,
     MissionType,
-    is_temporary,
     item_message,
     mission_result_words,
+    refusal,
 )
 from m2pem_plugin_mavlink.microservices.mission_upload import UploadMission
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, types_by_id
@@ -25,7 +25,6 @@ from m2pem_plugin_mavlink.protocol.quality import LinkQuality
 from m2pem_plugin_mavlink.protocol.transaction import (
     ExchangeError,
     NoAnswerError,
-    RefusedError,
     Transaction,
 )
 from m2pem_plugin_mavlink.signing.signature import RefusedFrames
@@ -123,8 +122,7 @@ def _transaction_error(error: Exception) -> ExchangeError:
     if name not in _RESULTS:  # a timeout, or an error of MAVSDK itself
         return NoAnswerError(f"upload of the mission: MAVSDK: {library.reason(error)}")
     result = _RESULTS[name]
-    reason = f"mission refused: {mission_result_words(result)}"
-    return RefusedError(reason, result, temporary=is_temporary(result))
+    return refusal(f"mission refused: {mission_result_words(result)}", result)
 
 
 _logger = logging.getLogger(__name__)

@@ -210,27 +210,23 @@ class CommandExchange(Transaction[T]):
         self.deadline_s = now_s + self.retry_policy.answer_s
 
     def _message(self, confirmation: int) -> Message:
-        system, component = self.target
         places = self._params[4:]
         if self._place is not None:
             place = self._place
             places = (place.latitude_deg, place.longitude_deg, place.altitude_m)
         named = {f"param{number}": each for number, each in enumerate(self._params[:4], 1)}
-        named |= {"target_system": system, "target_component": component, "command": self.command}
-        made: Message
+        named |= {**self.target.as_target, "command": self.command}
         if self._as_int:
             scale = DEG_TO_1E7 if self._place is not None else 1.0
-            made = _INT.make(
+            return _INT.make(
                 **named,
                 frame=self._place.frame if self._place is not None else dialect.MAV_FRAME_MISSION,
                 x=round(places[0] * scale),
                 y=round(places[1] * scale),
                 z=places[2],
             )
-        else:
-            named |= {f"param{number}": each for number, each in enumerate(places, 5)}
-            made = _LONG.make(**named, confirmation=min(confirmation, 255))
-        return made
+        named |= {f"param{number}": each for number, each in enumerate(places, 5)}
+        return _LONG.make(**named, confirmation=min(confirmation, 255))
 
     def _problem(self) -> str:
         """Return why the command cannot be sent; "" if it can."""

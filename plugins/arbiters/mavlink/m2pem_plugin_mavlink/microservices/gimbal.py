@@ -128,17 +128,15 @@ def pointing(manager: Address, aim: Aim, device: int = ALL) -> Message:
     """Return `point` as a message without an answer, to send repeatedly
     (GIMBAL_MANAGER_SET_PITCHYAW)."""
     pitch_rad, yaw_rad = _angles(aim)
-    message: Message = _SET_PITCHYAW.make(
+    return _SET_PITCHYAW.make(
         flags=aim.flags,
         pitch=pitch_rad,
         yaw=yaw_rad,
         pitch_rate=math.nan,
         yaw_rate=math.nan,
-        target_system=manager.system,
-        target_component=manager.component,
+        **manager.as_target,
         gimbal_device_id=device,
     )
-    return message
 
 
 def stop(manager: Address, yaw_frame: YawFrame = YawFrame.VEHICLE, device: int = ALL) -> Command:

@@ -7,20 +7,16 @@ from m2pem_plugin_mavlink.microservices.mission_items import (
     CANCELLED,
     ITEM_FLOAT,
     ITEM_INT,
+    REQUEST_INT,
+    MissionExchange,
     MissionItem,
     MissionType,
-    is_temporary,
     item_of,
     mission_result_words,
+    refusal,
 )
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
-from m2pem_plugin_mavlink.protocol.transaction import (
-    ExchangeError,
-    NoAnswerError,
-    RefusedError,
-    RetryPolicy,
-    Transaction,
-)
+from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, NoAnswerError, RetryPolicy
 
 COUNT_RETRIES = RetryPolicy(tries=5, answer_s=1.5)
 ITEM_RETRIES = RetryPolicy(tries=8, answer_s=0.75)
@@ -36,11 +32,10 @@ MOST_ITEMS = 5000
 
 _LIST = message_type("MISSION_REQUEST_LIST")
 _COUNT = message_type("MISSION_COUNT")
-_REQUEST_INT = message_type("MISSION_REQUEST_INT")
 _ACK = message_type("MISSION_ACK")
 
 
-class DownloadMission(Transaction[tuple[MissionItem, ...]]):
+class DownloadMission(MissionExchange[tuple[MissionItem, ...]]):
     """Downloads the stored items of a vehicle (ArduPilot: item 0 is home).
 
     Fails with `RefusedError` (a MAV_MISSION_RESULT), `NoAnswerError`, or `ExchangeError` for an
@@ -50,9 +45,7 @@ class DownloadMission(Transaction[tuple[MissionItem, ...]]):
     wants = frozenset({_COUNT.id, ITEM_INT.id, ITEM_FLOAT.id, _ACK.id})
 
     def __init__(self, target: Address, mission_type: MissionType = MissionType.MISSION) -> None:
-        super().__init__(("mission", target))
-        self.target, self.mission_type = target, mission_type
-        self._what = mission_type.name.lower()
+        super().__init__(target, mission_type)
         self._began_s = 0.0
         self._passes_left = PASSES
         self._tries = 0
@@ -66,8 +59,7 @@ class DownloadMission(Transaction[tuple[MissionItem, ...]]):
 
     def receive(self, message: Message, sender: Address, now_s: float) -> None:
         """Process the count, an item, or a refusal."""
-        is_expected = sender == self.target and message.mission_type == self.mission_type
-        if self.done or not is_expected or not self.for_us(message):
+        if self.done or not self.is_expected(message, sender):
             return
         if message.TYPE is _COUNT:
             self._counted(message.count, now_s)
@@ -96,7 +88,7 @@ class DownloadMission(Transaction[tuple[MissionItem, ...]]):
 
     @property
     def _title(self) -> str:
-        return f"download of the {self._what}"
+        return f"download of the {self.what}"
 
     @property
     def _ends_s(self) -> float:
@@ -134,7 +126,7 @@ class DownloadMission(Transaction[tuple[MissionItem, ...]]):
             return
         at = "" if self._count is None else f", at item {self._next} of {self._count}"
         reason = f"{self._title}: {mission_result_words(result)}{at}"
-        self.fail(RefusedError(reason, result, temporary=is_temporary(result)))
+        self.fail(refusal(reason, result))
 
     def _go_on(self, now_s: float) -> None:
         while self._next in self._items:
@@ -147,18 +139,12 @@ class DownloadMission(Transaction[tuple[MissionItem, ...]]):
 
     def _ask_count(self, now_s: float) -> None:
         self._tries += 1
-        self.outbox.append(
-            _LIST.make(
-                target_system=self.target.system,
-                target_component=self.target.component,
-                mission_type=self.mission_type,
-            )
-        )
+        self.send(_LIST)
         self.deadline_s = min(now_s + COUNT_RETRIES.answer_s, self._ends_s)
 
     def _ask_item(self, now_s: float) -> None:
         self._tries += 1
-        self.outbox.append(item_request(self.target, self._next, self.mission_type))
+        self.send(REQUEST_INT, seq=self._next)
         self.deadline_s = min(now_s + ITEM_RETRIES.answer_s, self._ends_s)
 
     def _stop(self, error: ExchangeError) -> None:
@@ -167,22 +153,4 @@ class DownloadMission(Transaction[tuple[MissionItem, ...]]):
 
     def _end(self, result: int) -> None:
         """Send an acknowledgement, so that the vehicle stops waiting for requests."""
-        self.outbox.append(
-            _ACK.make(
-                target_system=self.target.system,
-                target_component=self.target.component,
-                type=result,
-                mission_type=self.mission_type,
-            )
-        )
-
-
-def item_request(target: Address, sequence: int, mission_type: MissionType) -> Message:
-    """MISSION_REQUEST_INT."""
-    message: Message = _REQUEST_INT.make(
-        seq=sequence,
-        target_system=target.system,
-        target_component=target.component,
-        mission_type=mission_type,
-    )
-    return message
+        self.send(_ACK, type=result)

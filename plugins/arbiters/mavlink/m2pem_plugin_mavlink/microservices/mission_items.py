@@ -5,10 +5,14 @@
 import math
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Any, TypeVar
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
+from m2pem_plugin_mavlink.protocol.messages import Address, Message, MessageType, message_type
+from m2pem_plugin_mavlink.protocol.transaction import RefusedError, Transaction
+
+T = TypeVar("T")
 
 ACCEPTED: int = dialect.MAV_MISSION_ACCEPTED
 CANCELLED: int = dialect.MAV_MISSION_OPERATION_CANCELLED
@@ -51,13 +55,14 @@ def is_of_one_item(result: int) -> bool:
     return result in _OF_ONE_ITEM
 
 
-def is_temporary(result: int) -> bool:
-    """Return whether a later request may succeed."""
-    return result in _TEMPORARY
+def refusal(reason: str, result: int) -> RefusedError:
+    """Return the error of an exchange that a vehicle refused with a MAV_MISSION_RESULT."""
+    return RefusedError(reason, result, temporary=result in _TEMPORARY)
 
 
 ITEM_INT = message_type("MISSION_ITEM_INT")
 ITEM_FLOAT = message_type("MISSION_ITEM")
+REQUEST_INT = message_type("MISSION_REQUEST_INT")
 
 _NO_FRAME: int = dialect.MAV_FRAME_MISSION
 _DEG_TO_1E7 = 1e7
@@ -131,21 +136,19 @@ def item_message(
     there, and some ground stations require exactly one."""
     scale = 1.0 if item.frame == _NO_FRAME else _DEG_TO_1E7
     named = {f"param{number}": float(each) for number, each in enumerate(item.params, 1)}
-    message: Message = ITEM_INT.make(
+    return ITEM_INT.make(
         **named,
         x=round(item.latitude_deg * scale),
         y=round(item.longitude_deg * scale),
         z=item.altitude_m,
         seq=sequence,
         command=item.command,
-        target_system=target.system,
-        target_component=target.component,
+        **target.as_target,
         frame=item.frame,
         current=int(sequence == 0 and mission_type is MissionType.MISSION),
         autocontinue=int(item.autocontinue),
         mission_type=mission_type,
     )
-    return message
 
 
 def item_of(message: Message) -> MissionItem:
@@ -162,3 +165,22 @@ def item_of(message: Message) -> MissionItem:
         altitude_m=message.z,
         autocontinue=bool(message.autocontinue),
     )
+
+
+class MissionExchange(Transaction[T]):
+    """An exchange about the items of one kind that a vehicle stores."""
+
+    def __init__(self, target: Address, mission_type: MissionType) -> None:
+        super().__init__(("mission", target))
+        self.target, self.mission_type = target, mission_type
+        self.what = mission_type.name.lower()
+
+    def is_expected(self, message: Message, sender: Address) -> bool:
+        """Return whether a message is about these items, and for this ground station."""
+        of_target = sender == self.target and message.mission_type == self.mission_type
+        return of_target and self.for_us(message)
+
+    def send(self, type_: MessageType, **fields: Any) -> None:
+        """Send a message about these items."""
+        target = self.target.as_target
+        self.outbox.append(type_.make(**target, mission_type=self.mission_type, **fields))

@@ -15,21 +15,17 @@ from m2pem_plugin_mavlink.microservices.mission_items import (
     ACCEPTED,
     CANCELLED,
     OUT_OF_SEQUENCE,
+    REQUEST_INT,
+    MissionExchange,
     MissionItem,
     MissionType,
     is_of_one_item,
-    is_temporary,
     item_message,
     mission_result_words,
+    refusal,
 )
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
-from m2pem_plugin_mavlink.protocol.transaction import (
-    ExchangeError,
-    NoAnswerError,
-    RefusedError,
-    RetryPolicy,
-    Transaction,
-)
+from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, NoAnswerError, RetryPolicy
 
 COUNT_RETRIES = RetryPolicy(tries=5, answer_s=1.5)
 """For the first request; mavlink.io: 1.5 s, five times."""
@@ -54,11 +50,10 @@ MOST_ITEMS = 0xFFFF
 
 _COUNT = message_type("MISSION_COUNT")
 _REQUEST = message_type("MISSION_REQUEST")
-_REQUEST_INT = message_type("MISSION_REQUEST_INT")
 _ACK = message_type("MISSION_ACK")
 
 
-class UploadMission(Transaction[None]):
+class UploadMission(MissionExchange[None]):
     """Stores items in place of the stored ones.
 
     Fails with `RefusedError` (a MAV_MISSION_RESULT, and which item; `temporary` where it is busy or
@@ -66,7 +61,7 @@ class UploadMission(Transaction[None]):
     anything is sent.
     """
 
-    wants = frozenset({_REQUEST.id, _REQUEST_INT.id, _ACK.id})
+    wants = frozenset({_REQUEST.id, REQUEST_INT.id, _ACK.id})
 
     def __init__(
         self,
@@ -74,10 +69,9 @@ class UploadMission(Transaction[None]):
         items: Sequence[MissionItem],
         mission_type: MissionType = MissionType.MISSION,
     ) -> None:
-        super().__init__(("mission", target))
-        self.target, self.items, self.mission_type = target, tuple(items), mission_type
+        super().__init__(target, mission_type)
+        self.items = tuple(items)
         self.bound_s = BASE_S + PER_ITEM_S * len(self.items)
-        self._what = mission_type.name.lower()
         self._ends_s = 0.0
         self._passes_left = PASSES
         self._counts_sent = 0
@@ -92,14 +86,13 @@ class UploadMission(Transaction[None]):
         self._ends_s = now_s + self.bound_s
         problem = self._problem()
         if problem:
-            self.fail(ExchangeError(f"{self._what} not sent: {problem}"))
+            self.fail(ExchangeError(f"{self.what} not sent: {problem}"))
         else:
             self._pass(now_s)
 
     def receive(self, message: Message, sender: Address, now_s: float) -> None:
         """Process a request for an item, or the acknowledgement."""
-        is_expected = sender == self.target and message.mission_type == self.mission_type
-        if self.done or not is_expected or not self.for_us(message):
+        if self.done or not self.is_expected(message, sender):
             return
         if message.TYPE is _ACK:
             self._acknowledged(message.type, now_s)
@@ -128,14 +121,7 @@ class UploadMission(Transaction[None]):
 
     def _send_count(self, now_s: float) -> None:
         self._counts_sent += 1
-        self.outbox.append(
-            _COUNT.make(
-                count=len(self.items),
-                target_system=self.target.system,
-                target_component=self.target.component,
-                mission_type=self.mission_type,
-            )
-        )
+        self.send(_COUNT, count=len(self.items))
         self._wait(COUNT_RETRIES.answer_s, now_s)
 
     def _wanted(self, sequence: int, now_s: float) -> None:
@@ -176,21 +162,13 @@ class UploadMission(Transaction[None]):
             reason = f"item {self._last} ({name}): {reason}"
         elif self._last is not None:
             reason = f"{reason}, at item {self._last}"
-        error = f"{self._what} refused: {reason}"
-        self.fail(RefusedError(error, result, temporary=is_temporary(result)))
+        self.fail(refusal(f"{self.what} refused: {reason}", result))
 
     def _give_up(self, reason: str) -> None:
         """Make the vehicle stop waiting for items, and fail."""
-        self.outbox.append(
-            _ACK.make(
-                target_system=self.target.system,
-                target_component=self.target.component,
-                type=CANCELLED,
-                mission_type=self.mission_type,
-            )
-        )
+        self.send(_ACK, type=CANCELLED)
         odd = f" ({self._oddity})" if self._oddity else ""
-        self.fail(NoAnswerError(f"upload of the {self._what}: {reason}{odd}"))
+        self.fail(NoAnswerError(f"upload of the {self.what}: {reason}{odd}"))
 
     def _wait(self, seconds: float, now_s: float) -> None:
         self.deadline_s = min(now_s + seconds, self._ends_s)

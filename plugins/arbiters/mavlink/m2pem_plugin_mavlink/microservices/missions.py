@@ -1,29 +1,29 @@
 """Clearing stored items, setting the current one, and reading a single one (mavlink.io,
 "Mission Protocol", services/mission.html)."""
 
+from abc import abstractmethod
+from typing import TypeVar
+
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem_plugin_mavlink.microservices.commands import CommandExchange
-from m2pem_plugin_mavlink.microservices.mission_download import item_request
 from m2pem_plugin_mavlink.microservices.mission_items import (
     ACCEPTED,
     CANCELLED,
     ITEM_FLOAT,
     ITEM_INT,
+    REQUEST_INT,
+    MissionExchange,
     MissionItem,
     MissionType,
-    is_temporary,
     item_of,
     mission_result_words,
+    refusal,
 )
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
-from m2pem_plugin_mavlink.protocol.transaction import (
-    RETRIES,
-    NoAnswerError,
-    RefusedError,
-    RetryPolicy,
-    Transaction,
-)
+from m2pem_plugin_mavlink.protocol.transaction import RETRIES, NoAnswerError, RetryPolicy
+
+T = TypeVar("T")
 
 CLEAR_RETRIES = RetryPolicy(tries=5, answer_s=1.5)
 
@@ -33,50 +33,63 @@ _CURRENT = message_type("MISSION_CURRENT")
 _SET_CURRENT = message_type("MISSION_SET_CURRENT")
 
 
-class ClearMission(Transaction[None]):
-    """Removes all items. ArduPilot refuses while it executes them.
+class _Question(MissionExchange[T]):
+    """A request that is repeated until it is answered. `title`: what was requested, for errors.
 
     Fails with `RefusedError` (a MAV_MISSION_RESULT) or `NoAnswerError`.
     """
 
-    wants = frozenset({_ACK.id})
+    retry_policy: RetryPolicy
+    title: str
 
-    def __init__(self, target: Address, mission_type: MissionType = MissionType.MISSION) -> None:
-        super().__init__(("mission", target))
-        self.target, self.mission_type = target, mission_type
+    def __init__(self, target: Address, mission_type: MissionType) -> None:
+        super().__init__(target, mission_type)
         self._tries = 0
+
+    @abstractmethod
+    def ask(self) -> None:
+        """Send the request."""
 
     def begin(self, now_s: float) -> None:
         """Ask."""
         self._tries += 1
-        self.outbox.append(
-            _CLEAR.make(
-                target_system=self.target.system,
-                target_component=self.target.component,
-                mission_type=self.mission_type,
-            )
-        )
-        self.deadline_s = now_s + CLEAR_RETRIES.answer_s
+        self.ask()
+        self.deadline_s = now_s + self.retry_policy.answer_s
+
+    def expire(self, now_s: float) -> None:
+        """Repeat the request, or fail."""
+        if self._tries < self.retry_policy.tries:
+            self.begin(now_s)
+        else:
+            asked = f"no answer after {self._tries} requests"
+            self.fail(NoAnswerError(f"{self.title}: {asked}"))
+
+    def refused(self, result: int) -> None:
+        """Fail with a result of the vehicle."""
+        self.fail(refusal(f"{self.title}: {mission_result_words(result)}", result))
+
+
+class ClearMission(_Question[None]):
+    """Removes all items. ArduPilot refuses while it executes them."""
+
+    wants = frozenset({_ACK.id})
+    retry_policy = CLEAR_RETRIES
+
+    def __init__(self, target: Address, mission_type: MissionType = MissionType.MISSION) -> None:
+        super().__init__(target, mission_type)
+        self.title = f"clearing the {self.what}"
+
+    def ask(self) -> None:
+        self.send(_CLEAR)
 
     def receive(self, message: Message, sender: Address, now_s: float) -> None:
         """Process the acknowledgement or refusal."""
-        is_expected = sender == self.target and message.mission_type == self.mission_type
-        if not is_expected or not self.for_us(message):
+        if not self.is_expected(message, sender):
             return
         if message.type == ACCEPTED:
             self.succeed(None)
         elif message.type != CANCELLED:  # from an upload that has failed
-            reason = f"clearing the {self.mission_type.name.lower()}: "
-            reason += mission_result_words(message.type)
-            self.fail(RefusedError(reason, message.type, temporary=is_temporary(message.type)))
-
-    def expire(self, now_s: float) -> None:
-        """Repeat the request, or fail."""
-        if self._tries < CLEAR_RETRIES.tries:
-            self.begin(now_s)
-            return
-        what = f"clearing the {self.mission_type.name.lower()}"
-        self.fail(NoAnswerError(f"{what}: no answer after {self._tries} requests"))
+            self.refused(message.type)
 
 
 class SetCurrentItem(CommandExchange[None]):
@@ -124,24 +137,16 @@ class SetCurrentItem(CommandExchange[None]):
 
     def _send(self, now_s: float) -> None:
         self._tries += 1
-        self.outbox.append(
-            _SET_CURRENT.make(
-                seq=self._sequence,
-                target_system=self.target.system,
-                target_component=self.target.component,
-            )
-        )
+        self.outbox.append(_SET_CURRENT.make(**self.target.as_target, seq=self._sequence))
         self.deadline_s = now_s + self.retry_policy.answer_s
 
 
-class ReadMissionItem(Transaction[MissionItem]):
+class ReadMissionItem(_Question[MissionItem]):
     """Reads one stored item without a download, which ArduPilot allows (its item 0 is home) and PX4
-    does not.
-
-    Fails with `RefusedError` (a MAV_MISSION_RESULT) or `NoAnswerError`.
-    """
+    does not."""
 
     wants = frozenset({ITEM_INT.id, ITEM_FLOAT.id, _ACK.id})
+    retry_policy = RETRIES
 
     def __init__(
         self,
@@ -149,33 +154,19 @@ class ReadMissionItem(Transaction[MissionItem]):
         sequence: int,
         mission_type: MissionType = MissionType.MISSION,
     ) -> None:
-        super().__init__(("mission", target))
-        self.target, self.mission_type = target, mission_type
+        super().__init__(target, mission_type)
+        self.title = f"item {sequence}"
         self._sequence = sequence
-        self._tries = 0
 
-    def begin(self, now_s: float) -> None:
-        """Ask."""
-        self._tries += 1
-        self.outbox.append(item_request(self.target, self._sequence, self.mission_type))
-        self.deadline_s = now_s + RETRIES.answer_s
+    def ask(self) -> None:
+        self.send(REQUEST_INT, seq=self._sequence)
 
     def receive(self, message: Message, sender: Address, now_s: float) -> None:
         """Process the item, or a refusal."""
-        is_expected = sender == self.target and message.mission_type == self.mission_type
-        if not is_expected or not self.for_us(message):
+        if not self.is_expected(message, sender):
             return
         if message.TYPE is not _ACK:
             if message.seq == self._sequence:
                 self.succeed(item_of(message))
         elif message.type not in (ACCEPTED, CANCELLED):  # these are from earlier exchanges
-            reason = f"item {self._sequence}: {mission_result_words(message.type)}"
-            self.fail(RefusedError(reason, message.type, temporary=is_temporary(message.type)))
-
-    def expire(self, now_s: float) -> None:
-        """Repeat the request, or fail."""
-        if self._tries < RETRIES.tries:
-            self.begin(now_s)
-        else:
-            asked = f"no answer after {self._tries} requests"
-            self.fail(NoAnswerError(f"item {self._sequence}: {asked}"))
+            self.refused(message.type)

@@ -118,12 +118,6 @@ class ReadParameter(Transaction[float]):
 
     def _ask(self, now_s: float) -> None:
         self._tries += 1
-        self.outbox.append(
-            _READ.make(
-                param_index=_BY_NAME,
-                target_system=self.target.system,
-                target_component=self.target.component,
-                param_id=self._encoded,
-            )
-        )
+        target = self.target.as_target
+        self.outbox.append(_READ.make(**target, param_index=_BY_NAME, param_id=self._encoded))
         self.deadline_s = now_s + RETRIES.answer_s

@@ -25,6 +25,11 @@ class Address(NamedTuple):
     system: int
     component: int
 
+    @property
+    def as_target(self) -> dict[str, int]:
+        """The fields of a message that is sent there."""
+        return {"target_system": self.system, "target_component": self.component}
+
 
 class Message(Protocol):
     """A message: its fields are attributes of the names that the dialect gives them."""
@@ -34,6 +39,18 @@ class Message(Protocol):
     def __getattr__(self, field: str) -> Any: ...
 
     def __iter__(self) -> Iterator[Any]: ...
+
+    def _replace(self, **fields: Any) -> "Message": ...
+
+
+class MessageMaker(Protocol):
+    """The named tuple of a message type."""
+
+    _fields: tuple[str, ...]
+
+    def __call__(self, **fields: Any) -> Message: ...
+
+    def _make(self, items: Iterable[Any]) -> Message: ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,7 +66,7 @@ class MessageType:
     name: str
     crc_extra: int
     struct: Struct
-    make: Any
+    make: MessageMaker
     spans: tuple[slice | int, ...] | None
     texts: tuple[int, ...]
 

@@ -354,8 +354,7 @@ class Autopilot(ABC):
         north, east, down = velocity_ned_m_s
         self.link.send(
             _SET_POSITION_TARGET.make(
-                target_system=self.link.address.system,
-                target_component=self.link.address.component,
+                **self.link.address.as_target,
                 coordinate_frame=dialect.MAV_FRAME_LOCAL_NED,
                 type_mask=_VELOCITY_ONLY,
                 vx=north,
