@@ -5,9 +5,11 @@ import math
 from itertools import pairwise
 
 import pytest
+from m2pem_plugin_mavlink.microservices.mission_download import DownloadMission
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
+from m2pem_plugin_mavlink.microservices.mission_upload import UploadMission
+from m2pem_plugin_mavlink.microservices.missions import SetCurrentItem
 from m2pem_plugin_mavlink.simulator.specification import Kind
-from m2pem_plugin_mavlink.vehicle import exchanges
 from m2pem_plugin_mavlink.vehicle.fixed_wing import landing_start
 from mavlink_simulated import AMPLE_S, at, fly, ground_station
 
@@ -188,7 +190,8 @@ async def store_landing(bench) -> None:
     assert await bench.until(lambda: bench.latest("v1") is not None, AMPLE_S)
     home = stored(WAYPOINT, 0, 0, 0)  # ArduPilot has it as item 0
     async with ground_station(bench.simulator, bench.clock) as link:
-        await exchanges.upload(link, [home, stored(WAYPOINT, 0, 900, 50), *LANDING])
+        items = [home, stored(WAYPOINT, 0, 900, 50), *LANDING]
+        await link.perform(UploadMission(link.address, items))
 
 
 def test_without_a_landing_stored_it_says_what_it_needs() -> None:
@@ -226,9 +229,9 @@ def test_a_survey_that_goes_on_with_the_stored_landing_has_not_succeeded() -> No
         await bench.start("r1.b2", "single_vehicle_routing", "v1", route=route)
         await bench.running("r1.b2", AMPLE_S)
         async with ground_station(bench.simulator, bench.clock) as link:
-            begins = landing_start(await exchanges.download(link))
+            begins = landing_start(await link.perform(DownloadMission(link.address)))
             assert begins is not None
-            await exchanges.set_current(link, begins)
+            await link.perform(SetCurrentItem(link.address, begins))
         end = await bench.ended("r1.b2", AMPLE_S)
         assert end.state is BehaviorState.FAILED
         assert "has started its landing" in end.reason

@@ -5,9 +5,10 @@ import math
 from m2pem.api import LatLon, LocalFrame, distance_m
 from m2pem_plugin_mavlink.behaviors.behavior import Behavior, BehaviorContext
 from m2pem_plugin_mavlink.behaviors.parameters import AMSL, RELATIVE
-from m2pem_plugin_mavlink.protocol.transaction import ExchangeError
+from m2pem_plugin_mavlink.microservices.message_requests import RequestMessage
+from m2pem_plugin_mavlink.protocol.messages import Message
+from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, RetryPolicy
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode, TargetPosition
-from m2pem_plugin_mavlink.vehicle.exchanges import position_target
 from m2pem_plugin_mavlink.vehicle.state import AutopilotState
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 
@@ -27,6 +28,10 @@ LOOKS_FOR_S = 4.0
 """Seconds after a restart in which a vehicle on its way has turned and moves."""
 
 SAME_TARGET_M = 2.0
+
+_SHORT = RetryPolicy(tries=2, answer_s=1.0)
+_IGNORES_POSITION = 0b111
+"""POSITION_TARGET_TYPEMASK."""
 
 _TOWARDS = math.cos(math.radians(60.0))
 
@@ -179,7 +184,7 @@ async def _has_target(vehicle: Vehicle, place: TargetPosition) -> bool:
     """Ask the autopilot for its target: a plane may fly away from its target until it has turned.
     Heights in the answer are above mean sea level."""
     try:
-        target = await position_target(vehicle.link)
+        target = await _position_target(vehicle)
     except ExchangeError:
         return False  # the autopilot has no target, or does not report it
     if distance_m((place.latitude_deg, place.longitude_deg), target[:2]) > SAME_TARGET_M:
@@ -188,3 +193,17 @@ async def _has_target(vehicle: Vehicle, place: TargetPosition) -> bool:
     if place.altitude_m is None or height is None or here is None:
         return True
     return abs(target[2] - here.altitude_m - (place.altitude_m - height)) < HEIGHT_TOLERANCE_M
+
+
+async def _position_target(vehicle: Vehicle) -> tuple[float, float, float]:
+    """Return the autopilot's target: latitude and longitude in degrees, metres above mean sea level
+    (POSITION_TARGET_GLOBAL_INT in MAV_FRAME_GLOBAL). An autopilot without a target does not
+    answer."""
+
+    def read(message: Message) -> tuple[float, float, float] | None:
+        if message.type_mask & _IGNORES_POSITION:
+            return None
+        return message.lat_int / 1e7, message.lon_int / 1e7, message.alt
+
+    name, address = "POSITION_TARGET_GLOBAL_INT", vehicle.link.address
+    return await vehicle.link.perform(RequestMessage(address, name, read, retry_policy=_SHORT))

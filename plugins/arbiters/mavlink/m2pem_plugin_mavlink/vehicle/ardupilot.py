@@ -7,8 +7,8 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem_plugin_mavlink.microservices.commands import CommandPosition
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
+from m2pem_plugin_mavlink.microservices.missions import SetCurrentItem
 from m2pem_plugin_mavlink.protocol.transaction import RefusedError
-from m2pem_plugin_mavlink.vehicle import exchanges
 from m2pem_plugin_mavlink.vehicle.autopilot import SHOWS_WITHIN_S, Autopilot, cannot, not_now
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode, TargetPosition
 from m2pem_plugin_mavlink.vehicle.fixed_wing import NO_LANDING, WINGED, landing_items, landing_start
@@ -38,17 +38,13 @@ _STOP_MODES = {
 
 
 class ArdupilotDriver(Autopilot):
-    """The driver of a vehicle with ArduPilot; see `Driver`."""
+    """The driver of a vehicle with ArduPilot."""
 
     home_items = 1
 
     async def _command_mode(self, custom_mode: int) -> None:
-        await exchanges.command(
-            self.link,
-            dialect.MAV_CMD_DO_SET_MODE,
-            float(dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED),
-            float(custom_mode),
-        )
+        flags = float(dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED)
+        await self.command(dialect.MAV_CMD_DO_SET_MODE, flags, float(custom_mode))
 
     async def _enter_arming_mode(self) -> None:
         """Enter GUIDED, which is refused as long as there is no position: in STABILIZE the arming
@@ -78,9 +74,7 @@ class ArdupilotDriver(Autopilot):
             await self.arm()
             await self.set_mode(FlightMode.GUIDED)
             try:
-                await exchanges.command(
-                    self.link, dialect.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, altitude_m
-                )
+                await self.command(dialect.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, altitude_m)
             except RefusedError:
                 # A copter that was armed long ago disarms itself; or its position is just lost.
                 if attempt == TAKEOFF_ATTEMPTS:
@@ -160,23 +154,17 @@ class ArdupilotDriver(Autopilot):
         if speed_m_s is not None:
             await self.set_speed(speed_m_s)
         if place.heading_rad is not None and self.kind is Kind.COPTER:
-            await exchanges.command(
-                self.link,
-                dialect.MAV_CMD_CONDITION_YAW,
-                math.degrees(place.heading_rad) % 360.0,
-            )
+            heading_deg = math.degrees(place.heading_rad) % 360.0
+            await self.command(dialect.MAV_CMD_CONDITION_YAW, heading_deg)
 
     async def _reposition(self, place: TargetPosition, radius_m: float) -> None:
         """Send a target to a vehicle in GUIDED. It must not change the mode: one that a pilot has
         left GUIDED with refuses it."""
         frame, altitude_m = self._altitude(place)
+        at = CommandPosition(place.latitude_deg, place.longitude_deg, altitude_m, frame)
+        params = (AS_IT_IS, 0.0, radius_m, math.nan)
         try:
-            await exchanges.command_at(
-                self.link,
-                dialect.MAV_CMD_DO_REPOSITION,
-                (AS_IT_IS, 0.0, radius_m, math.nan),
-                CommandPosition(place.latitude_deg, place.longitude_deg, altitude_m, frame),
-            )
+            await self.command(dialect.MAV_CMD_DO_REPOSITION, *params, place=at)
         except RefusedError:
             guided = self.modes.number("GUIDED")
             if await self.vehicle.until(lambda: self._was_left(guided), SHOWS_WITHIN_S):
@@ -258,10 +246,10 @@ class ArdupilotDriver(Autopilot):
         self.commanded.first_item = first
         if self.state.mode is FlightMode.MISSION:
             await self.set_mode(FlightMode.GUIDED)
-        await exchanges.set_current(self.link, first + self.home_items)
+        await self.link.perform(SetCurrentItem(self.link.address, first + self.home_items))
         await self.set_mode(FlightMode.MISSION)
         if self.kind in WINGED:
             await self.arm()
         elif self.kind is Kind.COPTER and not self.in_the_air:
-            await exchanges.command(self.link, dialect.MAV_CMD_MISSION_START)
+            await self.command(dialect.MAV_CMD_MISSION_START)
         await self._mission_begins()

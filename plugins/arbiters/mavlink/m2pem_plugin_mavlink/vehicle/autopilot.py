@@ -1,4 +1,5 @@
-"""The base class of drivers: sends commands until the vehicle's own messages confirm them."""
+"""The interface of drivers, and what is the same for all autopilots: they send commands until the
+vehicle's own messages confirm them."""
 
 import contextlib
 import re
@@ -10,11 +11,14 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem.api import LatLon
 from m2pem_plugin_mavlink.link.vehicle_link import VehicleLink
+from m2pem_plugin_mavlink.microservices.commands import Command, CommandPosition
+from m2pem_plugin_mavlink.microservices.mission_download import DownloadMission
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem, MissionType
+from m2pem_plugin_mavlink.microservices.mission_upload import UploadMission
+from m2pem_plugin_mavlink.microservices.missions import ClearMission
 from m2pem_plugin_mavlink.protocol.messages import message_type
 from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, NoAnswerError, RefusedError
-from m2pem_plugin_mavlink.vehicle import exchanges
-from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Readiness
+from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Readiness, TargetPosition
 from m2pem_plugin_mavlink.vehicle.identity import Identity, Kind
 from m2pem_plugin_mavlink.vehicle.modes import modes_of
 from m2pem_plugin_mavlink.vehicle.readiness import TEXTS_WITHIN_S, readiness, unlocated
@@ -93,7 +97,13 @@ class DrivenVehicle(Protocol):
 
 
 class Autopilot(ABC):
-    """Implements the part of `Driver` that is the same for all autopilots."""
+    """A driver. Each method returns when the vehicle has accepted and its own messages confirm it
+    (HEARTBEAT for a mode, not the acknowledgement), after retries; it does not wait until the
+    motion ends.
+
+    Raises:
+        ExchangeError: the vehicle refuses (with its STATUSTEXT as the reason) or does not answer.
+    """
 
     home_items: int
     """How many items of a stored mission stand before the first real one."""
@@ -111,21 +121,26 @@ class Autopilot(ABC):
     # --- state ------------------------------------------------------------------------------------
 
     def mode_name(self, custom_mode: int) -> str:
+        """Return the autopilot's own name of a mode: "GUIDED", "AUTO.MISSION"."""
         return self.modes.name(custom_mode)
 
     def flight_mode(self, custom_mode: int) -> FlightMode:
+        """Return the purpose of a mode."""
         return self.modes.purpose(custom_mode)
 
     def readiness(self) -> Readiness:
+        """Return whether the vehicle may be armed now."""
         texts = self.vehicle.recent_texts(TEXTS_WITHIN_S)
         return readiness(self.identity.firmware, self.state, texts, self.link.now_s())
 
     @property
     def current_item(self) -> int | None:
+        """The item that the vehicle moves to, numbered as in `upload`."""
         return self._item(self.state.mission_sequence)
 
     @property
     def reached_item(self) -> int | None:
+        """The item reached last since the mission was started."""
         return self._item(self.state.reached_sequence)
 
     def _item(self, sequence: int | None) -> int | None:
@@ -314,14 +329,14 @@ class Autopilot(ABC):
         """Request the reasons against arming now; unasked, ArduPilot sends them every 30 s, and PX4
         when they change."""
         with contextlib.suppress(ExchangeError):  # older autopilots do not have the command
-            await exchanges.command(self.link, dialect.MAV_CMD_RUN_PREARM_CHECKS)
+            await self.command(dialect.MAV_CMD_RUN_PREARM_CHECKS)
 
     @abstractmethod
     async def _enter_arming_mode(self) -> None: ...
 
     async def _arm(self) -> None:
         await self._repeat(
-            lambda: exchanges.command(self.link, dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0),
+            lambda: self.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0),
             lambda: self.state.armed is True,
             ARM_WITHIN_S,
             "arming",
@@ -329,11 +344,12 @@ class Autopilot(ABC):
         self.commanded.disarming = False
 
     async def disarm(self) -> None:
+        """Disarm; refused in flight."""
         if self.state.armed is False:
             return
         self.commanded.disarming = True
         try:
-            await exchanges.command(self.link, dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
+            await self.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
         except RefusedError:
             self.commanded.disarming = False
             raise
@@ -348,7 +364,35 @@ class Autopilot(ABC):
             raise not_now("it is on the ground, not armed: it must take off first")
         await self.arm()
 
-    # --- velocity -------------------------------------------------------------------------------
+    # --- motion ---------------------------------------------------------------------------------
+
+    @abstractmethod
+    async def take_off(self, altitude_m: float) -> None:
+        """Arm where needed, and climb to a height above home."""
+
+    @abstractmethod
+    async def go_to(self, place: TargetPosition, speed_m_s: float | None = None) -> None:
+        """Go to a place and stay there (DO_REPOSITION or its equivalent)."""
+
+    @abstractmethod
+    async def orbit(self, center: TargetPosition, radius_m: float, speed_m_s: float | None) -> bool:
+        """Circle a place without end; return False if the autopilot has no command for it."""
+
+    @abstractmethod
+    async def stop(self) -> None:
+        """Stop at once (HOLD, LOITER, BRAKE) from any motion; idempotent."""
+
+    @abstractmethod
+    async def return_home(self) -> None:
+        """Return to launch."""
+
+    @abstractmethod
+    async def land(self) -> None:
+        """Land at the present position."""
+
+    @abstractmethod
+    async def move(self, velocity_ned_m_s: tuple[float, float, float]) -> None:
+        """Send one velocity setpoint; repeat it twice a second, or the vehicle stops."""
 
     def _send_velocity(self, velocity_ned_m_s: tuple[float, float, float]) -> None:
         north, east, down = velocity_ned_m_s
@@ -370,13 +414,17 @@ class Autopilot(ABC):
     # --- missions -------------------------------------------------------------------------------
 
     async def upload(self, items: Sequence[MissionItem]) -> None:
+        """Store a mission; an empty one clears it. Item 0 is the first real one: home, where the
+        autopilot requires it as item 0, is added here, and left out of `downloaded` and
+        `current_item`."""
         self.commanded.mission = None
         self.commanded.exchanging += 1
         try:
             if items:
-                await exchanges.upload(self.link, self._as_stored(tuple(items)))
+                stored = self._as_stored(tuple(items))
+                await self.link.perform(UploadMission(self.link.address, stored))
             else:
-                await exchanges.clear(self.link)
+                await self.link.perform(ClearMission(self.link.address))
         finally:
             self.commanded.exchanging -= 1
         self.commanded.mission = tuple(items)
@@ -386,15 +434,24 @@ class Autopilot(ABC):
         return items
 
     async def downloaded(self) -> tuple[MissionItem, ...]:
+        """Return the stored mission, in the form that `upload` takes."""
         self.commanded.exchanging += 1
         try:
-            return (await exchanges.download(self.link))[self.home_items :]
+            stored = await self.link.perform(DownloadMission(self.link.address))
+            return stored[self.home_items :]
         finally:
             self.commanded.exchanging -= 1
 
     async def rally_points(self) -> Sequence[LatLon]:
-        found = await exchanges.download(self.link, MissionType.RALLY)
+        """Return the places where the vehicle may land instead of at home: latitudes and longitudes
+        in degrees."""
+        found = await self.link.perform(DownloadMission(self.link.address, MissionType.RALLY))
         return [(each.latitude_deg, each.longitude_deg) for each in found]
+
+    @abstractmethod
+    async def start_mission(self, first: int = 0) -> None:
+        """Execute the stored mission from an item on (numbered as in `upload`), arming where
+        needed."""
 
     async def _mission_begins(self) -> None:
         """Wait until MISSION_CURRENT shows that the mission is active or complete. An autopilot
@@ -419,9 +476,11 @@ class Autopilot(ABC):
         """Set the speed over ground of the following motion (of a plane: the airspeed)."""
         air = self.kind is Kind.PLANE
         type_ = dialect.SPEED_TYPE_AIRSPEED if air else dialect.SPEED_TYPE_GROUNDSPEED
-        await exchanges.command(
-            self.link, dialect.MAV_CMD_DO_CHANGE_SPEED, float(type_), speed_m_s, -1.0
-        )
+        await self.command(dialect.MAV_CMD_DO_CHANGE_SPEED, float(type_), speed_m_s, -1.0)
 
-    async def command(self, command: int, *params: float) -> None:
-        await exchanges.command(self.link, command, *params)
+    async def command(
+        self, command: int, *params: float, place: CommandPosition | None = None
+    ) -> None:
+        """Send a command: a MAV_CMD with up to seven parameters, or the first four and a place; the
+        others are 0."""
+        await self.link.perform(Command(self.link.address, command, params, place=place))

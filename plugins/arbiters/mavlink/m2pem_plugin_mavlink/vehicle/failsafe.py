@@ -10,10 +10,14 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from m2pem.api import ResourceId
-from m2pem_plugin_mavlink.microservices.parameters import PARAM_VALUE, encoded_name, value_of
+from m2pem_plugin_mavlink.microservices.parameters import (
+    PARAM_VALUE,
+    ReadParameter,
+    encoded_name,
+    value_of,
+)
 from m2pem_plugin_mavlink.protocol.messages import Address, Message
 from m2pem_plugin_mavlink.protocol.transaction import ExchangeError
-from m2pem_plugin_mavlink.vehicle import exchanges
 from m2pem_plugin_mavlink.vehicle.identity import ON_THE_GROUND, Firmware, Identity, Kind
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 
@@ -294,10 +298,11 @@ class FailsafeMonitor:
         vehicle, identity = self._vehicle, self._vehicle.identity
         if not self._word or identity is None:
             return ()
+        link, encoding = vehicle.link, identity.firmware.encoding
 
         async def read(name: str) -> None:
             try:
-                value = await exchanges.parameter(vehicle.link, identity.firmware, name)
+                value = await link.perform(ReadParameter(link.address, name, encoding))
             except ExchangeError:
                 if name not in self._values:
                     self._missing.add(name)
@@ -315,7 +320,7 @@ class FailsafeMonitor:
         if identity is None:
             return
         names = {encoded_name(name): name for name in parameters_of_interest(identity)}
-        encoding = exchanges.ENCODINGS[identity.firmware]
+        encoding = identity.firmware.encoding
         changed = False
 
         def receive(message: Message, sender: Address) -> None:

@@ -11,8 +11,8 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem_plugin_mavlink.link.vehicle_link import VehicleLink
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
+from m2pem_plugin_mavlink.microservices.parameters import ReadParameter
 from m2pem_plugin_mavlink.protocol.transaction import NoAnswerError
-from m2pem_plugin_mavlink.vehicle import exchanges
 from m2pem_plugin_mavlink.vehicle.identity import Firmware, Identity, Kind
 from m2pem_plugin_mavlink.vehicle.state import AutopilotState
 
@@ -51,16 +51,16 @@ async def read_radii(state: AutopilotState, identity: Identity, link: VehicleLin
     Raises:
         ExchangeError: the vehicle does not answer.
     """
-    radii = _RADII[identity.firmware]
-    elsewhere_m = abs(await exchanges.parameter(link, identity.firmware, radii.name))
-    if elsewhere_m > 0:
-        state.loiter_radius_m = state.home_loiter_radius_m = elsewhere_m
+    radii, encoding = _RADII[identity.firmware], identity.firmware.encoding
+    elsewhere_m = await link.perform(ReadParameter(link.address, radii.name, encoding))
+    if abs(elsewhere_m) > 0:
+        state.loiter_radius_m = state.home_loiter_radius_m = abs(elsewhere_m)
     try:
-        home_m = abs(await exchanges.parameter(link, identity.firmware, radii.home_name))
+        home_m = await link.perform(ReadParameter(link.address, radii.home_name, encoding))
     except NoAnswerError:
         return  # older autopilots do not have this parameter
-    if home_m > 0:
-        state.home_loiter_radius_m = home_m
+    if abs(home_m) > 0:
+        state.home_loiter_radius_m = abs(home_m)
 
 
 _START: int = dialect.MAV_CMD_DO_LAND_START

@@ -5,12 +5,19 @@ from enum import StrEnum
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from m2pem_plugin_mavlink.microservices.parameters import ParameterEncoding
+
 
 class Firmware(StrEnum):
     """The firmware of the autopilot (MAV_AUTOPILOT)."""
 
     ARDUPILOT = "ArduPilot"
     PX4 = "PX4"
+
+    @property
+    def encoding(self) -> ParameterEncoding:
+        """The encoding of its parameters."""
+        return ParameterEncoding.BYTEWISE if self is Firmware.PX4 else ParameterEncoding.C_CAST
 
 
 class Kind(StrEnum):

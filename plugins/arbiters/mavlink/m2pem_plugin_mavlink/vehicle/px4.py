@@ -7,8 +7,8 @@ from collections.abc import Awaitable, Callable
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem_plugin_mavlink.microservices.commands import CommandPosition
+from m2pem_plugin_mavlink.microservices.missions import SetCurrentItem
 from m2pem_plugin_mavlink.protocol.transaction import RefusedError
-from m2pem_plugin_mavlink.vehicle import exchanges
 from m2pem_plugin_mavlink.vehicle.autopilot import Autopilot, cannot, not_now
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode, TargetPosition
 from m2pem_plugin_mavlink.vehicle.identity import ON_THE_GROUND, Kind
@@ -23,7 +23,7 @@ _UNSUPPORTED = dialect.MAV_RESULT_UNSUPPORTED
 
 
 class Px4Driver(Autopilot):
-    """The driver of a vehicle with PX4; see `Driver`.
+    """The driver of a vehicle with PX4.
 
     It goes to places in AUTO.LOITER, so that this is also its mode for `FlightMode.GUIDED`;
     OFFBOARD is entered by `move` alone.
@@ -38,9 +38,7 @@ class Px4Driver(Autopilot):
 
     async def _command_mode(self, custom_mode: int) -> None:
         main, sub = custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF
-        await exchanges.command(
-            self.link, dialect.MAV_CMD_DO_SET_MODE, _CUSTOM, float(main), float(sub)
-        )
+        await self.command(dialect.MAV_CMD_DO_SET_MODE, _CUSTOM, float(main), float(sub))
 
     async def _enter_arming_mode(self) -> None:
         """Enter a mode that holds its position: a manual mode may require a remote control."""
@@ -63,9 +61,7 @@ class Px4Driver(Autopilot):
         takeoff = self.modes.number("AUTO.TAKEOFF")
         await self._enter(
             takeoff,
-            lambda: exchanges.command(
-                self.link, dialect.MAV_CMD_NAV_TAKEOFF, nan, nan, nan, nan, nan, nan, amsl_m
-            ),
+            lambda: self.command(dialect.MAV_CMD_NAV_TAKEOFF, nan, nan, nan, nan, nan, nan, amsl_m),
             lambda: self.state.custom_mode == takeoff or self.in_the_air,
             must_accept=True,
         )
@@ -94,21 +90,16 @@ class Px4Driver(Autopilot):
 
     async def go_to(self, place: TargetPosition, speed_m_s: float | None = None) -> None:
         await self._arm_to_drive()
-        altitude_m = self._place_amsl(place)
-        heading = math.nan if place.heading_rad is None else place.heading_rad
+        at = self._position(place)
+        params = (
+            -1.0 if speed_m_s is None else speed_m_s,
+            float(dialect.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE),
+            0.0,
+            math.nan if place.heading_rad is None else place.heading_rad,
+        )
         await self._by_command(
             "AUTO.LOITER",
-            lambda: exchanges.command_at(
-                self.link,
-                dialect.MAV_CMD_DO_REPOSITION,
-                (
-                    -1.0 if speed_m_s is None else speed_m_s,
-                    float(dialect.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE),
-                    0.0,
-                    heading,
-                ),
-                CommandPosition(place.latitude_deg, place.longitude_deg, altitude_m, _AMSL),
-            ),
+            lambda: self.command(dialect.MAV_CMD_DO_REPOSITION, *params, place=at),
         )
 
     async def orbit(self, center: TargetPosition, radius_m: float, speed_m_s: float | None) -> bool:
@@ -116,21 +107,16 @@ class Px4Driver(Autopilot):
         if self.kind in ON_THE_GROUND or self.kind is Kind.PLANE:
             return False
         await self._arm_to_drive()
-        altitude_m = self._place_amsl(center)
+        at = self._position(center)
+        params = (
+            radius_m,
+            math.nan if speed_m_s is None else speed_m_s,
+            float(dialect.ORBIT_YAW_BEHAVIOUR_HOLD_FRONT_TO_CIRCLE_CENTER),
+            0.0,
+        )
         try:
             await self._by_command(
-                "POSCTL.ORBIT",
-                lambda: exchanges.command_at(
-                    self.link,
-                    dialect.MAV_CMD_DO_ORBIT,
-                    (
-                        radius_m,
-                        math.nan if speed_m_s is None else speed_m_s,
-                        float(dialect.ORBIT_YAW_BEHAVIOUR_HOLD_FRONT_TO_CIRCLE_CENTER),
-                        0.0,
-                    ),
-                    CommandPosition(center.latitude_deg, center.longitude_deg, altitude_m, _AMSL),
-                ),
+                "POSCTL.ORBIT", lambda: self.command(dialect.MAV_CMD_DO_ORBIT, *params, place=at)
             )
         except RefusedError as refused:
             if refused.result == _UNSUPPORTED:
@@ -144,10 +130,11 @@ class Px4Driver(Autopilot):
             number, command, lambda: self.state.custom_mode == number, must_accept=True
         )
 
-    def _place_amsl(self, place: TargetPosition) -> float:
-        if place.altitude_m is None or self.kind in ON_THE_GROUND:
-            return math.nan
-        return self._amsl(place.altitude_m, place.altitude_frame)
+    def _position(self, place: TargetPosition) -> CommandPosition:
+        altitude_m = math.nan
+        if place.altitude_m is not None and self.kind not in ON_THE_GROUND:
+            altitude_m = self._amsl(place.altitude_m, place.altitude_frame)
+        return CommandPosition(place.latitude_deg, place.longitude_deg, altitude_m, _AMSL)
 
     def _amsl(self, altitude_m: float, frame: str) -> float:
         """Return a height above mean sea level: PX4 accepts no other, in any frame of the
@@ -197,7 +184,7 @@ class Px4Driver(Autopilot):
         looks at the mission: until it has begun, that is an item of the mission before.
         """
         await self.arm()
-        await exchanges.set_current(self.link, first)
+        await self.link.perform(SetCurrentItem(self.link.address, first))
         await self.set_mode(FlightMode.MISSION)
         await self._mission_begins()
         self.state.reached_sequence = None

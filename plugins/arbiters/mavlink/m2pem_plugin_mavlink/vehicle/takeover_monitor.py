@@ -14,9 +14,9 @@ from enum import StrEnum
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
+from m2pem_plugin_mavlink.microservices.missions import ReadMissionItem
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
 from m2pem_plugin_mavlink.protocol.transaction import ExchangeError
-from m2pem_plugin_mavlink.vehicle import exchanges
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode
 from m2pem_plugin_mavlink.vehicle.fixed_wing import landing_start
 from m2pem_plugin_mavlink.vehicle.identity import Firmware
@@ -299,8 +299,9 @@ class TakeoverMonitor:
 
     async def _compare_item(self, item: int, mission: tuple[MissionItem, ...]) -> None:
         """Read the current item: it must be the one that was uploaded."""
+        link = self.vehicle.link
         try:
-            found = await exchanges.mission_item(self.vehicle.link, item + 1)
+            found = await link.perform(ReadMissionItem(link.address, item + 1))
         except ExchangeError:
             return  # a missing answer proves nothing
         if self.vehicle.commanded.mission is mission and not _same(found, mission[item]):

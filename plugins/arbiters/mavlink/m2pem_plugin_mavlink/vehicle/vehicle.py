@@ -3,20 +3,22 @@
 import asyncio
 import logging
 import math
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Mapping
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem.api import Clock, LinkState, ResourceId, VehicleState
 from m2pem_plugin_mavlink.link.vehicle_link import VehicleLink
+from m2pem_plugin_mavlink.microservices.message_requests import RequestMessage, SetMessageInterval
 from m2pem_plugin_mavlink.microservices.texts import GIVE_UP_S, StatusTexts, Text
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
 from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, NoAnswerError, RefusedError
 from m2pem_plugin_mavlink.signing.signature import Refusal
-from m2pem_plugin_mavlink.vehicle import exchanges, fixed_wing
+from m2pem_plugin_mavlink.vehicle import fixed_wing
 from m2pem_plugin_mavlink.vehicle.ardupilot import ArdupilotDriver
-from m2pem_plugin_mavlink.vehicle.driver import Driver, Readiness
+from m2pem_plugin_mavlink.vehicle.autopilot import Autopilot
+from m2pem_plugin_mavlink.vehicle.driver import Readiness
 from m2pem_plugin_mavlink.vehicle.identity import ON_THE_GROUND, Firmware, Identity, identity
 from m2pem_plugin_mavlink.vehicle.modes import modes_of
 from m2pem_plugin_mavlink.vehicle.px4 import Px4Driver
@@ -70,13 +72,10 @@ class ConditionWaiters:
             future.set_result(False)
 
 
-def driver_of(vehicle: "Vehicle", identity: Identity) -> Driver:
-    """Return the driver for a vehicle."""
-    if identity.firmware is Firmware.PX4:
-        return Px4Driver(vehicle, identity)
-    return ArdupilotDriver(vehicle, identity)
-
-
+_DRIVERS: Mapping[Firmware, type[Autopilot]] = {
+    Firmware.ARDUPILOT: ArdupilotDriver,
+    Firmware.PX4: Px4Driver,
+}
 _HEARTBEAT = message_type("HEARTBEAT").id
 _STATUSTEXT = message_type("STATUSTEXT").id
 _HOME = message_type("HOME_POSITION").id
@@ -132,7 +131,7 @@ class Vehicle:
         self.lost_after_s = lost_after_s
         self._clock = clock
         self._logger = logger or logging.getLogger(__name__)
-        self._driver: Driver | None = None
+        self._driver: Autopilot | None = None
         self._decoder: TelemetryDecoder | None = None
         self._streams: RequestedStreams | None = None
         self._waiters = ConditionWaiters(clock)
@@ -171,7 +170,7 @@ class Vehicle:
     # --- state ----------------------------------------------------------------------------------
 
     @property
-    def driver(self) -> Driver:
+    def driver(self) -> Autopilot:
         """The driver of its autopilot.
 
         Raises:
@@ -286,7 +285,7 @@ class Vehicle:
             self._logger.warning(
                 "%s: the fleet says %s, its heartbeat %s", self.resource, self.domain, found.kind
             )
-        self._driver = driver_of(self, found)
+        self._driver = _DRIVERS[found.firmware](self, found)
         self._streams = RequestedStreams(telemetry_streams(found.firmware))
         self._decoder = TelemetryDecoder(self.state, modes_of(found), flies=flies)
         if fixed_wing.must_circle(found):
@@ -378,8 +377,9 @@ class Vehicle:
     async def _ask(self, streams: RequestedStreams, due: list[int]) -> None:
         try:
             for id_ in due:
+                request = SetMessageInterval(self.link.address, id_, streams.wanted[id_])
                 try:
-                    await exchanges.message_interval(self.link, id_, streams.wanted[id_])
+                    await self.link.perform(request)
                 except RefusedError as error:
                     if not error.temporary:
                         streams.refused.add(id_)
@@ -393,8 +393,9 @@ class Vehicle:
             self._asking = False
 
     async def _ask_for_home(self) -> None:
+        request = RequestMessage(self.link.address, "HOME_POSITION", lambda message: message)
         try:
-            await exchanges.request_message(self.link, "HOME_POSITION")
+            await self.link.perform(request)
         except ExchangeError as error:
             self._logger.debug("%s: its home is not known: %s", self.resource, error)
         finally:
