@@ -25,8 +25,8 @@ def take_snapshot(vehicle: Vehicle, now_s: float) -> VehicleSnapshot | None:
         return None
     if position is None or height_m is None:
         return None
-    place = (position.latitude_deg, position.longitude_deg)
-    return VehicleSnapshot(now_s, state.armed, state.landed, state.custom_mode, *place, height_m)
+    reported = state.armed, state.landed, state.custom_mode
+    return VehicleSnapshot(now_s, *reported, *position.latlon, height_m)
 
 
 def shows_not_begun(behavior: Behavior, was: VehicleSnapshot | None, now_s: float) -> bool:

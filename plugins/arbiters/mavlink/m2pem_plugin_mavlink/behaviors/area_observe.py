@@ -63,7 +63,7 @@ class ObserveFromTheEdge(Goto):
             ring = [frame.to_local(corner[:2]) for corner in area.rings[0]]
             return frame.to_latlon(Polyline(ring).nearest(frame.to_local(here)))
         target = self.parameters.target_position()
-        frame = LocalFrame((target.latitude_deg, target.longitude_deg))
+        frame = LocalFrame(target.latlon)
         east, north = frame.to_local(here)
         away = math.hypot(east, north)
         if away <= STANDOFF_M:
@@ -110,8 +110,7 @@ class ObserveFromTheEdge(Goto):
         return BehaviorState.RUNNING if watches and is_still(self.vehicle) else state
 
     def checkpoint(self) -> CheckpointState:
-        place = self.target()
-        return {"stand": [place.latitude_deg, place.longitude_deg]}
+        return {"stand": list(self.target().latlon)}
 
     def restore(self, checkpoint: CheckpointState) -> None:
         stand = checkpoint.get("stand")

@@ -4,11 +4,10 @@ import math
 
 from m2pem.api import LatLon, LocalFrame, distance_m
 from m2pem_plugin_mavlink.behaviors.behavior import Behavior, BehaviorContext
-from m2pem_plugin_mavlink.behaviors.parameters import AMSL, RELATIVE
 from m2pem_plugin_mavlink.microservices.message_requests import RequestMessage
 from m2pem_plugin_mavlink.protocol.messages import Message
 from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, RetryPolicy
-from m2pem_plugin_mavlink.vehicle.driver import FlightMode, TargetPosition
+from m2pem_plugin_mavlink.vehicle.driver import AMSL, RELATIVE, FlightMode, TargetPosition
 from m2pem_plugin_mavlink.vehicle.state import AutopilotState
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 
@@ -101,7 +100,7 @@ def height_tolerance_m(vehicle: Vehicle, tolerance_m: float) -> float:
 def position_of(vehicle: Vehicle) -> LatLon | None:
     """Return the latitude and longitude; None if unknown."""
     position = vehicle.state.position
-    return (position.latitude_deg, position.longitude_deg) if position is not None else None
+    return position.latlon if position is not None else None
 
 
 def distance_to_m(vehicle: Vehicle, place: LatLon) -> float:
@@ -170,7 +169,7 @@ def _towards(vehicle: Vehicle, place: TargetPosition) -> bool:
     here, velocity = position_of(vehicle), vehicle.state.velocity_enu_m_s
     if here is None or velocity is None or vehicle.state.speed_m_s < STANDS_BELOW_M_S:
         return False
-    east, north = LocalFrame(here).to_local((place.latitude_deg, place.longitude_deg))
+    east, north = LocalFrame(here).to_local(place.latlon)
     height = height_m(vehicle.state, place.altitude_frame)
     up = 0.0
     if place.altitude_m is not None and height is not None:
@@ -187,7 +186,7 @@ async def _has_target(vehicle: Vehicle, place: TargetPosition) -> bool:
         target = await _position_target(vehicle)
     except ExchangeError:
         return False  # the autopilot has no target, or does not report it
-    if distance_m((place.latitude_deg, place.longitude_deg), target[:2]) > SAME_TARGET_M:
+    if distance_m(place.latlon, target[:2]) > SAME_TARGET_M:
         return False
     height, here = height_m(vehicle.state, place.altitude_frame), vehicle.state.position
     if place.altitude_m is None or height is None or here is None:

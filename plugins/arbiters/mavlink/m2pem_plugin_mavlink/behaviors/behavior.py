@@ -96,9 +96,9 @@ class Behavior(ABC):
     def paused(self) -> None:  # noqa: B027  # most have no clock of their own
         """The vehicle is being held: stop measuring time."""
 
-    @abstractmethod
     async def resume(self) -> None:
         """Command the vehicle again after a hold."""
+        await self.begin()
 
     def adjust(self, speed_m_s: float) -> bool:
         """Use this speed from now on; return False if the behavior has no speed to change. The
@@ -128,3 +128,18 @@ class Behavior(ABC):
 
     def restore(self, checkpoint: CheckpointState) -> None:  # noqa: B027  # most need nothing
         """Take over a checkpoint; called before `reattach`."""
+
+
+class SetBehavior(Behavior):
+    """Sets something that moves no vehicle, by one command."""
+
+    modes = ANY_MODE
+    moves_vehicle = False
+
+    def finished(self) -> bool:
+        """Return True: `begin` returns when the autopilot has accepted."""
+        return True
+
+    async def reattach(self) -> BehaviorState:
+        """Return UNKNOWN: no autopilot reports what it was set to."""
+        return BehaviorState.UNKNOWN

@@ -4,8 +4,7 @@ import math
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from m2pem.api import BehaviorState
-from m2pem_plugin_mavlink.behaviors.behavior import ANY_MODE, Behavior, BehaviorContext
+from m2pem_plugin_mavlink.behaviors.behavior import BehaviorContext, SetBehavior
 from m2pem_plugin_mavlink.behaviors.parameters import VehicleParameters
 
 KINDS = "'servo N', 'relay N', 'actuator N', 'gripper' or 'gripper N'"
@@ -13,13 +12,11 @@ KINDS = "'servo N', 'relay N', 'actuator N', 'gripper' or 'gripper N'"
 _PULSE_US = (500.0, 2500.0)
 
 
-class Deploy(Behavior):
+class Deploy(SetBehavior):
     """Set a servo (its output, in microseconds), a relay (0 or 1), an actuator of PX4 (-1 to 1), or
     have a gripper release (0, the default) or grab (1). A number alone is that of a servo."""
 
     name = "deploy"
-    modes = ANY_MODE
-    moves_vehicle = False
 
     def __init__(self, context: BehaviorContext) -> None:
         super().__init__(context)
@@ -61,17 +58,6 @@ class Deploy(Behavior):
             values = [math.nan] * 6
             values[self._number - 1] = 1.0 if self._value is None else self._value
             await driver.command(dialect.MAV_CMD_DO_SET_ACTUATOR, *values, 0.0)
-
-    async def resume(self) -> None:
-        await self.begin()
-
-    def finished(self) -> bool:
-        """Return True: `begin` returns when the autopilot has accepted."""
-        return True
-
-    async def reattach(self) -> BehaviorState:
-        """Return UNKNOWN: no autopilot reports its actuators."""
-        return BehaviorState.UNKNOWN
 
 
 def _read(words: list[str]) -> tuple[str, int]:

@@ -53,9 +53,6 @@ class Follow(Behavior):
         self._sent = None
         await self._send()
 
-    async def resume(self) -> None:
-        await self.begin()
-
     async def run_in_background(self) -> None:
         """Send the vehicle to its relative position twice a second."""
         while True:
@@ -105,7 +102,7 @@ class Follow(Behavior):
             self._course_rad = math.atan2(north, east)
         yaw = (self._course_rad or 0.0) - self._bearing_rad
         return offset(
-            (state.position.latitude_deg, state.position.longitude_deg),
+            state.position.latlon,
             east * LEAD_S + self._offset_m * math.cos(yaw),
             north * LEAD_S + self._offset_m * math.sin(yaw),
         )

@@ -80,8 +80,8 @@ class Goto(Behavior):
     def _breach(self, place: TargetPosition) -> str:
         if self.context.fence is None:
             return ""
-        way = [(place.latitude_deg, place.longitude_deg)]
-        return self.context.fence.breach(way, position_of(self.vehicle), lambda _: "the target")
+        way, start = [place.latlon], position_of(self.vehicle)
+        return self.context.fence.breach(way, start, lambda _: "the target")
 
     async def begin(self) -> None:
         self._stillness.forget()
@@ -92,9 +92,6 @@ class Goto(Behavior):
         self._place = self.target()
         await self.vehicle.driver.go_to(self._place, self.parameters.speed_m_s)
 
-    async def resume(self) -> None:
-        await self.begin()
-
     def adjust(self, speed_m_s: float) -> bool:
         self.parameters.adjusted_m_s = speed_m_s
         return True
@@ -104,9 +101,9 @@ class Goto(Behavior):
         while self.parameters.target_vehicle is not None:
             await self.vehicle.sleep(REPEAT_S)
             new, old = self.target(), self._place
-            at = (new.latitude_deg, new.longitude_deg)
-            if old is None or _apart_m(new, old) > MOVED_M:
-                if self.context.fence is not None and self.context.fence.outside_m(at) > 0:
+            if old is None or distance_m(new.latlon, old.latlon) > MOVED_M:
+                fence = self.context.fence
+                if fence is not None and fence.outside_m(new.latlon) > 0:
                     await self.vehicle.driver.stop()
                     raise BehaviorFailedError(
                         f"{self.parameters.target_vehicle} has left the fleet's fence"
@@ -122,7 +119,7 @@ class Goto(Behavior):
             BehaviorFailedError: it has stopped outside of a requested tolerance.
         """
         place = self._place or self.target()
-        away = distance_to_m(self.vehicle, (place.latitude_deg, place.longitude_deg))
+        away = distance_to_m(self.vehicle, place.latlon)
         height_m = height_tolerance_m(self.vehicle, max(self._tolerance_m, HEIGHT_TOLERANCE_M))
         high = height_error_m(self.vehicle, place) <= height_m
         if away <= arrival_radius_m(self.vehicle, self._tolerance_m) and high:
@@ -157,10 +154,6 @@ class Goto(Behavior):
         return BehaviorState.SUCCEEDED if self.finished() else BehaviorState.UNKNOWN
 
 
-def _apart_m(a: TargetPosition, b: TargetPosition) -> float:
-    return distance_m((a.latitude_deg, a.longitude_deg), (b.latitude_deg, b.longitude_deg))
-
-
 class Hold(Behavior):
     """Stop for a duration; without one, until the vehicle has stopped. What cannot stop circles."""
 
@@ -187,10 +180,6 @@ class Hold(Behavior):
         if self._since_s is not None:
             self._left_s -= self.context.now_s() - self._since_s
             self._since_s = None
-
-    async def resume(self) -> None:
-        """Continue for the rest of the duration."""
-        await self.begin()
 
     def finished(self) -> bool:
         """Return whether the vehicle has stopped and the duration is over."""

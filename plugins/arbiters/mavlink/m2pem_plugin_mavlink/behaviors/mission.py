@@ -40,15 +40,12 @@ from m2pem_plugin_mavlink.behaviors.behavior import (
     CheckpointState,
 )
 from m2pem_plugin_mavlink.behaviors.goto import TOLERANCES_M
-from m2pem_plugin_mavlink.behaviors.parameters import AMSL, RELATIVE, TERRAIN, VehicleParameters
-from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
-from m2pem_plugin_mavlink.vehicle.driver import FlightMode
+from m2pem_plugin_mavlink.behaviors.parameters import VehicleParameters
+from m2pem_plugin_mavlink.microservices.mission_items import MissionItem, same_frame
+from m2pem_plugin_mavlink.vehicle.driver import FRAMES, RELATIVE, FlightMode
 from m2pem_plugin_mavlink.vehicle.fixed_wing import remove_landing
 
 _LAST_NAVIGATION_COMMAND: int = dialect.MAV_CMD_NAV_LAST
-_SAME_FRAMES = {5: 0, 6: 3, 11: 10}
-"""The frames with integer coordinates, by those without; autopilots send back either."""
-
 _HEIGHT_STEP_M = 0.02
 """Autopilots keep altitudes in centimetres, or as short floats."""
 
@@ -72,7 +69,7 @@ class Fingerprint:
 def fingerprint(items: Sequence[MissionItem]) -> Fingerprint:
     placed = [item for item in items if is_navigation(item)]
     lines = "\n".join(
-        f"{item.command} {_SAME_FRAMES.get(item.frame, item.frame)}"
+        f"{item.command} {same_frame(item.frame)}"
         f" {round(item.latitude_deg * 1e7)} {round(item.longitude_deg * 1e7)}"
         for item in placed
     )
@@ -88,11 +85,6 @@ def is_navigation(item: MissionItem) -> bool:
     return item.command <= _LAST_NAVIGATION_COMMAND
 
 
-FRAMES = {
-    RELATIVE: dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT,
-    AMSL: dialect.MAV_FRAME_GLOBAL,
-    TERRAIN: dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT,
-}
 GROUND_SPEED = 1.0
 AS_IT_IS = -1.0
 
@@ -169,7 +161,7 @@ class MissionFlight(Behavior):
             last = items[-1]
             self._learn(items)
             self._work = self.work(way)
-            self._end = (len(items) - 1, (last.latitude_deg, last.longitude_deg))
+            self._end = (len(items) - 1, last.latlon)
             circles = self.vehicle.state.loiter_radius_m is not None
             self._items = (*items, circle_for_ever(last)) if circles else items
             self._kept = fingerprint(self._items)
@@ -210,7 +202,7 @@ class MissionFlight(Behavior):
         if self.context.fence is None or self._end is None:
             return ""
         placed = [items[index] for index in self._moves if index <= self._end[0]]
-        way = [(item.latitude_deg, item.longitude_deg) for item in placed]
+        way = [item.latlon for item in placed]
         start = position_of(self.vehicle)
         if reason := self.context.fence.breach(way, start, self.named):
             return reason
@@ -259,7 +251,7 @@ class MissionFlight(Behavior):
             work.reached(min(heading - 1, last))
         position = self.vehicle.state.position
         if position is not None and 0 < heading <= last:
-            place = work.frame.to_local((position.latitude_deg, position.longitude_deg))
+            place = work.frame.to_local(position.latlon)
             work.moved(place, heading)
         return work.to_report(least_m)
 
@@ -371,12 +363,12 @@ class MissionFlight(Behavior):
             self._end = (int(end[0]), (end[1], end[2]))
 
 
-_FRAME_NAMES = {_SAME_FRAMES.get(frame, frame): name for name, frame in FRAMES.items()}
+_FRAME_NAMES = {frame: name for name, frame in FRAMES.items()}
 
 
 def frame_name(item: MissionItem) -> str:
     """Return the altitude frame of a waypoint, by its name in missions."""
-    return _FRAME_NAMES.get(_SAME_FRAMES.get(item.frame, item.frame), RELATIVE)
+    return _FRAME_NAMES.get(same_frame(item.frame), RELATIVE)
 
 
 class Routing(MissionFlight):
@@ -401,7 +393,7 @@ class Routing(MissionFlight):
         """Return the account of the route; after a restart of the one that is stored."""
         own = [self._speeds.get(index + 1) for index in self._moves]
         stored = Route.of(
-            ((item.latitude_deg, item.longitude_deg, item.altitude_m) for item in way),
+            ((*item.latlon, item.altitude_m) for item in way),
             map(frame_name, way),
             tuple(own) if any(speed is not None for speed in own) else (),
         )
@@ -449,7 +441,7 @@ class Survey(MissionFlight):
 
     def work(self, way: Sequence[MissionItem]) -> RemainingWork:
         """Return the account of the tracks; after a restart of those that are stored."""
-        places = [(item.latitude_deg, item.longitude_deg) for item in way]
+        places = [item.latlon for item in way]
         frame = LocalFrame(places[0])
         points = [frame.to_local(place) for place in places]
         tracks = SurveyTracks(points, self._width_m, self.parameters.overshoot_m)
@@ -518,7 +510,7 @@ class RunOnboardMission(Behavior):
         self._last = moves[-1]
         if self.context.fence is not None:
             placed = [items[i] for i in moves if items[i].latitude_deg or items[i].longitude_deg]
-            way = [(item.latitude_deg, item.longitude_deg) for item in placed]
+            way = [item.latlon for item in placed]
             if reason := self.context.fence.breach(way):
                 raise BehaviorFailedError(reason)
 

@@ -65,13 +65,13 @@ class Orbit(MissionFlight):
         if self._center is None:
             place, self._radius_m = self.circle()
             height = self.parameters.altitude_to_fly(place.altitude_m, place.altitude_frame)
-            self._center = TargetPosition(place.latitude_deg, place.longitude_deg, *height)
+            self._center = TargetPosition(*place.latlon, *height)
         return self._center
 
     def way(self) -> Sequence[MissionItem]:
         """Return a polygon on the circle: all turns, or one turn that is repeated."""
         center = self.center
-        frame = LocalFrame((center.latitude_deg, center.longitude_deg))
+        frame = LocalFrame(center.latlon)
         sides = self._sides()
         laps = 1.0 if self._turns is None else self._turns
         self.loop = self._turns is None or laps * sides > MOST_ITEMS
@@ -151,7 +151,7 @@ class Orbit(MissionFlight):
 
     def _look(self) -> bool:
         """Add the angle since the last call; return whether the vehicle is on the circle."""
-        center = (self.center.latitude_deg, self.center.longitude_deg)
+        center = self.center.latlon
         here = position_of(self.vehicle)
         near_m, away = circle_tolerance_m(self._radius_m), distance_to_m(self.vehicle, center)
         # A plane that cannot turn as tightly as commanded flies a larger circle.
@@ -190,7 +190,7 @@ class Orbit(MissionFlight):
         center = self.center
         return {
             **super().checkpoint(),
-            "center": [center.latitude_deg, center.longitude_deg, center.altitude_m or 0.0],
+            "center": [*center.latlon, center.altitude_m or 0.0],
             "frame": center.altitude_frame,
             "radius": self._radius_m,
             "loop": float(self.loop),

@@ -2,9 +2,7 @@
 
 from m2pem.api import BehaviorParameters, LatLon, Point, ResourceId, VehiclePosition, VehicleState
 from m2pem_plugin_mavlink.behaviors.behavior import BehaviorContext, BehaviorFailedError
-from m2pem_plugin_mavlink.vehicle.driver import TargetPosition
-
-RELATIVE, AMSL, TERRAIN = "relative", "amsl", "terrain"
+from m2pem_plugin_mavlink.vehicle.driver import RELATIVE, TargetPosition
 
 TARGET_WITHIN_S = 5.0
 
@@ -115,7 +113,7 @@ class VehicleParameters(BehaviorParameters):
         state = state_of(self._context, vehicle)
         if state is None or state.position is None:
             raise BehaviorFailedError(f"the position of {vehicle} is not known")
-        return state.position.latitude_deg, state.position.longitude_deg
+        return state.position.latlon
 
 
 def state_of(context: BehaviorContext, vehicle: str) -> VehicleState | None:

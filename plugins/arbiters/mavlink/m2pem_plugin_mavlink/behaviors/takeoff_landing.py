@@ -26,11 +26,12 @@ from m2pem_plugin_mavlink.behaviors.behavior import (
     Behavior,
     BehaviorContext,
     BehaviorFailedError,
+    SetBehavior,
 )
 from m2pem_plugin_mavlink.behaviors.goto import TOLERANCES_M
-from m2pem_plugin_mavlink.behaviors.parameters import AMSL, VehicleParameters
+from m2pem_plugin_mavlink.behaviors.parameters import VehicleParameters
 from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, RefusedError
-from m2pem_plugin_mavlink.vehicle.driver import FlightMode, TargetPosition
+from m2pem_plugin_mavlink.vehicle.driver import AMSL, FlightMode, TargetPosition
 from m2pem_plugin_mavlink.vehicle.fixed_wing import landing_start
 from m2pem_plugin_mavlink.vehicle.readiness import TEXTS_WITHIN_S
 
@@ -74,10 +75,6 @@ class ChangeAltitude(Behavior):
         if here is None:
             raise BehaviorFailedError("its position is not known")
         await self.vehicle.driver.go_to(TargetPosition(*here, self._altitude_m, self._frame))
-
-    async def resume(self) -> None:
-        """Continue at the position that the vehicle has now."""
-        await self.begin()
 
     def finished(self) -> bool:
         """Return whether the vehicle is at the height and neither climbs nor descends."""
@@ -195,9 +192,6 @@ class Land(Behavior):
         if not self._down():
             await self.vehicle.driver.land()
 
-    async def resume(self) -> None:
-        await self.begin()
-
     async def run_in_background(self) -> None:
         """Disarm an aircraft that has landed and does not disarm itself."""
         await disarm_after_landing(self)
@@ -256,9 +250,6 @@ class ReturnToLaunch(Behavior):
             return
         await self.vehicle.driver.return_home()
 
-    async def resume(self) -> None:
-        await self.begin()
-
     async def run_in_background(self) -> None:
         """Read the rally points; then disarm as `Land` does."""
         if self.vehicle.domain == "air" and self.modes is not ANY_MODE:
@@ -279,7 +270,7 @@ class ReturnToLaunch(Behavior):
         home = self.vehicle.state.home
         if home is None:
             return 0.0
-        return distance_to_m(self.vehicle, (home.latitude_deg, home.longitude_deg))
+        return distance_to_m(self.vehicle, home.latlon)
 
     def _is_there_already(self) -> bool:
         state = self.vehicle.state
@@ -306,7 +297,7 @@ class ReturnToLaunch(Behavior):
                 raise BehaviorFailedError(f"{reason}; it said: {said}" if said else reason)
             return True
         home, radius_m = self.vehicle.state.home, self.vehicle.state.home_loiter_radius_m
-        place = (home.latitude_deg, home.longitude_deg) if home is not None else None
+        place = home.latlon if home is not None else None
         stopped_s = self._stillness.seconds(place, radius_m)
         if self.vehicle.domain == "air":
             near_m = arrival_radius_m(self.vehicle, self._near_m, radius_m)
@@ -322,12 +313,10 @@ class ReturnToLaunch(Behavior):
         return BehaviorState.RUNNING if returns else BehaviorState.UNKNOWN
 
 
-class SetSpeed(Behavior):
+class SetSpeed(SetBehavior):
     """Set the speed of the following motion; the controller keeps it for later behaviors."""
 
     name = "set_speed"
-    modes = ANY_MODE
-    moves_vehicle = False
 
     def __init__(self, context: BehaviorContext) -> None:
         super().__init__(context)
@@ -341,14 +330,3 @@ class SetSpeed(Behavior):
         except RefusedError as refused:
             if refused.result != dialect.MAV_RESULT_FAILED:
                 raise
-
-    async def resume(self) -> None:
-        await self.begin()
-
-    def finished(self) -> bool:
-        """Return True: `begin` returns when the autopilot has accepted."""
-        return True
-
-    async def reattach(self) -> BehaviorState:
-        """Return UNKNOWN: no autopilot reports the speed that it was set to."""
-        return BehaviorState.UNKNOWN

@@ -66,14 +66,18 @@ REQUEST_INT = message_type("MISSION_REQUEST_INT")
 
 _NO_FRAME: int = dialect.MAV_FRAME_MISSION
 _DEG_TO_1E7 = 1e7
-_SAME_FRAME: dict[int, int] = {
+_WITHOUT_INT: dict[int, int] = {
     dialect.MAV_FRAME_GLOBAL_INT: dialect.MAV_FRAME_GLOBAL,
     dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT: dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT,
     dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT: dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT,
 }
-"""Frames that autopilots return in place of others."""
 
-_GLOBAL = frozenset({*_SAME_FRAME, *_SAME_FRAME.values()})
+_GLOBAL = frozenset({*_WITHOUT_INT, *_WITHOUT_INT.values()})
+
+
+def same_frame(frame: int) -> int:
+    """Return one MAV_FRAME for those that mean the same: autopilots return either."""
+    return _WITHOUT_INT.get(frame, frame)
 
 
 class MissionType(IntEnum):
@@ -99,13 +103,18 @@ class MissionItem:
     altitude_m: float = 0.0
     autocontinue: bool = True
 
+    @property
+    def latlon(self) -> tuple[float, float]:
+        """Latitude and longitude in degrees."""
+        return self.latitude_deg, self.longitude_deg
+
     def same_as(self, other: "MissionItem") -> bool:
         """Return whether both are the same, except for changes by storing them: an autopilot keeps
         coordinates in 1e-7 degrees and altitudes as floats of 32 or fewer bits, and returns an
         equivalent frame."""
         return (
             self.command == other.command
-            and _SAME_FRAME.get(self.frame, self.frame) == _SAME_FRAME.get(other.frame, other.frame)
+            and same_frame(self.frame) == same_frame(other.frame)
             and abs(self.latitude_deg - other.latitude_deg) < 2.5e-7
             and abs(self.longitude_deg - other.longitude_deg) < 2.5e-7
             and math.isclose(self.altitude_m, other.altitude_m, rel_tol=1e-6, abs_tol=0.01)

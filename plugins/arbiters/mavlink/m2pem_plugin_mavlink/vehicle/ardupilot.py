@@ -10,7 +10,7 @@ from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
 from m2pem_plugin_mavlink.microservices.missions import SetCurrentItem
 from m2pem_plugin_mavlink.protocol.transaction import RefusedError
 from m2pem_plugin_mavlink.vehicle.autopilot import SHOWS_WITHIN_S, Autopilot, cannot, not_now
-from m2pem_plugin_mavlink.vehicle.driver import FlightMode, TargetPosition
+from m2pem_plugin_mavlink.vehicle.driver import FRAMES, FlightMode, TargetPosition
 from m2pem_plugin_mavlink.vehicle.fixed_wing import NO_LANDING, WINGED, landing_items, landing_start
 from m2pem_plugin_mavlink.vehicle.identity import Kind
 
@@ -21,11 +21,6 @@ TAKEOFF_ATTEMPTS = 3
 PLANE_PITCH_DEG = 15.0
 AS_IT_IS = -1.0
 
-_FRAMES = {
-    "relative": dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT,
-    "amsl": dialect.MAV_FRAME_GLOBAL,
-    "terrain": dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT,
-}
 _STOP_MODES = {
     # BRAKE stops fastest and ignores the sticks: from 10 m/s within 4 s, from 5 m/s within 3.
     Kind.COPTER: ("BRAKE", "LOITER"),
@@ -92,7 +87,7 @@ class ArdupilotDriver(Autopilot):
         vtol = self.kind is Kind.VTOL
         takeoff = dialect.MAV_CMD_NAV_VTOL_TAKEOFF if vtol else dialect.MAV_CMD_NAV_TAKEOFF
         frame = dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT
-        place = (here.latitude_deg, here.longitude_deg, altitude_m)
+        place = (*here.latlon, altitude_m)
         await self.upload(
             [
                 MissionItem(takeoff, frame, (PLANE_PITCH_DEG, 0.0, 0.0, 0.0), *place),
@@ -105,7 +100,7 @@ class ArdupilotDriver(Autopilot):
         position = self.state.position
         if position is None:
             raise not_now("its position is not known")
-        return TargetPosition(position.latitude_deg, position.longitude_deg, altitude_m)
+        return TargetPosition(*position.latlon, altitude_m)
 
     async def land(self) -> None:
         """Land at the present position; a plane by the landing sequence of its mission."""
@@ -161,7 +156,7 @@ class ArdupilotDriver(Autopilot):
         """Send a target to a vehicle in GUIDED. It must not change the mode: one that a pilot has
         left GUIDED with refuses it."""
         frame, altitude_m = self._altitude(place)
-        at = CommandPosition(place.latitude_deg, place.longitude_deg, altitude_m, frame)
+        at = CommandPosition(*place.latlon, altitude_m, frame)
         params = (AS_IT_IS, 0.0, radius_m, math.nan)
         try:
             await self.command(dialect.MAV_CMD_DO_REPOSITION, *params, place=at)
@@ -177,7 +172,7 @@ class ArdupilotDriver(Autopilot):
         if self.kind in (Kind.ROVER, Kind.BOAT):
             return dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT, 0.0
         if place.altitude_m is not None:
-            return _FRAMES[place.altitude_frame], place.altitude_m
+            return FRAMES[place.altitude_frame], place.altitude_m
         if self.state.position is None:
             raise not_now("its height is not known")
         return dialect.MAV_FRAME_GLOBAL, self.state.position.altitude_m
@@ -212,9 +207,7 @@ class ArdupilotDriver(Autopilot):
     def _as_stored(self, items: tuple[MissionItem, ...]) -> tuple[MissionItem, ...]:
         """Return the items behind item 0, which is home; the vehicle replaces it by its own."""
         home = self.state.home
-        place = (
-            (home.latitude_deg, home.longitude_deg, home.altitude_m) if home else (0.0, 0.0, 0.0)
-        )
+        place = (*home.latlon, home.altitude_m) if home else (0.0, 0.0, 0.0)
         frame = dialect.MAV_FRAME_GLOBAL
         return (MissionItem(dialect.MAV_CMD_NAV_WAYPOINT, frame, (0.0,) * 4, *place), *items)
 

@@ -446,7 +446,7 @@ class Autopilot(ABC):
         """Return the places where the vehicle may land instead of at home: latitudes and longitudes
         in degrees."""
         found = await self.link.perform(DownloadMission(self.link.address, MissionType.RALLY))
-        return [(each.latitude_deg, each.longitude_deg) for each in found]
+        return [each.latlon for each in found]
 
     @abstractmethod
     async def start_mission(self, first: int = 0) -> None:

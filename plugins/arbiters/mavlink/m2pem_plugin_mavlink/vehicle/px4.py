@@ -51,9 +51,7 @@ class Px4Driver(Autopilot):
             raise cannot(f"a {self.kind} does not take off")
         position = self.state.position
         if self.in_the_air and position is not None:
-            await self.go_to(
-                TargetPosition(position.latitude_deg, position.longitude_deg, altitude_m)
-            )
+            await self.go_to(TargetPosition(*position.latlon, altitude_m))
             return
         await self.arm()
         amsl_m = self._amsl(altitude_m, "relative")
@@ -134,7 +132,7 @@ class Px4Driver(Autopilot):
         altitude_m = math.nan
         if place.altitude_m is not None and self.kind not in ON_THE_GROUND:
             altitude_m = self._amsl(place.altitude_m, place.altitude_frame)
-        return CommandPosition(place.latitude_deg, place.longitude_deg, altitude_m, _AMSL)
+        return CommandPosition(*place.latlon, altitude_m, _AMSL)
 
     def _amsl(self, altitude_m: float, frame: str) -> float:
         """Return a height above mean sea level: PX4 accepts no other, in any frame of the
