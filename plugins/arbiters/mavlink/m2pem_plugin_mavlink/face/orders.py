@@ -9,7 +9,7 @@ import asyncio
 import logging
 from collections import OrderedDict
 from collections.abc import Callable, Collection, Coroutine
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -23,17 +23,14 @@ from m2pem_plugin_mavlink.face.commands import (
     RefusedCommandError,
     order_of,
 )
+from m2pem_plugin_mavlink.face.requests import ACCEPTED, DENIED, REJECTED, Request, Say
 from m2pem_plugin_mavlink.face.stations import Station
-from m2pem_plugin_mavlink.face.vehicle import AUTOPILOT, Camera, ShownVehicle
+from m2pem_plugin_mavlink.face.vehicle import ShownVehicle
 from m2pem_plugin_mavlink.link.route import Peer
 from m2pem_plugin_mavlink.protocol.messages import Address, message_type
-from m2pem_plugin_mavlink.protocol.raw_frames import RawFrame
 
 _logger = logging.getLogger(__name__)
 
-ACCEPTED: int = dialect.MAV_RESULT_ACCEPTED
-REJECTED: int = dialect.MAV_RESULT_TEMPORARILY_REJECTED
-DENIED: int = dialect.MAV_RESULT_DENIED
 FAILED: int = dialect.MAV_RESULT_FAILED
 IN_PROGRESS: int = dialect.MAV_RESULT_IN_PROGRESS
 CONFIGURE_GIMBAL: int = dialect.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE
@@ -54,7 +51,8 @@ UNKNOWN_PROGRESS = 255
 
 OFF = "commands of ground stations are off: faces.mavlink.commands"
 
-Say = Callable[[Station, ShownVehicle, str], None]
+
+_Key = tuple[Peer, Address, Address, int]
 
 
 @dataclass(slots=True)
@@ -62,20 +60,24 @@ class _Pending:
     """A command of a station. `result`: its last acknowledgement."""
 
     command: Command
+    request: Request
     result: int = IN_PROGRESS
     ended_s: float = 0.0
 
+    @property
+    def key(self) -> _Key:
+        """Names the sender, the receiver and the kind of command."""
+        request = self.request
+        return request.station.peer, request.source, request.component, self.command.id
 
-@dataclass(slots=True)
-class _Started:
-    """What became of a run that carries out an order."""
+    @property
+    def by(self) -> str:
+        """Who commands, for the journal."""
+        return name_of(self.request.source, self.request.station)
 
-    began: asyncio.Future[tuple[int, str]] = field(
-        default_factory=lambda: asyncio.get_running_loop().create_future()
-    )
-
-
-_Key = tuple[Peer, Address, int, int, int]
+    def acknowledge(self, result: int) -> None:
+        """Send the result."""
+        self.request.answer(acknowledgement(self.command.id, result, self.request.source))
 
 
 class Orders:
@@ -97,7 +99,7 @@ class Orders:
         self._latest: dict[ResourceId, _Key] = {}
         self._last: dict[ResourceId, Order] = {}
         self._budgets: dict[tuple[Peer, ResourceId, bool], tuple[float, float]] = {}
-        self._started: OrderedDict[RunId, _Started] = OrderedDict()
+        self._began: OrderedDict[RunId, asyncio.Future[tuple[int, str]]] = OrderedDict()
         self._targets: dict[tuple[Peer, Address, int], Order] = {}
         self._followed: set[tuple[Peer, Address, int]] = set()
         self._tasks: set[asyncio.Task[None]] = set()
@@ -122,52 +124,47 @@ class Orders:
         self._settle(run, ACCEPTED if state is BehaviorState.SUCCEEDED else FAILED, reason)
 
     def _settle(self, run: RunId, result: int, reason: str) -> None:
-        began = self._outcome(run).began
+        began = self._outcome(run)
         if not began.done():
             began.set_result((result, reason))
 
-    def _outcome(self, run: RunId) -> _Started:
-        """The records of a run may come before `execute_behavior` returns."""
-        started = self._started.get(run)
-        if started is None:
-            while len(self._started) >= MOST_OUTCOMES:
-                self._started.popitem(last=False)
-            started = self._started[run] = _Started()
-        return started
+    def _outcome(self, run: RunId) -> asyncio.Future[tuple[int, str]]:
+        """Return what becomes of a run that carries out an order: MAV_RESULT and reason. Its
+        records may come before `execute_behavior` returns."""
+        began = self._began.get(run)
+        if began is None:
+            while len(self._began) >= MOST_OUTCOMES:
+                self._began.popitem(last=False)
+            began = self._began[run] = asyncio.get_running_loop().create_future()
+        return began
 
     # --- commands ---------------------------------------------------------------------------------
 
-    def command(
-        self,
-        command: Command,
-        frame: RawFrame,
-        station: Station,
-        vehicle: ShownVehicle,
-        camera: Camera | None = None,
-    ) -> None:
+    def command(self, command: Command, request: Request) -> None:
         """Carry out a command, or refuse it."""
-        component = camera.component if camera is not None else AUTOPILOT
-        key = station.peer, frame.source, vehicle.system, component, command.id
+        pending = _Pending(command, request)
+        key = pending.key
         known = self._pending.get(key)
-        if known is not None and self._repeats(known, command, vehicle.resource, key):
-            self._acknowledge(key, station, known.result)
+        if known is not None and self._repeats(known, pending):
+            pending.acknowledge(known.result)
             return
-        pending = self._pending[key] = _Pending(command)
+        self._pending[key] = pending
         self._pending.move_to_end(key)
         while len(self._pending) > MOST_OUTCOMES:
             self._pending.popitem(last=False)
         try:
-            work = self._work(key, pending, frame, station, vehicle, camera)
+            work = self._work(pending)
         except RefusedCommandError as error:
-            self._refuse(key, pending, station, vehicle, error)
+            self._refuse(pending, error)
             return
         if work is None:
-            self._end(key, pending, station, ACCEPTED)
+            self._end(pending, ACCEPTED)
         else:
             self._begin(work)
 
-    def _repeats(self, known: _Pending, command: Command, resource: ResourceId, key: _Key) -> bool:
+    def _repeats(self, known: _Pending, again: _Pending) -> bool:
         """Return whether a command is the same one again, as its acknowledgement was lost."""
+        command = again.command
         same = (known.command.params, known.command.place, known.command.z)
         if same != (command.params, command.place, command.z) and repr(same) != repr(
             (command.params, command.place, command.z)  # NaN differs from itself
@@ -176,40 +173,32 @@ class Orders:
         if known.result == IN_PROGRESS:
             return True
         recent = self._now_s() - known.ended_s <= REPEATED_S
-        latest = self._latest.get(resource) in (key, None)
+        latest = self._latest.get(again.request.vehicle.resource) in (again.key, None)
         return recent and latest and (command.confirmation > 0 or known.result == ACCEPTED)
 
-    def _work(
-        self,
-        key: _Key,
-        pending: _Pending,
-        frame: RawFrame,
-        station: Station,
-        vehicle: ShownVehicle,
-        camera: Camera | None,
-    ) -> Coroutine[Any, Any, None] | None:
+    def _work(self, pending: _Pending) -> Coroutine[Any, Any, None] | None:
         """Return what carries a command out; None: nothing is to be done.
 
         Raises:
             RefusedCommandError: it is refused.
         """
-        command = pending.command
+        command, request = pending.command, pending.request
+        vehicle = request.vehicle
         if vehicle.resource not in self._allowed:
             raise RefusedCommandError(OFF)
-        by = name_of(frame.source, station)
         if command.id == REQUEST_OPERATOR_CONTROL:
-            return self._hand_over(key, pending, station, vehicle, by)
+            return self._hand_over(pending)
         if command.id == CONFIGURE_GIMBAL:
             for each in vehicle.cameras:
-                each.controller = frame.source
+                each.controller = request.source
             return None
-        order = order_of(command, vehicle, camera)
+        order = order_of(command, vehicle, request.camera)
         if order is None:
             return None
-        self._count(order, station)
+        self._count(order, request.station)
         order = self._with_speed(order, vehicle)
-        self._latest[vehicle.resource] = key
-        return self._carry_out(key, pending, order, station, vehicle, by)
+        self._latest[vehicle.resource] = pending.key
+        return self._carry_out(pending, order)
 
     def _with_speed(self, order: Order, vehicle: ShownVehicle) -> Order:
         """Another speed on the way to a target is a new order to go there: one behavior replaces
@@ -240,37 +229,28 @@ class Orders:
                 each: budget for each, budget in self._budgets.items() if budget[1] > refilled_s
             }
 
-    async def _hand_over(
-        self, key: _Key, pending: _Pending, station: Station, vehicle: ShownVehicle, by: str
-    ) -> None:
+    async def _hand_over(self, pending: _Pending) -> None:
+        resource, by = pending.request.vehicle.resource, pending.by
         takes = pending.command.params[0] == 1
         try:
             if takes:
-                await self._control.take(vehicle.resource, by=by)
+                await self._control.take(resource, by=by)
             else:
                 # A station gives back only what it has itself, for whatever reason.
-                holder = (await self._control.holders()).get(vehicle.resource)
+                holder = (await self._control.holders()).get(resource)
                 if holder != by:
                     raise OperatorError(f"it is not with {by}, but with {holder or 'no operator'}")
-                await self._control.give_back(vehicle.resource, by=by)
+                await self._control.give_back(resource, by=by)
         except M2pemError as error:
-            self._refuse(key, pending, station, vehicle, RefusedCommandError(str(error), REJECTED))
+            self._refuse(pending, RefusedCommandError(str(error), REJECTED))
         else:
-            self._end(key, pending, station, ACCEPTED)
+            self._end(pending, ACCEPTED)
 
-    async def _carry_out(
-        self,
-        key: _Key,
-        pending: _Pending,
-        order: Order,
-        station: Station,
-        vehicle: ShownVehicle,
-        by: str,
-    ) -> None:
-        executing = asyncio.ensure_future(self._execute(order, by))
+    async def _carry_out(self, pending: _Pending, order: Order) -> None:
+        executing = asyncio.ensure_future(self._execute(order, pending.by))
         try:
             while True:
-                self._acknowledge(key, station, IN_PROGRESS)
+                pending.acknowledge(IN_PROGRESS)
                 done, _ = await asyncio.wait([executing], timeout=PROGRESS_EVERY_S)
                 if done:
                     break
@@ -279,9 +259,9 @@ class Orders:
             executing.cancel()
             raise
         if result == ACCEPTED:
-            self._end(key, pending, station, ACCEPTED)
+            self._end(pending, ACCEPTED)
         else:
-            self._refuse(key, pending, station, vehicle, RefusedCommandError(reason, result))
+            self._refuse(pending, RefusedCommandError(reason, result))
 
     async def _execute(self, order: Order, by: str) -> tuple[int, str]:
         """Carry an order out, and note it as the last one unless it is refused."""
@@ -306,7 +286,7 @@ class Orders:
             return REJECTED, str(error)
         except M2pemError as error:
             return FAILED, str(error)
-        began = self._outcome(run).began
+        began = self._outcome(run)
         ending = asyncio.ensure_future(self._control.wait(run))
         try:
             both: list[asyncio.Future[Any]] = [began, ending]
@@ -316,27 +296,25 @@ class Orders:
             return FAILED, ending.result().detail or "it did not begin"
         finally:
             ending.cancel()
-            self._started.pop(run, None)
+            self._began.pop(run, None)
 
     # --- targets that are sent again and again ----------------------------------------------------
 
-    def target(
-        self, order: Order, frame: RawFrame, station: Station, vehicle: ShownVehicle
-    ) -> None:
+    def target(self, order: Order, request: Request) -> None:
         """Go to a target that has no acknowledgement (SET_POSITION_TARGET_GLOBAL_INT). Stations
         repeat it many times in a second: only another target is a new order."""
-        key = station.peer, frame.source, vehicle.system
+        station, vehicle = request.station, request.vehicle
+        key = station.peer, request.source, vehicle.system
         if vehicle.resource not in self._allowed:
             self._say(station, vehicle, OFF)
             return
         self._targets[key] = order
         if key not in self._followed:
             self._followed.add(key)
-            self._begin(self._follow(key, station, vehicle, name_of(frame.source, station)))
+            self._begin(self._follow(key, request))
 
-    async def _follow(
-        self, key: tuple[Peer, Address, int], station: Station, vehicle: ShownVehicle, by: str
-    ) -> None:
+    async def _follow(self, key: tuple[Peer, Address, int], request: Request) -> None:
+        station, vehicle = request.station, request.vehicle
         done: Order | None = None
         try:
             while (order := self._targets.pop(key, None)) is not None:
@@ -347,6 +325,7 @@ class Orders:
                         self._say(station, vehicle, error.reason)
                     else:
                         done = order
+                        by = name_of(request.source, station)
                         result, reason = await self._execute(order, by)
                         if result != ACCEPTED:
                             self._say(station, vehicle, reason)
@@ -361,25 +340,14 @@ class Orders:
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
 
-    def _refuse(
-        self,
-        key: _Key,
-        pending: _Pending,
-        station: Station,
-        vehicle: ShownVehicle,
-        error: RefusedCommandError,
-    ) -> None:
-        self._end(key, pending, station, error.result)
-        self._say(station, vehicle, f"{pending.command.name}: {error.reason}")
+    def _refuse(self, pending: _Pending, error: RefusedCommandError) -> None:
+        self._end(pending, error.result)
+        request, text = pending.request, f"{pending.command.name}: {error.reason}"
+        self._say(request.station, request.vehicle, text)
 
-    def _end(self, key: _Key, pending: _Pending, station: Station, result: int) -> None:
+    def _end(self, pending: _Pending, result: int) -> None:
         pending.result, pending.ended_s = result, self._now_s()
-        self._acknowledge(key, station, result)
-
-    @staticmethod
-    def _acknowledge(key: _Key, station: Station, result: int) -> None:
-        _, to, system, component, command = key
-        station.send(acknowledgement(command, result, to), Address(system, component))
+        pending.acknowledge(result)
 
 
 def acknowledgement(command: int, result: int, to: Address) -> Any:

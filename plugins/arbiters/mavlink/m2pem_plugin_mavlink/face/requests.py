@@ -15,14 +15,14 @@ from m2pem_plugin_mavlink.face.plan import Item
 from m2pem_plugin_mavlink.face.stations import HEARTBEAT, Station
 from m2pem_plugin_mavlink.face.streams import Streams, is_known, messages_of
 from m2pem_plugin_mavlink.face.telemetry import heartbeat
-from m2pem_plugin_mavlink.face.vehicle import Camera, ShownVehicle
+from m2pem_plugin_mavlink.face.vehicle import AUTOPILOT, Camera, ShownVehicle
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
 from m2pem_plugin_mavlink.protocol.station_requests import refusal_of_ftp, requested_intervals
 
 ACCEPTED: int = dialect.MAV_RESULT_ACCEPTED
 DENIED: int = dialect.MAV_RESULT_DENIED
 UNSUPPORTED: int = dialect.MAV_RESULT_UNSUPPORTED
-TEMPORARILY_REJECTED: int = dialect.MAV_RESULT_TEMPORARILY_REJECTED
+REJECTED: int = dialect.MAV_RESULT_TEMPORARILY_REJECTED
 
 MISSION, FENCE = 0, 1
 """MAV_MISSION_TYPE."""
@@ -36,21 +36,27 @@ MOST_DOWNLOADS = 64
 Say = Callable[[Station, ShownVehicle, str], None]
 """Tells a station why something is refused."""
 
-Answer = Callable[[Command, Station, ShownVehicle, Camera | None], int]
-
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """A message of a ground station to a vehicle. `source`: the address of its sender."""
+    """A message of a ground station to a vehicle. `source`: the address of its sender; `camera`:
+    the component that it is addressed to, None: the autopilot."""
 
     message: Message
     source: Address
     station: Station
     vehicle: ShownVehicle
+    camera: Camera | None
+
+    @property
+    def component(self) -> Address:
+        """The address of the component."""
+        own = self.camera.component if self.camera is not None else AUTOPILOT
+        return Address(self.vehicle.system, own)
 
     def answer(self, message: Message) -> None:
-        """Send a message of the vehicle to the sender."""
-        self.station.send(message, self.vehicle.autopilot)
+        """Send a message of the component to the sender."""
+        self.station.send(message, self.component)
 
 
 _ONE_MESSAGE: Mapping[int, int] = {
@@ -81,7 +87,7 @@ class Requests:
             for corner in ring[:-1]
         ]
         self._downloads: dict[tuple[str, Address, int, int], Sequence[Message]] = {}
-        self._commands: Mapping[int, Answer] = {
+        self._commands: Mapping[int, Callable[[Command, Request], int]] = {
             **dict.fromkeys((dialect.MAV_CMD_REQUEST_MESSAGE, *_ONE_MESSAGE), self._send),
             dialect.MAV_CMD_SET_MESSAGE_INTERVAL: self._set_interval,
             dialect.MAV_CMD_GET_MESSAGE_INTERVAL: self._get_interval,
@@ -109,12 +115,10 @@ class Requests:
             ),
         }
 
-    def command(
-        self, command: Command, station: Station, vehicle: ShownVehicle, camera: Camera | None
-    ) -> int | None:
+    def command(self, command: Command, request: Request) -> int | None:
         """Carry out a command that only asks; return its MAV_RESULT; None: it is another one."""
         answer = self._commands.get(command.id)
-        return None if answer is None else answer(command, station, vehicle, camera)
+        return None if answer is None else answer(command, request)
 
     def message(self, request: Request) -> bool:
         """Answer a message; return False if it is of another kind."""
@@ -125,58 +129,54 @@ class Requests:
 
     # --- messages and intervals -------------------------------------------------------------------
 
-    def _send(
-        self, command: Command, station: Station, vehicle: ShownVehicle, camera: Camera | None
-    ) -> int:
-        id_ = _ONE_MESSAGE.get(command.id, _whole(command.params[0]))
-        if camera is not None:
+    def _send(self, command: Command, request: Request) -> int:
+        id_, station = _ONE_MESSAGE.get(command.id, _whole(command.params[0])), request.station
+        if request.camera is not None:
             make = CAMERA_MAKERS.get(id_)
             if make is None:
                 return UNSUPPORTED
-            station.send(make(camera), Address(vehicle.system, camera.component))
+            request.answer(make(request.camera))
             return ACCEPTED
         if station.ardupilot_modes and id_ in (modes.AVAILABLE_MODES, modes.CURRENT_MODE):
             return UNSUPPORTED  # they have PX4's numbers
         if id_ == modes.AVAILABLE_MODES:
-            return self._send_modes(_whole(command.params[1]), station, vehicle)
+            return self._send_modes(_whole(command.params[1]), request)
         if not is_known(id_):
             return UNSUPPORTED
-        found = messages_of(vehicle, id_)
+        found = messages_of(request.vehicle, id_)
         for message, source in found:
             station.send(message, source)
         return ACCEPTED if found else DENIED
 
-    def _send_modes(self, index: int, station: Station, vehicle: ShownVehicle) -> int:
+    @staticmethod
+    def _send_modes(index: int, request: Request) -> int:
         if not 0 <= index <= len(modes.MODES):
             return DENIED
         for each in [index] if index else range(1, len(modes.MODES) + 1):
-            station.send(modes.available_mode(each), vehicle.autopilot)
+            request.answer(modes.available_mode(each))
         return ACCEPTED
 
-    def _set_interval(
-        self, command: Command, station: Station, vehicle: ShownVehicle, camera: Camera | None
-    ) -> int:
+    def _set_interval(self, command: Command, request: Request) -> int:
         id_, interval_us = _whole(command.params[0]), command.params[1]
-        if camera is not None or not is_known(id_):
+        if request.camera is not None or not is_known(id_):
             return UNSUPPORTED
         if not math.isfinite(interval_us) or (id_ == HEARTBEAT and interval_us < 0):
             return DENIED
-        set_ = self._streams.set_interval(station, vehicle, id_, interval_us / 1e6)
-        return ACCEPTED if set_ else TEMPORARILY_REJECTED
+        interval_s = interval_us / 1e6
+        set_ = self._streams.set_interval(request.station, request.vehicle, id_, interval_s)
+        return ACCEPTED if set_ else REJECTED
 
-    def _get_interval(
-        self, command: Command, station: Station, vehicle: ShownVehicle, camera: Camera | None
-    ) -> int:
+    def _get_interval(self, command: Command, request: Request) -> int:
         id_ = _whole(command.params[0])
-        if camera is not None:
+        if request.camera is not None:
             return UNSUPPORTED
         interval_us = 0
         if is_known(id_):
-            interval_us = round(self._streams.interval_s(station, vehicle, id_) * 1e6) or -1
-        made = message_type("MESSAGE_INTERVAL").make(
-            message_id=max(0, min(id_, 0xFFFF)), interval_us=interval_us
-        )
-        station.send(made, vehicle.autopilot)
+            interval_s = self._streams.interval_s(request.station, request.vehicle, id_)
+            interval_us = round(interval_s * 1e6) or -1
+        number = max(0, min(id_, 0xFFFF))
+        make = message_type("MESSAGE_INTERVAL").make
+        request.answer(make(message_id=number, interval_us=interval_us))
         return ACCEPTED
 
     def _set_streams(self, request: Request) -> None:

@@ -31,9 +31,9 @@ from m2pem_plugin_mavlink.face.components import cameras_of
 from m2pem_plugin_mavlink.face.event_settings import EventRules
 from m2pem_plugin_mavlink.face.events import Events
 from m2pem_plugin_mavlink.face.forwarding import COMMAND_INT, COMMAND_LONG, Forwarder
-from m2pem_plugin_mavlink.face.orders import DENIED, Orders, acknowledgement, name_of
+from m2pem_plugin_mavlink.face.orders import Orders, acknowledgement, name_of
 from m2pem_plugin_mavlink.face.received_messages import MessageReceiver
-from m2pem_plugin_mavlink.face.requests import Request, Requests, refusal_of_files
+from m2pem_plugin_mavlink.face.requests import DENIED, Request, Requests, refusal_of_files
 from m2pem_plugin_mavlink.face.sent_messages import MessageSender
 from m2pem_plugin_mavlink.face.settings import Settings, own_system
 from m2pem_plugin_mavlink.face.stations import Station, Stations
@@ -44,6 +44,7 @@ from m2pem_plugin_mavlink.face.vehicle import AUTOPILOT, Camera, ShownVehicle
 from m2pem_plugin_mavlink.link.hub import shared_hub
 from m2pem_plugin_mavlink.link.route import Peer
 from m2pem_plugin_mavlink.link.vehicle_link import VehicleLink
+from m2pem_plugin_mavlink.microservices.commands import message_name
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, types_by_id
 from m2pem_plugin_mavlink.protocol.raw_frames import RawFrame
 from m2pem_plugin_mavlink.settings import GCS_SYSTEM_ID
@@ -246,16 +247,16 @@ class FaceServer:
         if component != AUTOPILOT and camera is None:
             return
         message = type_.unpack(frame.payload)
+        request = Request(message, frame.source, station, vehicle, camera)
         station.sends_targets |= frame.id in _TARGETS
         if frame.id in (COMMAND_LONG, COMMAND_INT):
             may_be_px4s = station.sends_targets and not station.ardupilot_modes
-            command = command_of(message, frame, may_be_px4s=may_be_px4s)
-            self._command(command, frame, station, vehicle, camera)
+            self._command(command_of(message, frame, may_be_px4s=may_be_px4s), request)
         elif frame.id == SET_MODE:  # its number is whole: below 256, it is ArduPilot's
             is_custom = message.base_mode & dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
             params = float(is_custom), float(message.custom_mode), 0.0, 0.0
             mode = Command(dialect.MAV_CMD_DO_SET_MODE, params, None, 0.0, "", 0)
-            self._orders.command(mode, frame, station, vehicle)
+            self._orders.command(mode, request)
         elif camera is not None:
             return  # cameras have neither parameters nor a plan
         elif frame.id == POSITION_TARGET:
@@ -265,24 +266,16 @@ class FaceServer:
                 self._tell(station, vehicle, error.reason)
             else:
                 if order is not None:
-                    self._orders.target(order, frame, station, vehicle)
-        elif not self._requests.message(Request(message, frame.source, station, vehicle)):
+                    self._orders.target(order, request)
+        elif not self._requests.message(request):
             self._tell(station, vehicle, f"{type_.name} is not carried out")
 
-    def _command(
-        self,
-        command: Command,
-        frame: RawFrame,
-        station: Station,
-        vehicle: ShownVehicle,
-        camera: Camera | None,
-    ) -> None:
-        result = self._requests.command(command, station, vehicle, camera)
+    def _command(self, command: Command, request: Request) -> None:
+        result = self._requests.command(command, request)
         if result is None:
-            self._orders.command(command, frame, station, vehicle, camera)
-            return
-        source = Address(vehicle.system, camera.component if camera is not None else AUTOPILOT)
-        station.send(acknowledgement(command.id, result, frame.source), source)
+            self._orders.command(command, request)
+        else:
+            request.answer(acknowledgement(command.id, result, request.source))
 
     # --- what stations are told -------------------------------------------------------------------
 
@@ -310,21 +303,18 @@ class FaceServer:
 
     def _refuse_forwarding(self, station: Station, frame: RawFrame, system: int) -> None:
         """Refuse a command to a forwarded vehicle."""
-        name = next(each for each, id_ in self._settings.systems.items() if id_ == system)
-        message = (
-            types_by_id()[frame.id].unpack(frame.payload) if frame.id in types_by_id() else None
-        )
-        if frame.id in (COMMAND_LONG, COMMAND_INT) and frame.target.system:
-            assert message is not None
-            answer = acknowledgement(message.command, DENIED, frame.source)
-            station.send(answer, Address(system, frame.target.component or AUTOPILOT))
-        if frame.id == FILE_TRANSFER and frame.target.system and message is not None:
+        if not frame.target.system:
+            return
+        to = Address(system, frame.target.component or AUTOPILOT)
+        if frame.id in (COMMAND_LONG, COMMAND_INT):
+            command = types_by_id()[frame.id].unpack(frame.payload).command
+            station.send(acknowledgement(command, DENIED, frame.source), to)
+        if frame.id == FILE_TRANSFER:
+            message = types_by_id()[frame.id].unpack(frame.payload)
             if (refusal := refusal_of_files(message, frame.source)) is not None:
-                station.send(refusal, Address(system, frame.target.component or AUTOPILOT))
-        elif frame.target.system and frame.id != DATA_STREAM:  # MAVProxy sends it every 10 s
-            what = message.TYPE.name if message is not None else f"message {frame.id}"
-            self._tell_as(
-                station,
-                Address(system, ONBOARD_COMPUTER),
-                f"{name}: {what} is not forwarded: faces.mavlink.forward_commands",
-            )
+                station.send(refusal, to)
+        elif frame.id != DATA_STREAM:  # MAVProxy sends it every 10 s
+            name = next(each for each, id_ in self._settings.systems.items() if id_ == system)
+            what = message_name(frame.id)
+            text = f"{name}: {what} is not forwarded: faces.mavlink.forward_commands"
+            self._tell_as(station, Address(system, ONBOARD_COMPUTER), text)

@@ -33,7 +33,7 @@ FRAMES = {
 
 @dataclass(frozen=True, slots=True)
 class TargetPosition:
-    """A place to go to, in WGS-84 degrees; `altitude_m` in `altitude_frame` (one of `FRAMES`), None:
+    """A place to go to, in WGS-84 degrees; `altitude_m` in `altitude_frame` (of `FRAMES`), None:
     the present one. `heading_rad` from true north, clockwise; None: the present one."""
 
     latitude_deg: float
