@@ -6,7 +6,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem_plugin_mavlink.simulator.interfaces import AutopilotInterface, CommandHandler, Component
 from m2pem_plugin_mavlink.simulator.messages import Command, Result
-from m2pem_plugin_mavlink.simulator.specification import Kind
+from m2pem_plugin_mavlink.simulator.specification import SURFACE, Kind
 
 FORCE_ARM, FORCE = 2989, 21196
 """Parameter 2 of MAV_CMD_COMPONENT_ARM_DISARM: do it in spite of everything."""
@@ -26,7 +26,7 @@ class Arming(Component):
         """Yield the reasons against arming in the present mode, the most important first."""
         mode = self.autopilot.modes.mode
         if not mode.armable:
-            named = self.autopilot.spec.kind not in (Kind.ROVER, Kind.BOAT)
+            named = self.autopilot.spec.kind not in SURFACE
             yield f"{mode.name} mode not armable" if named else "Mode not armable"
         for component in self.autopilot.components:
             yield from component.refusals()
@@ -88,7 +88,7 @@ class Arming(Component):
             self.disarm(by="landing")
 
     def _may_disarm(self) -> bool:
-        return self.autopilot.spec.kind in (Kind.ROVER, Kind.BOAT) or self.autopilot.body.on_ground
+        return self.autopilot.spec.kind in SURFACE or self.autopilot.body.on_ground
 
     def step(self, dt_s: float) -> None:
         """Disarm a copter that stays on the ground for DISARM_DELAY."""

@@ -7,6 +7,7 @@ fast it passes.
 """
 
 import logging
+from collections.abc import Mapping
 from typing import Any, TypeVar
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -23,7 +24,8 @@ from m2pem_plugin_mavlink.simulator.dynamics import (
     dynamics_of,
 )
 from m2pem_plugin_mavlink.simulator.fence import Fence
-from m2pem_plugin_mavlink.simulator.firmware import Tuning, firmware_of
+from m2pem_plugin_mavlink.simulator.firmware.ardupilot import ArduPilot
+from m2pem_plugin_mavlink.simulator.firmware.px4 import Px4
 from m2pem_plugin_mavlink.simulator.geometry import LocalFrame, Point
 from m2pem_plugin_mavlink.simulator.gimbal import Gimbal
 from m2pem_plugin_mavlink.simulator.home import Home
@@ -31,22 +33,26 @@ from m2pem_plugin_mavlink.simulator.identity import Identity
 from m2pem_plugin_mavlink.simulator.interfaces import (
     Component,
     EventLog,
+    Firmware,
     InjectedFaults,
     MessageHandler,
     Parameters,
+    Tuning,
 )
 from m2pem_plugin_mavlink.simulator.messages import Command, Outgoing, Peer, Result, Sender
 from m2pem_plugin_mavlink.simulator.missions.plan import PlanStore
 from m2pem_plugin_mavlink.simulator.missions.progress import MissionProgress
 from m2pem_plugin_mavlink.simulator.missions.protocol import MissionServer
 from m2pem_plugin_mavlink.simulator.modes import ModeSwitch
-from m2pem_plugin_mavlink.simulator.motion_commands import GuidedSetpoints, MotionCommands
+from m2pem_plugin_mavlink.simulator.motion_commands import MotionCommands
 from m2pem_plugin_mavlink.simulator.parameters import ParameterServer
 from m2pem_plugin_mavlink.simulator.reports import Reports, Texts
 from m2pem_plugin_mavlink.simulator.sensors import Battery, Estimator
 from m2pem_plugin_mavlink.simulator.signing import SigningState
 from m2pem_plugin_mavlink.simulator.specification import Kind, VehicleSpec
 from m2pem_plugin_mavlink.simulator.streams import Streams
+
+FIRMWARES: Mapping[str, type[Firmware]] = {"ardupilot": ArduPilot, "px4": Px4}
 
 
 def equipment_of(spec: VehicleSpec) -> tuple[type[Component], ...]:
@@ -70,11 +76,18 @@ logger = logging.getLogger(__name__)
 
 
 class Autopilot:
-    """One vehicle: its state of motion, its firmware and its components."""
+    """One vehicle: its state of motion, its firmware and its components.
+
+    Raises:
+        ValueError: there is no such firmware, or not for that kind of vehicle.
+    """
 
     def __init__(self, spec: VehicleSpec, now_s: float = 0.0, *, step_s: float = 0.02) -> None:
         self.spec = spec
-        self.firmware = firmware_of(spec)
+        if spec.firmware not in FIRMWARES:
+            known = ", ".join(FIRMWARES)
+            raise ValueError(f"there is no firmware {spec.firmware!r}; there are: {known}")
+        self.firmware = FIRMWARES[spec.firmware](spec)
         self.now_s = now_s
         self.step_s = step_s
         self.frame = LocalFrame(spec.home)
@@ -100,7 +113,7 @@ class Autopilot:
         self.home = Home(self)
         self.modes = ModeSwitch(self)
         self.arming = Arming(self)
-        self.guided = GuidedSetpoints(self)
+        self.guided = MotionCommands(self)
         self.mission = MissionProgress(self)
         self.missions = MissionServer(self)
         self.payload = Payload(self)
@@ -119,7 +132,6 @@ class Autopilot:
             ParameterServer(self),
             Identity(self),
             SystemCommands(self),
-            MotionCommands(self),
             Reports(self),
         ]
         own = (*equipment_of(self.spec), *self.firmware.components())

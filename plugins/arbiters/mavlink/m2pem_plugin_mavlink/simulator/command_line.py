@@ -15,8 +15,8 @@ from m2pem.api.command_options import DurationOption, FaultOption, PositionOptio
 from m2pem.api.faults import PlannedFault
 from m2pem.api.foreground import interrupted
 from m2pem_plugin_mavlink.signing.key_file import SigningError, read_key
+from m2pem_plugin_mavlink.simulator.autopilot import FIRMWARES
 from m2pem_plugin_mavlink.simulator.faults import GRAMMAR, Faults
-from m2pem_plugin_mavlink.simulator.firmware import FIRMWARES
 from m2pem_plugin_mavlink.simulator.geometry import LocalFrame, Location, Point
 from m2pem_plugin_mavlink.simulator.server import Address
 from m2pem_plugin_mavlink.simulator.simulator import Simulator
@@ -107,8 +107,8 @@ class Parameter(click.ParamType):  # type: ignore[type-arg]  # older clicks have
 @click.option("--first-system", type=click.IntRange(1, MOST_SYSTEMS), default=1, show_default=True)
 @click.option(
     "--firmware",
-    type=click.Choice(FIRMWARES),
-    default=FIRMWARES[0],
+    type=click.Choice([*FIRMWARES]),
+    default="ardupilot",
     show_default=True,
     help="As which autopilot all vehicles speak.",
 )

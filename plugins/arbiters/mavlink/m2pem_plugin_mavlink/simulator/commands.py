@@ -175,5 +175,4 @@ class Payload(Component):
 
 
 def _result(done: bool) -> Result:
-    result = Result.ACCEPTED if done else Result.FAILED
-    return result
+    return Result.ACCEPTED if done else Result.FAILED

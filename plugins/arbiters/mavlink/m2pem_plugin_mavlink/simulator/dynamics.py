@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
 
 from m2pem_plugin_mavlink.simulator.geometry import Point, towards, wrapped_rad
 from m2pem_plugin_mavlink.simulator.specification import Kind
@@ -380,12 +379,7 @@ class RoverDynamics:
         return sign * speed, off / max(dt_s, 0.3)
 
 
-class Dynamics(Protocol):
-    """Moves a vehicle."""
-
-    def step(self, body: BodyState, setpoint: MotionSetpoint, dt_s: float) -> None:
-        """Advance by `dt_s`."""
-        ...
+Dynamics = CopterDynamics | PlaneDynamics | RoverDynamics
 
 
 def dynamics_of(kind: Kind) -> Dynamics:

@@ -4,6 +4,7 @@ Sources: ArduPilot events.cpp and failsafe.cpp; PX4 Commander, failsafe.cpp.
 """
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from enum import Enum
 from typing import Any
@@ -21,7 +22,7 @@ from m2pem_plugin_mavlink.simulator.firmware.px4_modes import (
 )
 from m2pem_plugin_mavlink.simulator.interfaces import AutopilotInterface, Component, MessageHandler
 from m2pem_plugin_mavlink.simulator.messages import Sender
-from m2pem_plugin_mavlink.simulator.specification import Kind
+from m2pem_plugin_mavlink.simulator.specification import SURFACE, Kind
 
 
 class Change(Enum):
@@ -37,41 +38,43 @@ class Watch:
 
     def __init__(self) -> None:
         self.wrong = False
-
-    def look(self, wrong: bool) -> Change:
-        """How it is now; what has changed since the last look."""
-        before, self.wrong = self.wrong, wrong
-        if wrong == before:
-            return Change.NONE
-        return Change.WRONG if wrong else Change.WELL
-
-
-class Lasting(Watch):
-    """Tracks a condition that counts as bad only after some time."""
-
-    def __init__(self) -> None:
-        super().__init__()
         self._since_s = math.inf
 
-    def look_for(self, wrong: bool, seconds: float, now_s: float) -> Change:
-        """Whether it has been wrong for that long."""
+    def look(self, wrong: bool, seconds: float = 0.0, now_s: float = 0.0) -> Change:
+        """How it is now; what has changed since the last look. It counts as bad only once it has
+        been for some seconds."""
         self._since_s = min(self._since_s, now_s) if wrong else math.inf
-        return self.look(wrong and now_s - self._since_s >= seconds)
+        before, self.wrong = self.wrong, wrong and now_s - self._since_s >= seconds
+        if self.wrong == before:
+            return Change.NONE
+        return Change.WRONG if self.wrong else Change.WELL
 
 
-class Heartbeats:
-    """Tracks the heartbeats of the ground station; before the first one it is not missed."""
+class Failsafes(Component, ABC):
+    """Monitors the ground station, the battery and the position. Before its first heartbeat a
+    ground station is not missed."""
 
-    def __init__(self) -> None:
-        self._received_s: float | None = None
+    def __init__(self, autopilot: AutopilotInterface) -> None:
+        super().__init__(autopilot)
+        self._heartbeat_s = math.inf
+        self._link = Watch()
+        self._position = Watch()
 
-    def received(self, now_s: float) -> None:
-        """Just now."""
-        self._received_s = now_s
+    def messages(self) -> Mapping[str, MessageHandler]:
+        """Heartbeats of ground stations."""
+        return {"HEARTBEAT": self._received}
 
-    def missed(self, seconds: float, now_s: float) -> bool:
-        """For longer than that."""
-        return self._received_s is not None and now_s - self._received_s > seconds
+    def _received(self, message: Any, sender: Sender) -> None:
+        if self._counts(message, sender):
+            self._heartbeat_s = self.autopilot.now_s
+
+    @abstractmethod
+    def _counts(self, message: Any, sender: Sender) -> bool:
+        """Return whether it is a heartbeat of a ground station that counts."""
+
+    def _missed(self, seconds: float) -> bool:
+        """Return whether no heartbeat has come for longer than that."""
+        return self.autopilot.now_s - self._heartbeat_s > seconds
 
 
 EKF_S = 1.0
@@ -81,7 +84,6 @@ CONTINUE_PILOTED_WITHOUT_GCS = 1 << 4
 """FS_OPTIONS."""
 PILOTED = ("STABILIZE", "ACRO", "ALT_HOLD", "LOITER", "POSHOLD", "BRAKE")
 """Modes of copters that count as controlled by a pilot (ArduCopter: Mode::is_autopilot)."""
-SURFACE = (Kind.ROVER, Kind.BOAT)
 
 Modes = Mapping[int, str]
 COPTER_BATTERY: Modes = {1: "LAND", 2: "RTL", 3: "SMART_RTL", 4: "SMART_RTL", 6: "RTL", 7: "BRAKE"}
@@ -94,15 +96,12 @@ PLANE_ACTIONS: Modes = {1: "RTL", 2: "RTL", 5: "RTL"}
 """FS_LONG_ACTN, BATT_FS_LOW_ACT: gliding and automatic landing end in RTL here."""
 
 
-class ArduPilotFailsafes(Component):
-    """Monitors the ground station, the battery and the estimator."""
+class ArduPilotFailsafes(Failsafes):
+    """Monitors one ground station, and the estimator."""
 
     def __init__(self, autopilot: AutopilotInterface) -> None:
         super().__init__(autopilot)
-        self._heartbeats = Heartbeats()
-        self._link = Watch()
-        self._position = Lasting()
-        self._battery = {"CRT": Lasting(), "LOW": Lasting()}
+        self._battery = {"CRT": Watch(), "LOW": Watch()}
 
     @property
     def failsafe(self) -> bool:
@@ -110,13 +109,8 @@ class ArduPilotFailsafes(Component):
         watches = (self._link, self._position, *self._battery.values())
         return any(watch.wrong for watch in watches)
 
-    def messages(self) -> Mapping[str, MessageHandler]:
-        """Heartbeats of the one ground station that counts."""
-        return {"HEARTBEAT": self._received}
-
-    def _received(self, message: Any, sender: Sender) -> None:
-        if sender.system == self.autopilot.parameters["MAV_GCS_SYSID"]:
-            self._heartbeats.received(self.autopilot.now_s)
+    def _counts(self, message: Any, sender: Sender) -> bool:
+        return sender.system == self.autopilot.parameters["MAV_GCS_SYSID"]
 
     def step(self, dt_s: float) -> None:
         """Check all three conditions."""
@@ -135,7 +129,7 @@ class ArduPilotFailsafes(Component):
         plane = kind is Kind.PLANE
         enabled = int(p["FS_GCS_ENABL" if plane else "FS_GCS_ENABLE"])
         timeout_s = p["FS_LONG_TIMEOUT" if plane else "FS_GCS_TIMEOUT"]
-        missed = enabled > 0 and self._heartbeats.missed(timeout_s, autopilot.now_s)
+        missed = enabled > 0 and self._missed(timeout_s)
         change = self._link.look(missed)
         if change is Change.WELL and kind in SURFACE:
             autopilot.say("GCS Failsafe Cleared")
@@ -184,10 +178,10 @@ class ArduPilotFailsafes(Component):
 
     # --- the battery ------------------------------------------------------------------------------
 
-    def _look_at_battery(self, level: str, watch: Lasting) -> None:
+    def _look_at_battery(self, level: str, watch: Watch) -> None:
         autopilot, p = self.autopilot, self.autopilot.parameters
         delay_s = p["BATT_LOW_TIMER"]
-        change = watch.look_for(self._empty(level), delay_s, autopilot.now_s)
+        change = watch.look(self._empty(level), delay_s, autopilot.now_s)
         if change is not Change.WRONG:
             return
         used_mah = (1 - autopilot.battery.left) * p["BATT_CAPACITY"]
@@ -221,7 +215,7 @@ class ArduPilotFailsafes(Component):
         needs = autopilot.arming.armed and autopilot.modes.mode.needs_position
         lost = (needs or self._position.wrong) and not autopilot.estimator.ready
         action = int(autopilot.parameters["FS_EKF_ACTION"])
-        change = self._position.look_for(lost, EKF_S, autopilot.now_s)
+        change = self._position.look(lost, EKF_S, autopilot.now_s)
         surface = autopilot.spec.kind in SURFACE
         if change is Change.WELL and action:
             autopilot.warn("EKF failsafe cleared" if surface else "EKF Failsafe Cleared")
@@ -249,14 +243,11 @@ RETURN_THEN_LAND = 3
 """COM_LOW_BAT_ACT: return when it is critical, land in an emergency."""
 
 
-class Px4Failsafes(Component):
-    """Monitors the ground station, the battery and the position."""
+class Px4Failsafes(Failsafes):
+    """Monitors all ground stations."""
 
     def __init__(self, autopilot: AutopilotInterface) -> None:
         super().__init__(autopilot)
-        self._heartbeats = Heartbeats()
-        self._link = Watch()
-        self._position = Lasting()
         self._low, self._critical, self._emergency = Watch(), Watch(), Watch()
         self._acting_in: int | None = None
         self._then: int | None = None  # the mode that follows on holding
@@ -268,13 +259,8 @@ class Px4Failsafes(Component):
         """It acts until it is disarmed or another mode is entered."""
         return self._acting_in is not None
 
-    def messages(self) -> Mapping[str, MessageHandler]:
-        """Heartbeats of any ground station."""
-        return {"HEARTBEAT": self._received}
-
-    def _received(self, message: Any, sender: Sender) -> None:
-        if message.type == dialect.MAV_TYPE_GCS:
-            self._heartbeats.received(self.autopilot.now_s)
+    def _counts(self, message: Any, sender: Sender) -> bool:
+        return bool(message.type == dialect.MAV_TYPE_GCS)
 
     def step(self, dt_s: float) -> None:
         """Check all three conditions."""
@@ -318,7 +304,7 @@ class Px4Failsafes(Component):
 
     def _look_at_link(self) -> None:
         autopilot, p = self.autopilot, self.autopilot.parameters
-        change = self._link.look(self._heartbeats.missed(p["COM_DL_LOSS_T"], autopilot.now_s))
+        change = self._link.look(self._missed(p["COM_DL_LOSS_T"]))
         if change is Change.WELL:
             autopilot.say("GCS connection regained")
         if change is not Change.WRONG:
@@ -353,7 +339,7 @@ class Px4Failsafes(Component):
         autopilot = self.autopilot
         needs = autopilot.modes.mode.needs_position or self._position.wrong
         lost = autopilot.arming.armed and needs and not autopilot.estimator.ready
-        change = self._position.look_for(lost, POSITION_S, autopilot.now_s)
+        change = self._position.look(lost, POSITION_S, autopilot.now_s)
         if change is Change.WRONG:
             self._before = autopilot.modes.mode.number
             self.act("no valid position estimate", DESCEND, at_once=True)

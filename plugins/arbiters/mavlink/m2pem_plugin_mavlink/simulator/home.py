@@ -56,9 +56,7 @@ class Home(Component):
             self.point.east_m,
             -self.point.up_m,
             [1.0, 0.0, 0.0, 0.0],
-            0.0,
-            0.0,
-            0.0,
+            *[0.0] * 3,
             int(self.autopilot.since_boot_s * 1e6),
         )
 

@@ -46,9 +46,7 @@ class Identity(Component):
         return dialect.MAVLink_autopilot_version_message(
             firmware.capabilities,
             firmware.version,
-            0,
-            0,
-            0,
+            *[0] * 3,
             list(b"m2pemsim"),
             [0] * 8,
             [0] * 8,

@@ -291,6 +291,8 @@ class Firmware(ABC):
 
     autopilot_id: ClassVar[int]
     """MAV_AUTOPILOT."""
+    types: ClassVar[Mapping[Kind, int]]
+    """MAV_TYPE of each kind of vehicle."""
     version: ClassVar[int]
     """As in AUTOPILOT_VERSION.flight_sw_version."""
     capabilities: ClassVar[int]
@@ -328,9 +330,9 @@ class Firmware(ABC):
         self.spec = spec
 
     @property
-    @abstractmethod
     def vehicle_type(self) -> int:
         """MAV_TYPE."""
+        return self.types[self.spec.kind]
 
     @abstractmethod
     def modes(self) -> Sequence[Mode]:

@@ -16,7 +16,7 @@ from m2pem_plugin_mavlink.simulator.dynamics import (
 )
 from m2pem_plugin_mavlink.simulator.geometry import Point
 from m2pem_plugin_mavlink.simulator.interfaces import Maneuver
-from m2pem_plugin_mavlink.simulator.specification import Kind
+from m2pem_plugin_mavlink.simulator.specification import SURFACE, Kind
 
 
 class HoldPosition(Maneuver):
@@ -54,7 +54,7 @@ class CircleHere(Maneuver):
     @property
     def takes_speed(self) -> bool:
         """Whether it obeys DO_CHANGE_SPEED: rovers and boats."""
-        return self.autopilot.spec.kind in (Kind.ROVER, Kind.BOAT)
+        return self.autopilot.spec.kind in SURFACE
 
     def step(self, dt_s: float) -> MotionSetpoint:
         """Around it."""
@@ -178,7 +178,6 @@ class ReturnToLaunch(Maneuver):
         return descend_to_land(self, self._above_home)
 
 
-SURFACE = (Kind.ROVER, Kind.BOAT)
 TAKEN_OFF_M = 0.3
 """A takeoff is over when it is that near to its height."""
 

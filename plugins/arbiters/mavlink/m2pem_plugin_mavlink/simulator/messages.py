@@ -90,26 +90,10 @@ class Command:
 
 def command_of(message: Any, sender: Sender) -> Command:
     """From COMMAND_LONG or COMMAND_INT."""
+    params = (message.param1, message.param2, message.param3, message.param4)
     if message.get_msgId() == dialect.MAVLINK_MSG_ID_COMMAND_LONG:
-        frame, x, y, z = 3, message.param5, message.param6, message.param7
-        was_long = True
-        confirmation = message.confirmation
-    else:
-        scale = 1e-7 if message.frame in GLOBAL_FRAMES else 1.0
-        frame, x, y, z = message.frame, message.x * scale, message.y * scale, message.z
-        confirmation = 0
-        was_long = False
-    return Command(
-        message.command,
-        message.param1,
-        message.param2,
-        message.param3,
-        message.param4,
-        x,
-        y,
-        z,
-        frame,
-        was_long,
-        confirmation,
-        sender,
-    )
+        place = (message.param5, message.param6, message.param7)
+        return Command(message.command, *params, *place, 3, True, message.confirmation, sender)
+    scale = 1e-7 if message.frame in GLOBAL_FRAMES else 1.0
+    place = (message.x * scale, message.y * scale, message.z)
+    return Command(message.command, *params, *place, message.frame, False, 0, sender)

@@ -19,7 +19,7 @@ from m2pem_plugin_mavlink.simulator.messages import (
     Sender,
 )
 from m2pem_plugin_mavlink.simulator.missions.execution import ITSELF
-from m2pem_plugin_mavlink.simulator.specification import Kind
+from m2pem_plugin_mavlink.simulator.specification import SURFACE, Kind
 
 IGNORE_POSITION = 7
 IGNORE_VELOCITY = 7 << 3
@@ -27,8 +27,15 @@ IGNORE_YAW, IGNORE_YAW_RATE = 1 << 10, 1 << 11
 """POSITION_TARGET_TYPEMASK."""
 
 
-class GuidedSetpoints(Component):
-    """Passes setpoints to GUIDED; in other modes they are ignored."""
+LEAST_MPS = 0.05
+"""AR_WPNAV_SPEED_MIN."""
+CHANGE_MODE = 1
+"""Parameter 2 of DO_REPOSITION: enter GUIDED if it is in another mode."""
+
+
+class MotionCommands(Component):
+    """Executes commands that move the vehicle, as ArduPilot does, and passes setpoints to GUIDED;
+    in other modes they are ignored."""
 
     def messages(self) -> Mapping[str, MessageHandler]:
         """Setpoints in the frame of the vehicle's home."""
@@ -52,7 +59,7 @@ class GuidedSetpoints(Component):
 
     def _on_surface(self, point: Point) -> Point:
         """Return the point at the surface for a rover or boat, whatever its height."""
-        surface = self.autopilot.spec.kind in (Kind.ROVER, Kind.BOAT)
+        surface = self.autopilot.spec.kind in SURFACE
         return point.at_height(0.0) if surface else point
 
     def _guided(self) -> Guided | None:
@@ -76,17 +83,6 @@ class GuidedSetpoints(Component):
             rate = None if mask & IGNORE_YAW_RATE else message.yaw_rate
             guided.move(VelocitySetpoint(message.vx, message.vy, -message.vz, yaw, rate))
 
-
-SURFACE = (Kind.ROVER, Kind.BOAT)
-LEAST_MPS = 0.05
-"""AR_WPNAV_SPEED_MIN."""
-CHANGE_MODE = 1
-"""Parameter 2 of DO_REPOSITION: enter GUIDED if it is in another mode."""
-
-
-class MotionCommands(Component):
-    """Executes commands that move the vehicle, as ArduPilot does."""
-
     def commands(self) -> Mapping[int, CommandHandler]:
         """By MAV_CMD; what a kind of vehicle cannot do, it does not know."""
         roles, kind = self.autopilot.firmware.roles, self.autopilot.spec.kind
@@ -109,10 +105,6 @@ class MotionCommands(Component):
 
     def _enter(self, mode: int) -> Result:
         return Result.ACCEPTED if self.autopilot.modes.switch(mode) else Result.FAILED
-
-    def _guided(self) -> Guided | None:
-        maneuver = self.autopilot.modes.maneuver
-        return maneuver if isinstance(maneuver, Guided) else None
 
     def _take_off(self, command: Command) -> Result:
         """In GUIDED only, armed and on the ground."""

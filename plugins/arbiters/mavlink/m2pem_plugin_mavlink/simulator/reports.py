@@ -15,7 +15,7 @@ from m2pem_plugin_mavlink.simulator.interfaces import (
     ReportMaker,
 )
 from m2pem_plugin_mavlink.simulator.messages import Peer, Sender
-from m2pem_plugin_mavlink.simulator.specification import Kind
+from m2pem_plugin_mavlink.simulator.specification import SURFACE
 
 CHUNK = 50
 """Bytes of text in one message (MAVLink common, STATUSTEXT)."""
@@ -123,12 +123,7 @@ class Reports(Component):
             round(autopilot.battery.voltage_v * 1000),
             round(autopilot.battery.current_a * 100),
             autopilot.battery.percent,
-            0,
-            0,
-            0,
-            0,
-            0,
-            0,
+            *[0] * 6,
         )
 
     def _target(self) -> Any:
@@ -225,7 +220,7 @@ class Reports(Component):
         state: int = dialect.MAV_LANDED_STATE_IN_AIR
         if not autopilot.firmware.tells_landed:
             state = dialect.MAV_LANDED_STATE_UNDEFINED
-        elif autopilot.body.on_ground or autopilot.spec.kind in (Kind.ROVER, Kind.BOAT):
+        elif autopilot.body.on_ground or autopilot.spec.kind in SURFACE:
             state = dialect.MAV_LANDED_STATE_ON_GROUND
         elif autopilot.modes.maneuver.taking_off:
             state = dialect.MAV_LANDED_STATE_TAKEOFF

@@ -7,7 +7,6 @@ async with Simulator([VehicleSpec(), VehicleSpec(Kind.ROVER, system=2)], speed=1
 import asyncio
 import logging
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from types import TracebackType
 from typing import Self
 
 from m2pem.api.faults import PlannedFault
@@ -147,12 +146,7 @@ class Simulator:
         self._task.add_done_callback(lambda _: self._moved.set())
         return self
 
-    async def __aexit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    async def __aexit__(self, *_: object) -> None:
         if self._task is not None:
             self._task.cancel()
             await asyncio.gather(self._task, return_exceptions=True)

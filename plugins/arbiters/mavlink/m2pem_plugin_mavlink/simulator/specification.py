@@ -20,11 +20,15 @@ class Kind(StrEnum):
     BOAT = "boat"
 
 
+SURFACE = (Kind.ROVER, Kind.BOAT)
+"""What drives or floats."""
+
+
 @dataclass(frozen=True, slots=True)
 class VehicleSpec:
     """One simulated vehicle.
 
-    `firmware`: a name in `simulator.firmware.FIRMWARES`; `estimator_s`: how long the position is
+    `firmware`: a name in `simulator.autopilot.FIRMWARES`; `estimator_s`: how long the position is
     unknown after the start, in seconds of simulated time;
     `parameters`: what differs from the firmware's defaults; `battery_s`: how long a full battery
     lasts in motion; `gimbal`: it has one (None: if it is a copter); `camera`: it has one, as a

@@ -28,7 +28,7 @@ from m2pem_plugin_mavlink.simulator.maneuvers import (
 )
 from m2pem_plugin_mavlink.simulator.missions.execution import AutoMission
 from m2pem_plugin_mavlink.simulator.signing import SigningSetup
-from m2pem_plugin_mavlink.simulator.specification import Kind, VehicleSpec
+from m2pem_plugin_mavlink.simulator.specification import SURFACE, Kind, VehicleSpec
 
 COPTER = (
     Mode(0, "STABILIZE", HoldPosition, needs_position=False, armable=True, automatic=False),
@@ -115,6 +115,7 @@ class ArduPilot(Firmware):
     """ArduPilot on one kind of vehicle."""
 
     autopilot_id = dialect.MAV_AUTOPILOT_ARDUPILOTMEGA
+    types = TYPES
     version = 4 << 24 | 7 << 16 | 0 << 8 | dialect.FIRMWARE_VERSION_TYPE_DEV
     capabilities = (
         dialect.MAV_PROTOCOL_CAPABILITY_PARAM_FLOAT
@@ -137,7 +138,7 @@ class ArduPilot(Firmware):
         plane, copter = spec.kind is Kind.PLANE, spec.kind is Kind.COPTER
         self.reason_home = "AHRS: waiting for home"
         self.reason_position = self.reason_home if plane else "Need Position Estimate"
-        if spec.kind in (Kind.ROVER, Kind.BOAT):
+        if spec.kind in SURFACE:
             self.reason_home = "AHRS: not using configured AHRS type"
         self.reason_sensors = "Gyros inconsistent"
         self.loop_hz = 400.0 if copter else 50.0
@@ -148,12 +149,6 @@ class ArduPilot(Firmware):
         if not copter:
             self.armed_text, self.disarmed_text = "Throttle armed", "Throttle disarmed"
         self.roles = ROLES[spec.kind]
-
-    @property
-    def vehicle_type(self) -> int:
-        """MAV_TYPE."""
-        type_: int = TYPES[self.spec.kind]
-        return type_
 
     def modes(self) -> Sequence[Mode]:
         """The modes of the vehicle."""

@@ -107,6 +107,7 @@ class Px4(Firmware):
     """
 
     autopilot_id = dialect.MAV_AUTOPILOT_PX4
+    types = TYPES
     version = 1 << 24 | 16 << 16 | 0 << 8 | dialect.FIRMWARE_VERSION_TYPE_DEV
     capabilities = (
         dialect.MAV_PROTOCOL_CAPABILITY_MISSION_FLOAT
@@ -145,12 +146,6 @@ class Px4(Firmware):
                 "or a plane with ArduPilot"
             )
         super().__init__(spec)
-
-    @property
-    def vehicle_type(self) -> int:
-        """MAV_TYPE."""
-        type_: int = TYPES[self.spec.kind]
-        return type_
 
     def modes(self) -> Sequence[Mode]:
         """The modes of the vehicle."""

@@ -11,7 +11,7 @@ from m2pem_plugin_mavlink.simulator.maneuvers import HoldPosition
 from m2pem_plugin_mavlink.simulator.messages import Command, Sender
 from m2pem_plugin_mavlink.simulator.missions.legs import NAV_TAKEOFF, Leg, Return, leg_of
 from m2pem_plugin_mavlink.simulator.missions.plan import ACTIONS, MISSION, NAVIGATION, Item
-from m2pem_plugin_mavlink.simulator.specification import Kind
+from m2pem_plugin_mavlink.simulator.specification import SURFACE, Kind
 
 CONDITION_DELAY = 112
 ITSELF = Sender(None, 0, 0)
@@ -66,20 +66,10 @@ class Actions:
 
     def _perform(self, item: Item) -> None:
         """As if it had been commanded; what the vehicle cannot do, it leaves out."""
-        command = Command(
-            item.command,
-            item.param1,
-            item.param2,
-            item.param3,
-            0.0 if math.isnan(item.param4) else item.param4,
-            item.latitude_deg,
-            item.longitude_deg,
-            item.z,
-            item.frame,
-            False,
-            0,
-            ITSELF,
-        )
+        param4 = 0.0 if math.isnan(item.param4) else item.param4
+        params = (item.param1, item.param2, item.param3, param4)
+        place = (item.latitude_deg, item.longitude_deg, item.z)
+        command = Command(item.command, *params, *place, item.frame, False, 0, ITSELF)
         self.autopilot.obey(command)
 
 
@@ -104,7 +94,7 @@ class AutoMission(Maneuver):
         """An armed copter on the ground needs a mission that begins with a takeoff; what drives
         needs one even while it is not armed."""
         autopilot, progress = self.autopilot, self.autopilot.mission
-        surface = autopilot.spec.kind in (Kind.ROVER, Kind.BOAT)
+        surface = autopilot.spec.kind in SURFACE
         if not (autopilot.arming.armed or surface):
             return None
         if progress.empty:

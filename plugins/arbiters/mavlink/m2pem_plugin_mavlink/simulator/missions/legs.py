@@ -13,9 +13,8 @@ from m2pem_plugin_mavlink.simulator.geometry import Location, Point, wrapped_rad
 from m2pem_plugin_mavlink.simulator.interfaces import AutopilotInterface, Maneuver
 from m2pem_plugin_mavlink.simulator.maneuvers import ReturnToLaunch, descend_to_land
 from m2pem_plugin_mavlink.simulator.missions.plan import Item
-from m2pem_plugin_mavlink.simulator.specification import Kind
+from m2pem_plugin_mavlink.simulator.specification import SURFACE, Kind
 
-SURFACE = (Kind.ROVER, Kind.BOAT)
 NAV_TAKEOFF = 22
 
 
@@ -90,25 +89,6 @@ class Takeoff(Leg):
         return self.reach(self.place, yaw_rad=yaw_rad)
 
 
-class Px4Takeoff(Leg):
-    """Climb if it stands on the ground, and go to the item's place."""
-
-    def __init__(self, autopilot: AutopilotInterface, item: Item) -> None:
-        super().__init__(autopilot, item)
-        self._climb = Takeoff(autopilot, item) if autopilot.body.on_ground else None
-
-    def step(self, dt_s: float) -> MotionSetpoint:
-        """Up, then there."""
-        if self._climb is not None and not self._climb.done:
-            return self._climb.step(dt_s)
-        return super().step(dt_s)
-
-    def there(self) -> MotionSetpoint:
-        """Its first parameter is no time."""
-        self.done = True
-        return self.stay(self.place)
-
-
 class Loiter(Leg):
     """Stay there for ever."""
 
@@ -153,6 +133,21 @@ class LoiterToAltitude(Leg):
         """It was there at that height."""
         self.done = True
         return self.stay(self.place)
+
+
+class Px4Takeoff(LoiterToAltitude):
+    """Climb if it stands on the ground, and go to the item's place; its first parameter is no
+    time."""
+
+    def __init__(self, autopilot: AutopilotInterface, item: Item) -> None:
+        super().__init__(autopilot, item)
+        self._climb = Takeoff(autopilot, item) if autopilot.body.on_ground else None
+
+    def step(self, dt_s: float) -> MotionSetpoint:
+        """Up, then there."""
+        if self._climb is not None and not self._climb.done:
+            return self._climb.step(dt_s)
+        return super().step(dt_s)
 
 
 class Return(Leg):

@@ -114,18 +114,7 @@ FRAMES = GLOBAL_FRAMES | {1, MISSION_FRAME}
 
 def item_of(message: Any) -> Item:
     """The item in MISSION_ITEM_INT."""
-    return Item(
-        message.frame,
-        message.command,
-        message.param1,
-        message.param2,
-        message.param3,
-        message.param4,
-        message.x,
-        message.y,
-        message.z,
-        message.autocontinue,
-    )
+    return Item(*(getattr(message, name) for name in Item._fields))
 
 
 def fault_of(kind: int, item: Item) -> int:
@@ -159,12 +148,6 @@ def message_of(item: Item, seq: int, kind: int, current: bool, to: tuple[int, in
         item.command,
         int(current),
         item.autocontinue,
-        item.param1,
-        item.param2,
-        item.param3,
-        item.param4,
-        item.x,
-        item.y,
-        item.z,
+        *item[2:9],  # its parameters and its place
         kind,
     )
