@@ -1,10 +1,10 @@
 """Arming and disarming, and the checks before."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from m2pem_plugin_mavlink.simulator.interfaces import AutopilotInterface, CommandHandler, Component
+from m2pem_plugin_mavlink.simulator.interfaces import AutopilotInterface, Component, on_command
 from m2pem_plugin_mavlink.simulator.messages import Command, Result
 from m2pem_plugin_mavlink.simulator.specification import SURFACE, Kind
 
@@ -102,13 +102,7 @@ class Arming(Component):
         if self._idle_s >= delay_s:
             self.disarm(by="auto preflight disarming")
 
-    def commands(self) -> Mapping[int, CommandHandler]:
-        """Arm and disarm; ask what is against it."""
-        return {
-            dialect.MAV_CMD_COMPONENT_ARM_DISARM: self._command,
-            dialect.MAV_CMD_RUN_PREARM_CHECKS: self._check,
-        }
-
+    @on_command(dialect.MAV_CMD_COMPONENT_ARM_DISARM)
     def _command(self, command: Command) -> Result:
         force = command.param2 in (FORCE, FORCE_ARM)
         if command.param1 == 1:
@@ -119,6 +113,7 @@ class Arming(Component):
             return Result.UNSUPPORTED
         return Result.ACCEPTED if done else Result.FAILED
 
+    @on_command(dialect.MAV_CMD_RUN_PREARM_CHECKS)
     def _check(self, command: Command) -> Result:
         if self.armed:
             return Result.TEMPORARILY_REJECTED

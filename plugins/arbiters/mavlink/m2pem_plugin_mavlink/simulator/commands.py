@@ -1,6 +1,5 @@
 """Commands (MAV_CMD): receiving and acknowledging them; reboot, servos, relays and grippers."""
 
-from collections.abc import Mapping
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -9,7 +8,8 @@ from m2pem_plugin_mavlink.simulator.interfaces import (
     AutopilotInterface,
     CommandHandler,
     Component,
-    MessageHandler,
+    on_command,
+    on_message,
 )
 from m2pem_plugin_mavlink.simulator.messages import Command, Result, Sender, command_of
 
@@ -28,10 +28,7 @@ class CommandServer(Component):
         self.handlers: dict[int, CommandHandler] = {}
         self._answers: dict[CommandKey, tuple[float, tuple[Any, ...], Result]] = {}
 
-    def messages(self) -> Mapping[str, MessageHandler]:
-        """Both kinds of commands."""
-        return {"COMMAND_LONG": self._receive, "COMMAND_INT": self._receive}
-
+    @on_message("COMMAND_LONG", "COMMAND_INT")
     def _receive(self, message: Any, sender: Sender) -> None:
         command = command_of(message, sender)
         refusal = self.autopilot.injected_faults.refusal_of(command.id)
@@ -96,10 +93,7 @@ class SystemCommands(Component):
 
     rebooting = False
 
-    def commands(self) -> Mapping[int, CommandHandler]:
-        """Reboot."""
-        return {dialect.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: self._reboot}
-
+    @on_command(dialect.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN)
     def _reboot(self, command: Command) -> Result:
         if command.param1 not in REBOOTS:
             return Result.UNSUPPORTED
@@ -156,18 +150,15 @@ class Payload(Component):
         self.autopilot.say("Gripper load grabbed" if grab else "Gripper load released")
         return True
 
-    def commands(self) -> Mapping[int, CommandHandler]:
-        """DO_SET_SERVO, DO_SET_RELAY, DO_GRIPPER."""
-        return {
-            dialect.MAV_CMD_DO_SET_SERVO: lambda command: _result(
-                self.set_servo(int(command.param1), int(command.param2))
-            ),
-            dialect.MAV_CMD_DO_SET_RELAY: lambda command: _result(
-                self.set_relay(int(command.param1), command.param2 > 0)
-            ),
-            dialect.MAV_CMD_DO_GRIPPER: self._gripper,
-        }
+    @on_command(dialect.MAV_CMD_DO_SET_SERVO)
+    def _servo(self, command: Command) -> Result:
+        return _result(self.set_servo(int(command.param1), int(command.param2)))
 
+    @on_command(dialect.MAV_CMD_DO_SET_RELAY)
+    def _relay(self, command: Command) -> Result:
+        return _result(self.set_relay(int(command.param1), command.param2 > 0))
+
+    @on_command(dialect.MAV_CMD_DO_GRIPPER)
     def _gripper(self, command: Command) -> Result:
         if command.param2 not in (0, 1):
             return Result.DENIED

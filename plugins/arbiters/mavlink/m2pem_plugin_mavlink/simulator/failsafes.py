@@ -20,7 +20,7 @@ from m2pem_plugin_mavlink.simulator.firmware.px4_modes import (
     RETURN,
     custom_mode,
 )
-from m2pem_plugin_mavlink.simulator.interfaces import AutopilotInterface, Component, MessageHandler
+from m2pem_plugin_mavlink.simulator.interfaces import AutopilotInterface, Component, on_message
 from m2pem_plugin_mavlink.simulator.messages import Sender
 from m2pem_plugin_mavlink.simulator.specification import SURFACE, Kind
 
@@ -60,10 +60,7 @@ class Failsafes(Component, ABC):
         self._link = Watch()
         self._position = Watch()
 
-    def messages(self) -> Mapping[str, MessageHandler]:
-        """Heartbeats of ground stations."""
-        return {"HEARTBEAT": self._received}
-
+    @on_message("HEARTBEAT")
     def _received(self, message: Any, sender: Sender) -> None:
         if self._counts(message, sender):
             self._heartbeat_s = self.autopilot.now_s

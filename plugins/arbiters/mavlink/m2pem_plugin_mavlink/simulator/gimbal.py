@@ -2,7 +2,6 @@
 radians; pitch up, yaw clockwise."""
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -11,10 +10,10 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from m2pem_plugin_mavlink.simulator.geometry import Location, Point, towards, wrapped_rad
 from m2pem_plugin_mavlink.simulator.interfaces import (
     AutopilotInterface,
-    CommandHandler,
     Component,
-    MessageHandler,
-    ReportMaker,
+    makes,
+    on_command,
+    on_message,
 )
 from m2pem_plugin_mavlink.simulator.messages import Command, Result, Sender
 
@@ -145,23 +144,7 @@ class Gimbal(Component):
 
     # --- commands ---------------------------------------------------------------------------------
 
-    def commands(self) -> Mapping[int, CommandHandler]:
-        """Of the manager, and regions of interest."""
-        return {
-            dialect.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE: self._configure,
-            dialect.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW: self._pitch_yaw,
-            dialect.MAV_CMD_DO_SET_ROI_LOCATION: self._watch,
-            dialect.MAV_CMD_DO_SET_ROI: self._watch,
-            dialect.MAV_CMD_DO_SET_ROI_NONE: self._watch_nothing,
-        }
-
-    def messages(self) -> Mapping[str, MessageHandler]:
-        """Those that have no acknowledgement."""
-        return {
-            "GIMBAL_MANAGER_SET_PITCHYAW": self._set_pitch_yaw,
-            "GIMBAL_MANAGER_SET_ATTITUDE": self._set_attitude,
-        }
-
+    @on_command(dialect.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE)
     def _configure(self, command: Command) -> Result:
         """Set who controls the gimbal: -1 keeps it, -2 is the sender, -3 releases the sender's
         control."""
@@ -179,6 +162,7 @@ class Gimbal(Component):
         free = not self.autopilot.firmware.gimbal_needs_control
         return free or who in (self.primary, self.secondary)
 
+    @on_command(dialect.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW)
     def _pitch_yaw(self, command: Command) -> Result:
         if not self._may(command.sender):
             return Result.DENIED
@@ -188,6 +172,7 @@ class Gimbal(Component):
         self._point(command.flags, *map(math.radians, angles))
         return Result.ACCEPTED  # also of no angles, which change nothing
 
+    @on_command(dialect.MAV_CMD_DO_SET_ROI_LOCATION, dialect.MAV_CMD_DO_SET_ROI)
     def _watch(self, command: Command) -> Result:
         if not command.has_position or not math.isfinite(command.z):
             return Result.DENIED
@@ -196,16 +181,19 @@ class Gimbal(Component):
         self._target = place.at_height(autopilot.guided.up_m(command.z, command.frame))
         return Result.ACCEPTED
 
+    @on_command(dialect.MAV_CMD_DO_SET_ROI_NONE)
     def _watch_nothing(self, command: Command) -> Result:
         self._target = None
         self.pointing.point(*NEUTRAL, locked=False)
         return Result.ACCEPTED
 
+    @on_message("GIMBAL_MANAGER_SET_PITCHYAW")
     def _set_pitch_yaw(self, message: Any, sender: Sender) -> None:
         if message.gimbal_device_id in (0, DEVICE) and self._may(sender):
             rates = (message.pitch_rate, message.yaw_rate)
             self._point(message.flags, message.pitch, message.yaw, *rates)
 
+    @on_message("GIMBAL_MANAGER_SET_ATTITUDE")
     def _set_attitude(self, message: Any, sender: Sender) -> None:
         if message.gimbal_device_id not in (0, DEVICE) or not self._may(sender):
             return
@@ -217,28 +205,23 @@ class Gimbal(Component):
 
     # --- telemetry --------------------------------------------------------------------------------
 
-    def reports(self) -> Mapping[int, ReportMaker]:
-        """Of the manager and the device."""
-        return {
-            dialect.MAVLINK_MSG_ID_GIMBAL_MANAGER_INFORMATION: self._information,
-            dialect.MAVLINK_MSG_ID_GIMBAL_MANAGER_STATUS: self._status,
-            dialect.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS: self._attitude,
-        }
-
     @property
     def _flags(self) -> int:
         return ALWAYS | (YAW_LOCK if self.pointing.locked else 0)
 
+    @makes(dialect.MAVLINK_MSG_ID_GIMBAL_MANAGER_INFORMATION)
     def _information(self) -> Any:
         return dialect.MAVLink_gimbal_manager_information_message(
             self.autopilot.boot_ms, CAPABILITIES, DEVICE, 0.0, 0.0, *PITCH_RAD, *YAW_RAD
         )
 
+    @makes(dialect.MAVLINK_MSG_ID_GIMBAL_MANAGER_STATUS)
     def _status(self) -> Any:
         return dialect.MAVLink_gimbal_manager_status_message(
             self.autopilot.boot_ms, self._flags, DEVICE, *self.primary, *self.secondary
         )
 
+    @makes(dialect.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS)
     def _attitude(self) -> Any:
         heading_rad = self.autopilot.body.yaw_rad
         frame = YAW_FROM_NORTH if self.pointing.locked else YAW_FROM_VEHICLE

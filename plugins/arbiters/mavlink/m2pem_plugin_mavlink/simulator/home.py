@@ -1,6 +1,5 @@
 """The home position. It is set when the estimator is ready, and again at arming."""
 
-from collections.abc import Mapping
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -9,7 +8,7 @@ from m2pem_plugin_mavlink.simulator.geometry import Point
 from m2pem_plugin_mavlink.simulator.interfaces import (
     AutopilotInterface,
     Component,
-    ReportMaker,
+    makes,
 )
 
 
@@ -37,13 +36,7 @@ class Home(Component):
         if not self.known and self.autopilot.estimator.ready:
             self.set(self.autopilot.position)
 
-    def reports(self) -> Mapping[int, ReportMaker]:
-        """HOME_POSITION and GPS_GLOBAL_ORIGIN."""
-        return {
-            dialect.MAVLINK_MSG_ID_HOME_POSITION: self._home,
-            dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: self._origin,
-        }
-
+    @makes(dialect.MAVLINK_MSG_ID_HOME_POSITION)
     def _home(self) -> Any:
         if not self.known:
             return None
@@ -60,6 +53,7 @@ class Home(Component):
             int(self.autopilot.since_boot_s * 1e6),
         )
 
+    @makes(dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
     def _origin(self) -> Any:
         if not self.known:
             return None

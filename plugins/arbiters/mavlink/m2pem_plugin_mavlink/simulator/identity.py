@@ -1,13 +1,12 @@
 """The identity of the autopilot (HEARTBEAT, AUTOPILOT_VERSION) and its time."""
 
-from collections.abc import Mapping
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem_plugin_mavlink.simulator.interfaces import (
     Component,
-    ReportMaker,
+    makes,
 )
 
 EPOCH_S = 1_700_000_000
@@ -17,15 +16,7 @@ EPOCH_S = 1_700_000_000
 class Identity(Component):
     """Reports the identity."""
 
-    def reports(self) -> Mapping[int, ReportMaker]:
-        """What tells who it is."""
-        return {
-            dialect.MAVLINK_MSG_ID_HEARTBEAT: self._heartbeat,
-            dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION: self._version,
-            dialect.MAVLINK_MSG_ID_SYSTEM_TIME: self._system_time,
-            dialect.MAVLINK_MSG_ID_TIMESYNC: self._ask_time,
-        }
-
+    @makes(dialect.MAVLINK_MSG_ID_HEARTBEAT)
     def _heartbeat(self) -> Any:
         autopilot = self.autopilot
         active = autopilot.firmware.active(autopilot)
@@ -41,6 +32,7 @@ class Identity(Component):
             3,
         )
 
+    @makes(dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
     def _version(self) -> Any:
         firmware, system = self.autopilot.firmware, self.autopilot.spec.system
         return dialect.MAVLink_autopilot_version_message(
@@ -56,6 +48,7 @@ class Identity(Component):
             [*list(b"m2pem"), *[0] * 12, system],
         )
 
+    @makes(dialect.MAVLINK_MSG_ID_SYSTEM_TIME)
     def _system_time(self) -> Any:
         autopilot = self.autopilot
         unix_us = int((EPOCH_S + autopilot.now_s) * 1e6)
@@ -65,5 +58,6 @@ class Identity(Component):
     def _boot_ns(self) -> int:
         return int(self.autopilot.since_boot_s * 1e9)
 
+    @makes(dialect.MAVLINK_MSG_ID_TIMESYNC)
     def _ask_time(self) -> Any:
         return dialect.MAVLink_timesync_message(0, self._boot_ns)

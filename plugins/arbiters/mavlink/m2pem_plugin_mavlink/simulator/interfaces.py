@@ -143,12 +143,35 @@ MessageHandler = Callable[[Any, Sender], None]
 ReportMaker = Callable[[], Any]
 """Makes the message as of now; None: there is nothing to tell."""
 
+M = TypeVar("M", bound=Callable[..., Any])
+
+
+def _marking(table: str) -> Callable[..., Callable[[M], M]]:
+    """Return a decorator that notes the keys of a method of a component."""
+
+    def with_keys(*keys: int | str) -> Callable[[M], M]:
+        def mark(method: M) -> M:
+            setattr(method, table, keys)
+            return method
+
+        return mark
+
+    return with_keys
+
+
+on_command = _marking("commands")
+"""Of a `CommandHandler`: the MAV_CMD that it carries out."""
+on_message = _marking("messages")
+"""Of a `MessageHandler`: the names of the messages that it takes."""
+makes = _marking("reports")
+"""Of a `ReportMaker`: the id of its message."""
+
 
 class Component:
     """What an autopilot answers, reports and does as time passes; by itself it does nothing.
 
-    A component names the commands and messages that it takes, the messages that may be streamed or
-    requested, reasons not to arm, and forbidden places. `component_id`: the MAVLink
+    Its methods are marked with the commands and messages that they take, and with the messages that
+    may be streamed or requested (`on_command`, `on_message`, `makes`). `component_id`: the MAVLink
     component that its messages and commands are sent to.
     """
 
@@ -159,15 +182,23 @@ class Component:
 
     def commands(self) -> Mapping[int, CommandHandler]:
         """Return the handlers of commands, by MAV_CMD."""
-        return {}
+        return self._marked("commands")
 
     def messages(self) -> Mapping[str, MessageHandler]:
         """Return the handlers of other messages, by name."""
-        return {}
+        return self._marked("messages")
 
     def reports(self) -> Mapping[int, ReportMaker]:
         """Return the makers of messages that can be streamed or requested, by id."""
-        return {}
+        return self._marked("reports")
+
+    def _marked(self, table: str) -> dict[Any, Any]:
+        methods = {name: getattr(type(self), name) for name in dir(type(self))}
+        return {
+            key: getattr(self, name)
+            for name, method in methods.items()
+            for key in getattr(method, table, ())
+        }
 
     def step(self, dt_s: float) -> None:
         """Advance by `dt_s` of simulated time."""

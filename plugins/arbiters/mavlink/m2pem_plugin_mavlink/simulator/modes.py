@@ -1,16 +1,14 @@
 """Changing modes: the present mode and its maneuver."""
 
-from collections.abc import Mapping
-
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem_plugin_mavlink.simulator.dynamics import NoThrust
 from m2pem_plugin_mavlink.simulator.interfaces import (
     AutopilotInterface,
-    CommandHandler,
     Component,
     Maneuver,
     Mode,
+    on_command,
 )
 from m2pem_plugin_mavlink.simulator.messages import Command, Result
 
@@ -88,10 +86,7 @@ class ModeSwitch(Component):
         armed = self.autopilot.arming.armed
         self.autopilot.setpoint = self.maneuver.step(dt_s) if armed else NoThrust()
 
-    def commands(self) -> Mapping[int, CommandHandler]:
-        """DO_SET_MODE."""
-        return {dialect.MAV_CMD_DO_SET_MODE: self._command}
-
+    @on_command(dialect.MAV_CMD_DO_SET_MODE)
     def _command(self, command: Command) -> Result:
         number = self.autopilot.firmware.mode_number(
             int(command.param1), int(command.param2), int(command.param3)

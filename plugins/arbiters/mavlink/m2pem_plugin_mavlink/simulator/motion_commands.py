@@ -8,7 +8,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem_plugin_mavlink.simulator.dynamics import VelocitySetpoint
 from m2pem_plugin_mavlink.simulator.geometry import Location, Point, wrapped_rad
-from m2pem_plugin_mavlink.simulator.interfaces import CommandHandler, Component, MessageHandler
+from m2pem_plugin_mavlink.simulator.interfaces import CommandHandler, Component, on_message
 from m2pem_plugin_mavlink.simulator.maneuvers import Guided
 from m2pem_plugin_mavlink.simulator.messages import (
     GLOBAL_FRAMES,
@@ -37,10 +37,6 @@ class MotionCommands(Component):
     """Executes commands that move the vehicle, as ArduPilot does, and passes setpoints to GUIDED;
     in other modes they are ignored."""
 
-    def messages(self) -> Mapping[str, MessageHandler]:
-        """Setpoints in the frame of the vehicle's home."""
-        return {"SET_POSITION_TARGET_LOCAL_NED": self._take}
-
     def forbidden(self, point: Point) -> bool:
         """Return whether the fence forbids a point; ArduPilot sends no reason."""
         return any(component.forbids(point) for component in self.autopilot.components)
@@ -66,6 +62,7 @@ class MotionCommands(Component):
         maneuver = self.autopilot.modes.maneuver
         return maneuver if isinstance(maneuver, Guided) else None
 
+    @on_message("SET_POSITION_TARGET_LOCAL_NED")
     def _take(self, message: Any, sender: Sender) -> None:
         guided, mask = self._guided(), message.type_mask
         local = message.coordinate_frame == dialect.MAV_FRAME_LOCAL_NED

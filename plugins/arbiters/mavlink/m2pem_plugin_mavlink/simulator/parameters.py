@@ -3,13 +3,13 @@ Protocol"). An unknown name gets no answer from ArduPilot, and PARAM_ERROR from 
 which ground stations ask for the list first, is refused."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem_plugin_mavlink.protocol.station_requests import refusal_of_ftp
-from m2pem_plugin_mavlink.simulator.interfaces import AutopilotInterface, Component, MessageHandler
+from m2pem_plugin_mavlink.simulator.interfaces import AutopilotInterface, Component, on_message
 from m2pem_plugin_mavlink.simulator.messages import Peer, Sender
 
 LIST_BURST = 25
@@ -23,15 +23,7 @@ class ParameterServer(Component):
         super().__init__(autopilot)
         self._listing: dict[Peer, Iterator[str]] = {}
 
-    def messages(self) -> Mapping[str, MessageHandler]:
-        """The protocol."""
-        return {
-            "PARAM_REQUEST_LIST": self._list,
-            "PARAM_REQUEST_READ": self._read,
-            "PARAM_SET": self._set,
-            "FILE_TRANSFER_PROTOCOL": self._refuse_file,
-        }
-
+    @on_message("FILE_TRANSFER_PROTOCOL")
     def _refuse_file(self, message: Any, sender: Sender) -> None:
         if (payload := refusal_of_ftp(bytes(message.payload))) is not None:
             make = dialect.MAVLink_file_transfer_protocol_message
@@ -48,9 +40,11 @@ class ParameterServer(Component):
                     break
                 self._send(name, peer, self.autopilot.parameters.index(name))
 
+    @on_message("PARAM_REQUEST_LIST")
     def _list(self, message: Any, sender: Sender) -> None:
         self._listing[sender.peer] = iter(self.autopilot.parameters)
 
+    @on_message("PARAM_REQUEST_READ")
     def _read(self, message: Any, sender: Sender) -> None:
         parameters = self.autopilot.parameters
         name: str | None = message.param_id
@@ -61,6 +55,7 @@ class ParameterServer(Component):
         else:
             self._unknown(message.param_id, message.param_index, sender)
 
+    @on_message("PARAM_SET")
     def _set(self, message: Any, sender: Sender) -> None:
         """Set a parameter, and report its value to all peers."""
         name, parameters = message.param_id, self.autopilot.parameters

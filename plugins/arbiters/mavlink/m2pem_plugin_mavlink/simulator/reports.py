@@ -2,7 +2,7 @@
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -11,8 +11,8 @@ from m2pem_plugin_mavlink.simulator.fence import Fence
 from m2pem_plugin_mavlink.simulator.interfaces import (
     AutopilotInterface,
     Component,
-    MessageHandler,
-    ReportMaker,
+    makes,
+    on_message,
 )
 from m2pem_plugin_mavlink.simulator.messages import Peer, Sender
 from m2pem_plugin_mavlink.simulator.specification import SURFACE
@@ -32,10 +32,7 @@ class Texts(Component):
         self._received_s: dict[Peer, float] = {}
         self._said_to: Counter[Peer] = Counter()
 
-    def messages(self) -> Mapping[str, MessageHandler]:
-        """Heartbeats of ground stations."""
-        return {"HEARTBEAT": self._received}
-
+    @on_message("HEARTBEAT")
     def _received(self, message: Any, sender: Sender) -> None:
         if message.type == dialect.MAV_TYPE_GCS:
             self._received_s[sender.peer] = self.autopilot.now_s
@@ -87,21 +84,7 @@ PLACE_ALONE = 0xFFF8
 class Reports(Component):
     """What ground stations show."""
 
-    def reports(self) -> Mapping[int, ReportMaker]:
-        """By message id."""
-        return {
-            dialect.MAVLINK_MSG_ID_SYS_STATUS: self._sys_status,
-            dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: self._global_position,
-            dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED: self._local_position,
-            dialect.MAVLINK_MSG_ID_ATTITUDE: self._attitude,
-            dialect.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: self._quaternion,
-            dialect.MAVLINK_MSG_ID_VFR_HUD: self._hud,
-            dialect.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: self._extended_state,
-            dialect.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT: self._navigation,
-            dialect.MAVLINK_MSG_ID_TERRAIN_REPORT: self._terrain,
-            dialect.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT: self._target,
-        }
-
+    @makes(dialect.MAVLINK_MSG_ID_SYS_STATUS)
     def _sys_status(self) -> Any:
         autopilot = self.autopilot
         present = SENSORS | dialect.MAV_SYS_STATUS_PREARM_CHECK
@@ -126,6 +109,7 @@ class Reports(Component):
             *[0] * 6,
         )
 
+    @makes(dialect.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT)
     def _target(self) -> Any:
         """Return only the position with its height above mean sea level; nothing without a
         target."""
@@ -143,6 +127,7 @@ class Reports(Component):
             *[0.0] * 8,
         )
 
+    @makes(dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT)
     def _global_position(self) -> Any:
         """Before the estimator is ready, ArduPilot says zeros."""
         autopilot, body = self.autopilot, self.autopilot.body
@@ -160,6 +145,7 @@ class Reports(Component):
             round(math.degrees(body.yaw_rad) * 100) % 36000,
         )
 
+    @makes(dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED)
     def _local_position(self) -> Any:
         """Nothing before there is a position."""
         body = self.autopilot.body
@@ -175,6 +161,7 @@ class Reports(Component):
             -body.up_mps,
         )
 
+    @makes(dialect.MAVLINK_MSG_ID_ATTITUDE)
     def _attitude(self) -> Any:
         body = self.autopilot.body
         return dialect.MAVLink_attitude_message(
@@ -187,6 +174,7 @@ class Reports(Component):
             body.yaw_rps,
         )
 
+    @makes(dialect.MAVLINK_MSG_ID_ATTITUDE_QUATERNION)
     def _quaternion(self) -> Any:
         body = self.autopilot.body
         cr, sr = math.cos(body.roll_rad / 2), math.sin(body.roll_rad / 2)
@@ -203,6 +191,7 @@ class Reports(Component):
             body.yaw_rps,
         )
 
+    @makes(dialect.MAVLINK_MSG_ID_VFR_HUD)
     def _hud(self) -> Any:
         autopilot, body = self.autopilot, self.autopilot.body
         altitude_m = autopilot.frame.origin.altitude_amsl_m + body.up_m
@@ -215,6 +204,7 @@ class Reports(Component):
             body.up_mps,
         )
 
+    @makes(dialect.MAVLINK_MSG_ID_EXTENDED_SYS_STATE)
     def _extended_state(self) -> Any:
         autopilot = self.autopilot
         state: int = dialect.MAV_LANDED_STATE_IN_AIR
@@ -228,6 +218,7 @@ class Reports(Component):
             state = dialect.MAV_LANDED_STATE_LANDING
         return dialect.MAVLink_extended_sys_state_message(autopilot.firmware.vtol_state, state)
 
+    @makes(dialect.MAVLINK_MSG_ID_TERRAIN_REPORT)
     def _terrain(self) -> Any:
         """There are no terrain data, so that the height is that above the sea. What drives or
         floats has none to tell."""
@@ -246,6 +237,7 @@ class Reports(Component):
             0,
         )
 
+    @makes(dialect.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT)
     def _navigation(self) -> Any:
         autopilot, body = self.autopilot, self.autopilot.body
         target = autopilot.target_point

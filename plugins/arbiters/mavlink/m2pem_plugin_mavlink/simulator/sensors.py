@@ -1,12 +1,11 @@
 """The position estimator and the battery of a simulated autopilot."""
 
 import math
-from collections.abc import Mapping
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem.api import ellipsoidal_m
-from m2pem_plugin_mavlink.simulator.interfaces import AutopilotInterface, Component, ReportMaker
+from m2pem_plugin_mavlink.simulator.interfaces import AutopilotInterface, Component, makes
 
 LEVELLED = 0.2
 """After this part of the time it knows its attitude."""
@@ -55,19 +54,14 @@ class Estimator(Component):
         wait_s = self.autopilot.spec.estimator_s
         return self.autopilot.since_boot_s / wait_s if wait_s > 0 else 1.0
 
-    def reports(self) -> Mapping[int, ReportMaker]:
-        """EKF_STATUS_REPORT and GPS_RAW_INT."""
-        return {
-            dialect.MAVLINK_MSG_ID_EKF_STATUS_REPORT: self._status,
-            dialect.MAVLINK_MSG_ID_GPS_RAW_INT: self._gps,
-        }
-
+    @makes(dialect.MAVLINK_MSG_ID_EKF_STATUS_REPORT)
     def _status(self) -> object:
         variance = 0.05 if self.ready else 0.6
         return dialect.MAVLink_ekf_status_report_message(
             self.flags, variance, variance, variance, 0.02, 0.0, 0.0
         )
 
+    @makes(dialect.MAVLINK_MSG_ID_GPS_RAW_INT)
     def _gps(self) -> object:
         """The receiver has a fix long before the estimator uses it."""
         autopilot, body = self.autopilot, self.autopilot.body
@@ -130,10 +124,7 @@ class Battery(Component):
         self._load = IDLE if not armed else 1.0 if body.moving or not body.on_ground else 0.1
         self.left = max(0.0, self.left - dt_s * self._load / self.autopilot.spec.battery_s)
 
-    def reports(self) -> Mapping[int, ReportMaker]:
-        """BATTERY_STATUS."""
-        return {dialect.MAVLINK_MSG_ID_BATTERY_STATUS: self._status}
-
+    @makes(dialect.MAVLINK_MSG_ID_BATTERY_STATUS)
     def _status(self) -> object:
         used_mah = (1 - self.left) * self.autopilot.parameters[self.autopilot.firmware.capacity]
         return dialect.MAVLink_battery_status_message(

@@ -5,12 +5,11 @@ It signs and checks with pymavlink's own classes, so that it shares no code with
 """
 
 import time
-from collections.abc import Mapping
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from m2pem_plugin_mavlink.simulator.interfaces import Component, MessageHandler
+from m2pem_plugin_mavlink.simulator.interfaces import Component, on_message
 from m2pem_plugin_mavlink.simulator.messages import Sender
 
 EPOCH_S = 1_420_070_400
@@ -77,10 +76,7 @@ class _Parser(dialect.MAVLink):  # type: ignore[misc]  # pymavlink is not typed
 class SigningSetup(Component):
     """Takes a key while the vehicle is disarmed."""
 
-    def messages(self) -> Mapping[str, MessageHandler]:
-        """SETUP_SIGNING."""
-        return {"SETUP_SIGNING": self._set_up}
-
+    @on_message("SETUP_SIGNING")
     def _set_up(self, message: Any, _: Sender) -> None:
         if self.autopilot.arming.armed:
             text = "ERROR: Won't setup signing when armed"

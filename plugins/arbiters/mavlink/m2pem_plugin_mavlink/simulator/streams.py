@@ -11,10 +11,10 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from m2pem_plugin_mavlink.protocol.station_requests import requested_intervals
 from m2pem_plugin_mavlink.simulator.interfaces import (
     AutopilotInterface,
-    CommandHandler,
     Component,
     MessageHandler,
     ReportMaker,
+    on_command,
 )
 from m2pem_plugin_mavlink.simulator.messages import Command, Peer, Result, Sender
 
@@ -68,13 +68,7 @@ class Streams(Component):
             if interval_s > 0 and id_ in self.makers:
                 self._set(sender.peer, id_, max(interval_s, 1 / self.autopilot.firmware.loop_hz))
 
-    def commands(self) -> Mapping[int, CommandHandler]:
-        """Setting, and asking for one message."""
-        return {
-            dialect.MAV_CMD_SET_MESSAGE_INTERVAL: self._set_interval,
-            dialect.MAV_CMD_REQUEST_MESSAGE: self._request,
-        }
-
+    @on_command(dialect.MAV_CMD_SET_MESSAGE_INTERVAL)
     def _set_interval(self, command: Command) -> Result:
         id_, interval_us = int(command.param1), command.param2
         peer = command.sender.peer
@@ -96,6 +90,7 @@ class Streams(Component):
             self._set(peer, id_, interval_us * 1e-6)
         return Result.ACCEPTED
 
+    @on_command(dialect.MAV_CMD_REQUEST_MESSAGE)
     def _request(self, command: Command) -> Result:
         """ArduPilot acknowledges it even if there is nothing to send; PX4 denies it."""
         id_, firmware = int(command.param1), self.autopilot.firmware

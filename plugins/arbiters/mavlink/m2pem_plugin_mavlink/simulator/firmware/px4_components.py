@@ -1,6 +1,6 @@
 """Components that only PX4 has: mission checks, landing detection, OFFBOARD, telemetry, texts."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -10,9 +10,9 @@ from m2pem_plugin_mavlink.simulator.firmware.px4_modes import HOLD, LAND, OFFBOA
 from m2pem_plugin_mavlink.simulator.interfaces import (
     AutopilotInterface,
     Component,
-    MessageHandler,
     Mode,
-    ReportMaker,
+    makes,
+    on_message,
 )
 from m2pem_plugin_mavlink.simulator.messages import Sender
 from m2pem_plugin_mavlink.simulator.px4_maneuvers import Orbit
@@ -64,10 +64,7 @@ class OffboardMonitor(Component):
         autopilot = self.autopilot
         return autopilot.now_s - self._received_s <= autopilot.parameters["COM_OF_LOSS_T"]
 
-    def messages(self) -> Mapping[str, MessageHandler]:
-        """The setpoints; what they ask for is the maneuver's."""
-        return {"SET_POSITION_TARGET_LOCAL_NED": self._received}
-
+    @on_message("SET_POSITION_TARGET_LOCAL_NED")
     def _received(self, message: Any, sender: Sender) -> None:
         self._received_s = self.autopilot.now_s
 
@@ -88,18 +85,11 @@ class OffboardMonitor(Component):
 class Px4Reports(Component):
     """ESTIMATOR_STATUS, ALTITUDE, ORBIT_EXECUTION_STATUS."""
 
-    def reports(self) -> Mapping[int, ReportMaker]:
-        """By message id."""
-        return {
-            dialect.MAVLINK_MSG_ID_ESTIMATOR_STATUS: self._estimator,
-            dialect.MAVLINK_MSG_ID_ALTITUDE: self._altitude,
-            dialect.MAVLINK_MSG_ID_ORBIT_EXECUTION_STATUS: self._orbit,
-        }
-
     @property
     def _time_us(self) -> int:
         return int(self.autopilot.since_boot_s * 1e6)
 
+    @makes(dialect.MAVLINK_MSG_ID_ESTIMATOR_STATUS)
     def _estimator(self) -> Any:
         """Its flags have the same numbers as those of ArduPilot's EKF_STATUS_REPORT, but "constant
         position" means also that it is at rest (since July 2024)."""
@@ -112,6 +102,7 @@ class Px4Reports(Component):
             self._time_us, flags, ratio, ratio, ratio, 0.02, 0.0, 0.0, accuracy_m, 0.4
         )
 
+    @makes(dialect.MAVLINK_MSG_ID_ALTITUDE)
     def _altitude(self) -> Any:
         autopilot = self.autopilot
         up_m = autopilot.body.up_m
@@ -121,6 +112,7 @@ class Px4Reports(Component):
             self._time_us, amsl_m, amsl_m, up_m, relative_m, up_m, up_m
         )
 
+    @makes(dialect.MAVLINK_MSG_ID_ORBIT_EXECUTION_STATUS)
     def _orbit(self) -> Any:
         """Only while it goes around something."""
         maneuver, frame = self.autopilot.modes.maneuver, self.autopilot.frame

@@ -1,6 +1,5 @@
 """The progress of the mission: the current item, the state, and their messages."""
 
-from collections.abc import Mapping
 from enum import IntEnum
 from typing import Any
 
@@ -8,10 +7,10 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem_plugin_mavlink.simulator.interfaces import (
     AutopilotInterface,
-    CommandHandler,
     Component,
-    MessageHandler,
-    ReportMaker,
+    makes,
+    on_command,
+    on_message,
 )
 from m2pem_plugin_mavlink.simulator.maneuvers import Land
 from m2pem_plugin_mavlink.simulator.messages import Command, Result, Sender
@@ -191,23 +190,13 @@ class MissionProgress(Component):
             self.autopilot.send(dialect.MAVLink_mission_item_reached_message(self._reached[-1][1]))
             self._reached.clear()
 
-    def messages(self) -> Mapping[str, MessageHandler]:
-        """The old way to set it."""
-        return {"MISSION_SET_CURRENT": self._set}
-
-    def commands(self) -> Mapping[int, CommandHandler]:
-        """The new way."""
-        return {dialect.MAV_CMD_DO_SET_MISSION_CURRENT: self._command}
-
-    def reports(self) -> Mapping[int, ReportMaker]:
-        """MISSION_CURRENT."""
-        return {dialect.MAVLINK_MSG_ID_MISSION_CURRENT: self._current}
-
+    @on_message("MISSION_SET_CURRENT")
     def _set(self, message: Any, sender: Sender) -> None:
         """ArduPilot answers with the number that was asked for, whatever it made of it."""
         if self.set_current(message.seq):
             self.autopilot.send(self._current(message.seq))
 
+    @on_command(dialect.MAV_CMD_DO_SET_MISSION_CURRENT)
     def _command(self, command: Command) -> Result:
         index = int(command.param1)
         if index >= len(self.items):
@@ -219,6 +208,7 @@ class MissionProgress(Component):
         self.autopilot.send(self._current())
         return Result.ACCEPTED
 
+    @makes(dialect.MAVLINK_MSG_ID_MISSION_CURRENT)
     def _current(self, seq: int | None = None) -> Any:
         return dialect.MAVLink_mission_current_message(
             self.current if seq is None else seq,

@@ -7,7 +7,7 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem_plugin_mavlink.simulator.fence import is_whole
-from m2pem_plugin_mavlink.simulator.interfaces import AutopilotInterface, Component, MessageHandler
+from m2pem_plugin_mavlink.simulator.interfaces import AutopilotInterface, Component, on_message
 from m2pem_plugin_mavlink.simulator.messages import Sender
 from m2pem_plugin_mavlink.simulator.missions.plan import (
     ACCEPTED,
@@ -76,17 +76,6 @@ class MissionServer(Component):
         self.upload: Upload | None = None
         self._last: tuple[Sender, int, int] | None = None  # the last item of the last upload
 
-    def messages(self) -> Mapping[str, MessageHandler]:
-        """The protocol."""
-        return {
-            "MISSION_COUNT": self._begin,
-            "MISSION_ITEM_INT": self._take,
-            "MISSION_REQUEST_LIST": self._count,
-            "MISSION_REQUEST_INT": self._give,
-            "MISSION_CLEAR_ALL": self._clear,
-            "MISSION_ACK": self._acknowledged,
-        }
-
     def step(self, dt_s: float) -> None:
         """Ask again for what did not come; give up at last."""
         upload, now_s = self.upload, self.autopilot.now_s
@@ -106,6 +95,7 @@ class MissionServer(Component):
     def _ardupilot(self) -> bool:
         return self.autopilot.firmware.is_ardupilot
 
+    @on_message("MISSION_COUNT")
     def _begin(self, message: Any, sender: Sender) -> None:
         kind, count = message.mission_type, message.count
         if not self._may_upload(kind, sender):
@@ -143,6 +133,7 @@ class MissionServer(Component):
         message = make(to.system, to.component, upload.next, upload.kind)
         self.autopilot.send(message, to.peer)
 
+    @on_message("MISSION_ITEM_INT")
     def _take(self, message: Any, sender: Sender) -> None:
         upload, kind = self.upload, message.mission_type
         if upload is None or kind != upload.kind:
@@ -203,6 +194,7 @@ class MissionServer(Component):
         if TOTALS[kind] in self.autopilot.parameters:
             self.autopilot.parameters[TOTALS[kind]] = len(self.autopilot.plans[kind])
 
+    @on_message("MISSION_REQUEST_LIST")
     def _count(self, message: Any, sender: Sender) -> None:
         kind = message.mission_type
         if kind not in MOST_ITEMS:
@@ -216,6 +208,7 @@ class MissionServer(Component):
             )
             self.autopilot.send(answer, sender.peer)
 
+    @on_message("MISSION_REQUEST_INT")
     def _give(self, message: Any, sender: Sender) -> None:
         kind, seq, autopilot = message.mission_type, message.seq, self.autopilot
         if kind not in MOST_ITEMS:
@@ -240,6 +233,7 @@ class MissionServer(Component):
         x, y = round(place.latitude_deg * 1e7), round(place.longitude_deg * 1e7)
         return Item(0, 16, 0, 0, 0, 0, x, y, round(place.altitude_amsl_m, 2))
 
+    @on_message("MISSION_CLEAR_ALL")
     def _clear(self, message: Any, sender: Sender) -> None:
         """ArduPilot does not clear a mission that is being flown."""
         kind, autopilot = message.mission_type, self.autopilot
@@ -263,6 +257,7 @@ class MissionServer(Component):
             if MISSION in kinds:
                 autopilot.mission.clear()
 
+    @on_message("MISSION_ACK")
     def _acknowledged(self, message: Any, sender: Sender) -> None:
         """The end of a download, or an uploader that gives up."""
         upload = self.upload
