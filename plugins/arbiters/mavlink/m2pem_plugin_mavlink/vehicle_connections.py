@@ -5,9 +5,9 @@ from collections.abc import Awaitable, Callable, Mapping
 
 from m2pem.api import ArbiterContext, Connection, ResourceId
 from m2pem.errors import PluginError
-from m2pem_plugin_mavlink.link.routed_link import GROUND_STATION, RoutedLink, open_link
+from m2pem_plugin_mavlink.link.routed_link import GROUND_STATION, open_link
+from m2pem_plugin_mavlink.link.vehicle_link import VehicleLink
 from m2pem_plugin_mavlink.mavsdk_driver.ground_station import open_mavsdk_link
-from m2pem_plugin_mavlink.mavsdk_driver.link import MavsdkLink
 from m2pem_plugin_mavlink.protocol.messages import Address
 from m2pem_plugin_mavlink.settings import Settings
 from m2pem_plugin_mavlink.signing.key_file import SigningError
@@ -15,7 +15,7 @@ from m2pem_plugin_mavlink.vehicle.failsafe import FailsafeMonitor
 from m2pem_plugin_mavlink.vehicle.takeover_monitor import TakeoverMonitor
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 
-_OPEN: Mapping[str, Callable[..., Awaitable[RoutedLink | MavsdkLink]]] = {
+_OPEN: Mapping[str, Callable[..., Awaitable[VehicleLink]]] = {
     "pymavlink": open_link,
     "mavsdk": open_mavsdk_link,
 }
@@ -36,7 +36,7 @@ class MavlinkVehicleConnections:
         self._settings = settings
         self._context = context
         self._lost_after_s = lost_after_s
-        self._links: list[RoutedLink | MavsdkLink] = []
+        self._links: list[VehicleLink] = []
         self._vehicles: dict[ResourceId, Vehicle] = {}
 
     async def open(self) -> Mapping[ResourceId, Vehicle]:

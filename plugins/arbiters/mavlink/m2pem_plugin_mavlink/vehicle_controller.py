@@ -42,7 +42,6 @@ STOP_SHARE = 0.8
 _FAILSAFES = frozenset({FlightMode.RETURN, FlightMode.LAND})
 """Modes that autopilots enter by themselves when a link is lost, besides stopping."""
 _HELD = frozenset({FlightMode.HOLD})
-_FAIL_SAFE = frozenset({FlightMode.RETURN, FlightMode.LAND})
 
 
 @dataclass(slots=True)
@@ -239,10 +238,10 @@ class VehicleController:
                 active.begun = active.reattached = True
             await self._begin_or_resume(active)
             await self._wait_until_finished(active)
-        except BehaviorFailedError as error:
-            await self._fail(active, error.reason, error.code)
         except _TakenOverError as error:
             self._end(active, BehaviorState.FAILED, error.code, error.reason)
+        except BehaviorFailedError as error:
+            await self._fail(active, error.reason, error.code)
         except ModeLeftError as error:
             await self._end_taken_over(active, error.reason)
         except ExchangeError as error:
@@ -430,7 +429,7 @@ class VehicleController:
         """Return whether the vehicle returns or lands without a command from here: by a failsafe,
         or by a person."""
         state, active = self.vehicle.state, self._active
-        if not state.armed or state.mode not in _FAIL_SAFE:
+        if not state.armed or state.mode not in _FAILSAFES:
             return False
         return not self._takeover_monitor.mode_is_commanded(
             accepted_modes(active.behavior) if active else ()
@@ -455,7 +454,7 @@ class VehicleController:
         """End a behavior that has failed half-way: stop the motion, but not a return or a landing,
         nor a vehicle that is on the ground."""
         state = self.vehicle.state
-        comes_down = isinstance(active.behavior, Land | ReturnToLaunch) and state.mode in _FAIL_SAFE
+        comes_down = isinstance(active.behavior, Land | ReturnToLaunch) and state.mode in _FAILSAFES
         try:
             if active.behavior.moves_vehicle and state.landed is not True and not comes_down:
                 await self._stop()
@@ -473,10 +472,5 @@ class VehicleController:
         self._tracker.end(active.id, state, code, reason)
 
 
-class _TakenOverError(Exception):
+class _TakenOverError(BehaviorFailedError):
     """The vehicle was taken over: nothing more is sent to it."""
-
-    def __init__(self, reason: str, code: str) -> None:
-        super().__init__(reason)
-        self.reason = reason
-        self.code = code

@@ -11,8 +11,8 @@ from m2pem_plugin_mavlink.microservices.commands import (
     REASON_S,
     Command,
     CommandPosition,
-    Request,
 )
+from m2pem_plugin_mavlink.microservices.message_requests import RequestMessage
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
 from m2pem_plugin_mavlink.protocol.transaction import (
     RETRIES,
@@ -235,10 +235,8 @@ def test_what_is_over_stays_as_it_is() -> None:
     assert (command.outbox, command.deadline_s) == ([], None)
 
 
-def request() -> Request[Any]:
-    home = message_type("HOME_POSITION").id
-    command = dialect.MAV_CMD_REQUEST_MESSAGE
-    return Request(VEHICLE, command, (home,), home, lambda each: each.altitude or None)
+def request() -> RequestMessage[Any]:
+    return RequestMessage(VEHICLE, "HOME_POSITION", lambda each: each.altitude or None)
 
 
 def gives_home(command: Any, vehicle: Commanded) -> Sequence[Message]:
@@ -256,5 +254,5 @@ def test_an_answer_that_never_comes_is_told_from_silence() -> None:
     command = dialect.MAV_CMD_REQUEST_MESSAGE
     played = run(request(), Answers(*[[ack(command)]] * 9))
     assert isinstance(played.error, ExchangeError)
-    assert played.error.reason == "REQUEST_MESSAGE: accepted, but no answer was received"
+    assert played.error.reason == "request for HOME_POSITION: accepted, but no answer was received"
     assert len(played.sent) == RETRIES.tries

@@ -114,10 +114,6 @@ class Forwarder:
         if self._from_vehicle in self._hub.taps:
             self._hub.taps.remove(self._from_vehicle)
 
-    def forwards(self, system: int) -> bool:
-        """Return whether a system is a forwarded vehicle."""
-        return system in self._vehicles
-
     def from_station(self, station: Station, frame: RawFrame) -> None:
         """Forward a frame of a station to vehicles and to other stations."""
         if not self._vehicles:

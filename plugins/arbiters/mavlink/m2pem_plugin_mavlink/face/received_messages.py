@@ -7,6 +7,7 @@ is; a message that no rule names costs nothing.
 import asyncio
 import logging
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
 from m2pem.api import EventThrower, ResourceId
 from m2pem.errors import M2pemError
@@ -69,7 +70,8 @@ class MessageReceiver:
             return
         for rule in self._rules:
             if vehicle in rule.received.vehicles:
-                self._ends.append(link.listen({rule.received.type.id}, rule.listener(vehicle)))
+                hear = partial(rule.hear, who=vehicle)
+                self._ends.append(link.listen({rule.received.type.id}, hear))
 
 
 class _Rule:
@@ -80,14 +82,6 @@ class _Rule:
         self._second = 0
         self._received = 0
         self._failed = False
-
-    def listener(self, vehicle: ResourceId) -> Callable[[Message, Address], None]:
-        """Return what hears the messages of a vehicle."""
-
-        def hear(message: Message, sender: Address) -> None:
-            self.hear(message, sender, vehicle)
-
-        return hear
 
     def hear(self, message: Message, sender: Address, who: str) -> None:
         """Throw an event if the message is one. `who`: for the records."""

@@ -41,6 +41,8 @@ class Endpoint(ABC):
         self.now_s = now_s
         self.greet = greet
         self.taps = taps
+        self.users = 0
+        """The number of links that use it."""
         self.peers: dict[Hashable, Peer] = {}
         self._routes: dict[int, Route] = {}
         self._own_systems = own_systems

@@ -9,8 +9,9 @@ not sent anything yet.
 import asyncio
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from weakref import WeakKeyDictionary
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem.api import US_PER_S, Clock
 from m2pem.errors import PluginError
@@ -19,7 +20,7 @@ from m2pem_plugin_mavlink.link.route import Peer, Route
 from m2pem_plugin_mavlink.link.streams import SerialEndpoint, TcpInEndpoint, TcpOutEndpoint
 from m2pem_plugin_mavlink.link.udp import UdpEndpoint
 from m2pem_plugin_mavlink.link.vehicle_link import VehicleLink
-from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
+from m2pem_plugin_mavlink.protocol.messages import Address, message_type
 from m2pem_plugin_mavlink.protocol.url import SerialUrl, Url, Way
 from m2pem_plugin_mavlink.signing.policy import SigningPolicy
 from m2pem_plugin_mavlink.signing.registry import Signers
@@ -29,11 +30,12 @@ HEARTBEAT_US = US_PER_S
 PEERS_AT_ONCE = 64
 """Peers that receive heartbeats before other tasks run."""
 
-MAV_TYPE_GCS = 6
-MAV_AUTOPILOT_INVALID = 8
-MAV_STATE_ACTIVE = 4
-MAVLINK_VERSION = 3
-
+_HEARTBEAT = message_type("HEARTBEAT").make(
+    type=dialect.MAV_TYPE_GCS,
+    autopilot=dialect.MAV_AUTOPILOT_INVALID,
+    system_status=dialect.MAV_STATE_ACTIVE,
+    mavlink_version=3,
+)
 _KINDS: dict[Way, type[Endpoint]] = {
     Way.UDP_IN: UdpEndpoint,
     Way.UDP_OUT: UdpEndpoint,
@@ -45,12 +47,6 @@ _KINDS: dict[Way, type[Endpoint]] = {
 def endpoint_kind(url: Url) -> type[Endpoint]:
     """Return the class of the endpoints of a URL."""
     return SerialEndpoint if isinstance(url, SerialUrl) else _KINDS[url.way]
-
-
-@dataclass(slots=True)
-class _Opened:
-    endpoint: Endpoint
-    users: int = 0
 
 
 class Hub:
@@ -66,7 +62,7 @@ class Hub:
         """Those to vehicles that are open."""
         self.link_watchers: list[Callable[[VehicleLink], None]] = []
         """Called with each link that is opened."""
-        self._opened: dict[Url, _Opened] = {}
+        self._opened: dict[Url, Endpoint] = {}
         self._sources: Counter[Address] = Counter()
         self._own_systems: set[int] = set()
         self._signers = Signers()
@@ -79,7 +75,7 @@ class Hub:
 
     def endpoint(self, url: Url) -> Endpoint:
         """Return an open endpoint."""
-        return self._opened[url].endpoint
+        return self._opened[url]
 
     def add_link(self, link: VehicleLink) -> None:
         """A link was opened."""
@@ -93,7 +89,7 @@ class Hub:
 
     def owners(self, system: int, component: int) -> list[Peer]:
         """Return the peers that own a component of a system, on all endpoints."""
-        found = (each.endpoint.owner(system, component) for each in self._opened.values())
+        found = (each.owner(system, component) for each in self._opened.values())
         return [peer for peer in found if peer is not None]
 
     async def join(
@@ -115,7 +111,7 @@ class Hub:
             if not self._opened:
                 self._clock = clock
             own_systems = (source.system, *(each.system for each in self._sources))
-            taken = any(each.endpoint.has_route(source.system) for each in self._opened.values())
+            taken = any(each.has_route(source.system) for each in self._opened.values())
             if taken or system in own_systems:
                 clash = source.system if taken else system
                 raise PluginError(
@@ -130,12 +126,12 @@ class Hub:
                 for url in own:
                     await self._open(url)
                     joined.append(url)
-                routes += [self._opened[url].endpoint.route(system) for url in joined]
+                routes += [self._opened[url].route(system) for url in joined]
                 for route, check in zip(routes, checks, strict=False):
-                    self._opened[route.url].endpoint.require_signatures(route, check)
+                    self._opened[route.url].require_signatures(route, check)
             except BaseException:
                 for route in routes:
-                    self._opened[route.url].endpoint.release(route)
+                    self._opened[route.url].release(route)
                 await self._leave(joined, source)
                 raise
             return routes
@@ -144,29 +140,28 @@ class Hub:
         """Undo one `join`."""
         async with self._changing:
             for route in routes:
-                self._opened[route.url].endpoint.release(route)
+                self._opened[route.url].release(route)
             await self._leave([route.url for route in routes], source)
 
     async def _open(self, url: Url) -> None:
-        opened = self._opened.get(url)
-        if opened is None:
-            endpoint = endpoint_kind(url)(
-                url, self._own_systems, self.now_s, self._greet, self.taps
-            )
+        endpoint = self._opened.get(url)
+        if endpoint is None:
+            kind = endpoint_kind(url)
+            endpoint = kind(url, self._own_systems, self.now_s, self._greet, self.taps)
             await endpoint.open()
-            opened = self._opened[url] = _Opened(endpoint)
-        opened.users += 1
+            self._opened[url] = endpoint
+        endpoint.users += 1
         if self._beating is None:
             self._beating = asyncio.create_task(self._beat())
 
     async def _leave(self, urls: Sequence[Url], source: Address) -> None:
         self._remove_source(source)
         for url in urls:
-            opened = self._opened[url]
-            opened.users -= 1
-            if not opened.users:
+            endpoint = self._opened[url]
+            endpoint.users -= 1
+            if not endpoint.users:
                 del self._opened[url]
-                await opened.endpoint.close()
+                await endpoint.close()
         if not self._opened and self._beating is not None:
             self._beating.cancel()
             await asyncio.wait([self._beating])
@@ -177,8 +172,8 @@ class Hub:
         self._sources[source] += 1
         if source.system not in self._own_systems:
             self._own_systems.add(source.system)
-            for opened in self._opened.values():
-                opened.endpoint.forget(source.system)
+            for endpoint in self._opened.values():
+                endpoint.forget(source.system)
 
     def _remove_source(self, source: Address) -> None:
         self._sources[source] -= 1
@@ -201,8 +196,7 @@ class Hub:
                 at_us = now_us + HEARTBEAT_US
             await self._clock.sleep_until(at_us)
             await self._signers.keep()
-            for opened in list(self._opened.values()):
-                endpoint = opened.endpoint
+            for endpoint in list(self._opened.values()):
                 endpoint.maintain()
                 signings = endpoint.signings()
                 for number, peer in enumerate(list(endpoint.peers.values())):
@@ -211,16 +205,6 @@ class Hub:
                         await asyncio.sleep(0)
 
 
-def _heartbeat() -> Message:
-    return message_type("HEARTBEAT").make(
-        type=MAV_TYPE_GCS,
-        autopilot=MAV_AUTOPILOT_INVALID,
-        system_status=MAV_STATE_ACTIVE,
-        mavlink_version=MAVLINK_VERSION,
-    )
-
-
-_HEARTBEAT = _heartbeat()
 _hubs: WeakKeyDictionary[asyncio.AbstractEventLoop, Hub] = WeakKeyDictionary()
 
 

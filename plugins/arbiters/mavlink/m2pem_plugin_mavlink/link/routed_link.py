@@ -5,14 +5,14 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from typing import TypeVar
 
-from m2pem.api import US_PER_S, Clock
+from m2pem.api import Clock
 from m2pem.errors import PluginError
 from m2pem_plugin_mavlink.link.hub import Hub, shared_hub
 from m2pem_plugin_mavlink.link.route import Route
-from m2pem_plugin_mavlink.link.vehicle_link import Exchange, Listener
+from m2pem_plugin_mavlink.link.vehicle_link import Listener, VehicleLink
 from m2pem_plugin_mavlink.protocol.messages import Address, Message
 from m2pem_plugin_mavlink.protocol.quality import LinkQuality
-from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, Transaction
+from m2pem_plugin_mavlink.protocol.transaction import Transaction
 from m2pem_plugin_mavlink.protocol.url import parse_url
 from m2pem_plugin_mavlink.signing.policy import SigningPolicy
 from m2pem_plugin_mavlink.signing.signature import RefusedFrames
@@ -59,8 +59,8 @@ async def open_link(
     return link
 
 
-class RoutedLink:
-    """See `VehicleLink`. Sends over the endpoint with the best connection to the vehicle."""
+class RoutedLink(VehicleLink):
+    """Sends over the endpoint with the best connection to the vehicle."""
 
     def __init__(
         self,
@@ -71,22 +71,15 @@ class RoutedLink:
         clock: Clock,
         may_send: Callable[[], bool] = lambda: True,
     ) -> None:
-        self.address = address
+        super().__init__(address, clock)
         self.source = source
         self._hub = hub
         self._routes = list(routes)
-        self._clock = clock
         self._may_send = may_send
         self._used = self._routes[0]
         for route in routes:
             route.autopilots.add(address.component)
         self._listening: list[tuple[frozenset[int], Listener]] = []
-        self._exchanges: set[Exchange] = set()
-        self._closed = False
-
-    def now_s(self) -> float:
-        """See `VehicleLink.now_s`."""
-        return self._clock.now_us() / US_PER_S
 
     def send(self, message: Message) -> None:
         """See `VehicleLink.send`. Nothing is sent to a vehicle that has never sent anything: its
@@ -127,14 +120,8 @@ class RoutedLink:
         """See `VehicleLink.perform`. Cancelling it ends the exchange: nothing more is sent."""
         transaction.source = self.source
         async with self._routes[0].locks.locked((self.source, transaction.key)):
-            if self._closed:
-                raise ExchangeError("the link was closed")
-            exchange = Exchange(transaction, self, self._clock)
-            self._exchanges.add(exchange)
-            try:
-                await exchange.run()
-            finally:
-                self._exchanges.discard(exchange)
+            self._refuse_closed()
+            await self._exchange(transaction)
         return transaction.outcome()
 
     def quality(self) -> LinkQuality | None:
@@ -165,10 +152,8 @@ class RoutedLink:
         """Release the vehicle, and endpoints without other users. Active exchanges fail."""
         if self._closed:
             return
-        self._closed = True
         self._hub.remove_link(self)
-        for exchange in list(self._exchanges):
-            exchange.abort(ExchangeError("the link was closed"))
+        self._end_exchanges()
         for wanted, listener in self._listening:
             for route in self._routes:
                 route.unlisten(wanted, listener)

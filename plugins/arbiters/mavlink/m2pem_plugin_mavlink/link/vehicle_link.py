@@ -1,19 +1,20 @@
-"""The interface of a link to one vehicle, and what every implementation of it shares.
+"""A link to one vehicle: its interface, and what all links share.
 
-`VehicleLink` is the interface. `Exchange` runs one transaction over it; `KeyedLock` serializes the
-transactions that have the same key.
+`Exchange` runs one transaction over it; `KeyedLock` serializes the transactions that have the same
+key.
 """
 
 import asyncio
 import math
+from abc import ABC, abstractmethod
 from collections.abc import AsyncIterator, Callable, Hashable, Iterable, Sequence
 from contextlib import asynccontextmanager
-from typing import Any, Protocol, TypeAlias, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 from m2pem.api import US_PER_S, Clock
 from m2pem_plugin_mavlink.protocol.messages import Address, Message
 from m2pem_plugin_mavlink.protocol.quality import LinkQuality
-from m2pem_plugin_mavlink.protocol.transaction import Transaction
+from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, Transaction
 from m2pem_plugin_mavlink.signing.signature import RefusedFrames
 
 
@@ -43,44 +44,67 @@ Listener: TypeAlias = Callable[[Message, Address], None]
 """Called with a message and its sender in the event loop; must not raise."""
 
 
-class VehicleLink(Protocol):
+class VehicleLink(ABC):
     """The link that exchanges and drivers of a vehicle use. `address` is its autopilot's."""
 
-    @property
-    def address(self) -> Address:
-        """The address of the autopilot."""
-        ...
+    def __init__(self, address: Address, clock: Clock) -> None:
+        self.address = address
+        self._clock = clock
+        self._closed = False
+        self._exchanges: set[Exchange] = set()
 
     def now_s(self) -> float:
         """Return the time of the clock of `deadline_s`, in seconds; it never goes back."""
-        ...
+        return self._clock.now_us() / US_PER_S
 
+    @abstractmethod
     def send(self, message: Message) -> None:
         """Send a message; the caller sets its target fields. It may get lost."""
-        ...
 
+    @abstractmethod
     async def perform(self, transaction: Transaction[T]) -> T:
         """Run an exchange to its end, after others with the same key.
 
         Raises:
             ExchangeError: it failed.
         """
-        ...
 
+    async def _exchange(self, transaction: Transaction[Any]) -> None:
+        exchange = Exchange(transaction, self, self._clock)
+        self._exchanges.add(exchange)
+        try:
+            await exchange.run()
+        finally:
+            self._exchanges.discard(exchange)
+
+    def _refuse_closed(self) -> None:
+        if self._closed:
+            raise ExchangeError("the link was closed")
+
+    def _end_exchanges(self) -> None:
+        """Let active exchanges fail, and those that come later."""
+        self._closed = True
+        for exchange in list(self._exchanges):
+            exchange.abort(ExchangeError("the link was closed"))
+
+    @abstractmethod
     def listen(self, ids: Iterable[int], listener: Listener) -> Callable[[], None]:
         """Call the listener with all messages of these ids from this system, any component; the
         returned function ends that. Only messages with a listener are decoded."""
-        ...
 
+    @abstractmethod
     def quality(self) -> LinkQuality | None:
         """Return the quality over the endpoint in use; None if the autopilot has never sent
         anything."""
-        ...
 
+    @abstractmethod
     def refused(self) -> Sequence[RefusedFrames]:
         """Return which frames of the vehicle were refused for their signatures, by endpoint and
         reason."""
-        ...
+
+    @abstractmethod
+    async def close(self) -> None:
+        """Release the vehicle. Active exchanges fail."""
 
 
 class Exchange:

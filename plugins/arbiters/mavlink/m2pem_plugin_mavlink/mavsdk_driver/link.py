@@ -9,8 +9,8 @@ from typing import Any, TypeVar
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from m2pem.api import US_PER_S, Clock
-from m2pem_plugin_mavlink.link.vehicle_link import Exchange, KeyedLock, Listener
+from m2pem.api import Clock
+from m2pem_plugin_mavlink.link.vehicle_link import KeyedLock, Listener, VehicleLink
 from m2pem_plugin_mavlink.mavsdk_driver import json_fields, library
 from m2pem_plugin_mavlink.microservices.mission_items import (
     MissionItem,
@@ -131,7 +131,7 @@ UNSENT = 50
 """Most messages that wait to be sent; the oldest are dropped."""
 
 
-class MavsdkLink:
+class MavsdkLink(VehicleLink):
     """The link of a vehicle, from when MAVSDK has found its system id (`attach`) to `close`, which
     calls `leave` at last.
 
@@ -143,20 +143,17 @@ class MavsdkLink:
     def __init__(
         self, address: Address, clock: Clock, leave: Callable[[], Awaitable[None]]
     ) -> None:
-        self.address = address
+        super().__init__(address, clock)
         self.calls = PendingCalls()
         self.missions: Any = None
         self.may_send: Callable[[], bool] = lambda: True
         """Nothing is sent while it is false."""
         self._direct: Any = None
-        self._clock = clock
         self._leave = leave
-        self._closed = False
         self._listeners: dict[int, list[Listener]] = {}
         self._readers: dict[int, asyncio.Task[None]] = {}
         self._unsent: deque[Message] = deque(maxlen=UNSENT)
         self._sender: asyncio.Task[None] | None = None
-        self._exchanges: set[Exchange] = set()
         self._locks = KeyedLock()
 
     # --- life -----------------------------------------------------------------------------------
@@ -177,9 +174,7 @@ class MavsdkLink:
         """Unsubscribe, and wait for active calls. Active exchanges fail."""
         if self._closed:
             return
-        self._closed = True
-        for exchange in list(self._exchanges):
-            exchange.abort(ExchangeError("the link was closed"))
+        self._end_exchanges()
         tasks = list(self._readers.values())
         if self._sender is not None:
             tasks.append(self._sender)
@@ -200,10 +195,6 @@ class MavsdkLink:
         self.missions.destroy()
 
     # --- VehicleLink ----------------------------------------------------------------------------
-
-    def now_s(self) -> float:
-        """See `VehicleLink.now_s`."""
-        return self._clock.now_us() / US_PER_S
 
     def send(self, message: Message) -> None:
         """See `VehicleLink.send`."""
@@ -231,17 +222,11 @@ class MavsdkLink:
     async def perform(self, transaction: Transaction[T]) -> T:
         """See `VehicleLink.perform`."""
         async with self._locks.locked(transaction.key):
-            if self._closed:
-                raise ExchangeError("the link was closed")
+            self._refuse_closed()
             if not self.attached:
                 raise NoAnswerError(f"system {self.address.system} has sent no message yet")
             if not await upload_with_mavsdk(self, transaction):
-                exchange = Exchange(transaction, self, self._clock)
-                self._exchanges.add(exchange)
-                try:
-                    await exchange.run()
-                finally:
-                    self._exchanges.discard(exchange)
+                await self._exchange(transaction)
         return transaction.outcome()
 
     def quality(self) -> LinkQuality | None:

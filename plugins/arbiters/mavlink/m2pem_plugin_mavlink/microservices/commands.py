@@ -2,7 +2,7 @@
 
 import math
 from abc import abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -252,46 +252,3 @@ class Command(CommandExchange[Message]):
     def accepted(self, ack: Message, now_s: float) -> None:
         """End: the command is executed, or its execution has begun."""
         self.succeed(ack)
-
-
-class Request(CommandExchange[T]):
-    """A command that is answered with a message, which is the result (REQUEST_MESSAGE and the
-    like). The message counts even if the acknowledgement is lost.
-
-    Args:
-        answer: the id of the message.
-        read: returns the result in the message; None: it is not the requested one.
-    """
-
-    def __init__(
-        self,
-        target: Address,
-        command: int,
-        params: Sequence[float],
-        answer: int,
-        read: Callable[[Message], T | None],
-        *,
-        retry_policy: RetryPolicy = RETRIES,
-    ) -> None:
-        super().__init__(target, command, params, retry_policy=retry_policy)
-        self.wants = frozenset({_ACK, _TEXT, answer})
-        self._answer, self._read = answer, read
-        self._accepted_s: float | None = None
-
-    def receive(self, message: Message, sender: Address, now_s: float) -> None:
-        """Receive the message or an acknowledgement."""
-        if message.TYPE.id == self._answer and sender == self.target:
-            result = self._read(message) if self.for_us(message) else None
-            if result is not None:
-                self.succeed(result)
-        else:
-            super().receive(message, sender, now_s)
-
-    def accepted(self, ack: Message, now_s: float) -> None:
-        """Wait for the message; `expire` requests it again."""
-        self._accepted_s = now_s
-
-    def _silence(self) -> str:
-        if self._accepted_s is None:
-            return super()._silence()
-        return f"{self.name}: accepted, but no answer was received"

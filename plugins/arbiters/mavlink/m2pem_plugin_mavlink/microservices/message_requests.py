@@ -7,7 +7,7 @@ from typing import TypeVar
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem.api import US_PER_S
-from m2pem_plugin_mavlink.microservices.commands import CommandExchange, Request, message_name
+from m2pem_plugin_mavlink.microservices.commands import CommandExchange, message_name
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
 from m2pem_plugin_mavlink.protocol.transaction import RETRIES, RetryPolicy
 
@@ -51,11 +51,12 @@ class SetMessageInterval(CommandExchange[float]):
         return float(self._message_id), interval_us
 
 
-class RequestMessage(Request[T]):
-    """Requests one message once; the result is that of `read`.
+class RequestMessage(CommandExchange[T]):
+    """Requests one message once. The message counts even if the acknowledgement is lost.
 
     Args:
         name: of the message: "HOME_POSITION".
+        read: returns the result in the message; None: it is not the requested one.
         index: of the camera or image, if there are several.
     """
 
@@ -70,5 +71,26 @@ class RequestMessage(Request[T]):
     ) -> None:
         id_ = message_type(name).id
         command = dialect.MAV_CMD_REQUEST_MESSAGE
-        super().__init__(target, command, (id_, index), id_, read, retry_policy=retry_policy)
+        super().__init__(target, command, (id_, index), retry_policy=retry_policy)
         self.name = f"request for {name}"
+        self.wants = CommandExchange.wants | {id_}
+        self._answer, self._read = id_, read
+        self._accepted = False
+
+    def receive(self, message: Message, sender: Address, now_s: float) -> None:
+        """Receive the message or an acknowledgement."""
+        if message.TYPE.id == self._answer and sender == self.target:
+            result = self._read(message) if self.for_us(message) else None
+            if result is not None:
+                self.succeed(result)
+        else:
+            super().receive(message, sender, now_s)
+
+    def accepted(self, ack: Message, now_s: float) -> None:
+        """Wait for the message; `expire` requests it again."""
+        self._accepted = True
+
+    def _silence(self) -> str:
+        if not self._accepted:
+            return super()._silence()
+        return f"{self.name}: accepted, but no answer was received"

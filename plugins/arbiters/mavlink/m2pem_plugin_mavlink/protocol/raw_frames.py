@@ -11,12 +11,11 @@ from m2pem_plugin_mavlink.protocol.frames import (
     AROUND_V1,
     AROUND_V2,
     EXTRA,
-    HEADER_V1,
-    HEADER_V2,
     SIGNATURE,
     SIGNED,
     V1,
     V2,
+    read,
     right,
 )
 from m2pem_plugin_mavlink.protocol.messages import Address, types_by_id
@@ -81,21 +80,12 @@ class FrameSplitter:
 
 
 def _read(unsigned: bytes, whole: bytes) -> RawFrame | None:
-    if unsigned[0] == V1:
-        _, _, sender, id_ = HEADER_V1.unpack_from(unsigned)
-        payload = unsigned[6:-2]
-    else:
-        _, flags, _, sender, low, high = HEADER_V2.unpack_from(unsigned)
-        if flags & ~SIGNED:
-            return None
-        id_ = low | high << 16
-        payload = unsigned[10:-2]
-    target = EVERYONE
-    if id_ in EXTRA:
-        if not right(unsigned, id_):
-            return None
-        target = _target(id_, payload)
-    return RawFrame(whole, Address(sender & 255, sender >> 8), id_, payload, target)
+    frame = read(whole)
+    if frame is None or (frame.id in EXTRA and not right(unsigned, frame.id)):
+        return None
+    target = _target(frame.id, frame.payload) if frame.id in EXTRA else EVERYONE
+    source = Address(frame.sender & 255, frame.sender >> 8)
+    return RawFrame(whole, source, frame.id, frame.payload, target)
 
 
 def _target(id_: int, payload: bytes) -> Address:

@@ -16,9 +16,6 @@ from pathlib import Path
 from m2pem_plugin_mavlink.signing.key_file import fingerprint
 from m2pem_plugin_mavlink.signing.timestamps import UNITS_PER_S, Timestamps, TimestampStore
 
-SIGNATURE_BYTES = 13
-"""Link id (1), timestamp (6), and the first 6 bytes of the hash."""
-
 NEWEST_STREAM = 60 * UNITS_PER_S
 """The first frame of a stream may be older by so much."""
 
@@ -39,7 +36,8 @@ class Refusal(StrEnum):
 
 
 class Signer:
-    """One key: signs and checks frames. A frame has its checksum."""
+    """One key: signs and checks frames. A frame has its checksum. A signature is the link id (1
+    byte), the timestamp (6), and the first 6 bytes of the hash."""
 
     def __init__(self, key: bytes, store: TimestampStore | None) -> None:
         self._started = sha256(key)

@@ -34,11 +34,6 @@ _RADII = {
 }
 
 
-def must_circle(identity: Identity) -> bool:
-    """Return whether a vehicle cannot stop in the air."""
-    return identity.kind in WINGED
-
-
 def assume_default_radii(state: AutopilotState, identity: Identity) -> None:
     """Set the radii to the defaults of the autopilot, until it reports them."""
     state.loiter_radius_m = state.home_loiter_radius_m = _RADII[identity.firmware].usual_m

@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass, field
 
-from m2pem.api import GeoPosition, LinkState, ResourceId, VehicleState
+from m2pem.api import GeoPosition, LinkState
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
-from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Readiness
+from m2pem_plugin_mavlink.vehicle.driver import FlightMode
 
 
 @dataclass(slots=True)
@@ -113,30 +113,3 @@ def link_state(silent_s: float | None, lost_after_s: float, loss: float = 0.0) -
     if silent_s >= DEGRADED_SHARE * lost_after_s or loss > DEGRADED_LOSS:
         return LinkState.DEGRADED
     return LinkState.CONNECTED
-
-
-def vehicle_state(
-    resource: ResourceId,
-    time_us: int,
-    state: AutopilotState,
-    mode: str,
-    readiness: Readiness | None,
-    link: LinkState,
-) -> VehicleState:
-    """Return the telemetry for the fleet. `mode`: the autopilot's own name of it."""
-    return VehicleState(
-        resource,
-        time_us,
-        state.position,
-        state.altitude_above_home_m,
-        state.velocity_enu_m_s,
-        state.roll_rad or 0.0,
-        state.pitch_rad or 0.0,
-        state.yaw_rad,
-        state.battery_fraction,
-        mode,
-        state.armed,
-        readiness.ready if readiness else None,
-        readiness.reasons if readiness else (),
-        link,
-    )

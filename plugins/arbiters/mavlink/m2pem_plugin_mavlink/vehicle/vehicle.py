@@ -15,10 +15,10 @@ from m2pem_plugin_mavlink.microservices.texts import GIVE_UP_S, StatusTexts, Tex
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
 from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, NoAnswerError, RefusedError
 from m2pem_plugin_mavlink.signing.signature import Refusal
-from m2pem_plugin_mavlink.vehicle import fixed_wing
 from m2pem_plugin_mavlink.vehicle.ardupilot import ArdupilotDriver
 from m2pem_plugin_mavlink.vehicle.autopilot import Autopilot
 from m2pem_plugin_mavlink.vehicle.driver import Readiness
+from m2pem_plugin_mavlink.vehicle.fixed_wing import WINGED, assume_default_radii, read_radii
 from m2pem_plugin_mavlink.vehicle.identity import ON_THE_GROUND, Firmware, Identity, identity
 from m2pem_plugin_mavlink.vehicle.modes import modes_of
 from m2pem_plugin_mavlink.vehicle.px4 import Px4Driver
@@ -27,7 +27,6 @@ from m2pem_plugin_mavlink.vehicle.state import (
     AutopilotState,
     CommandedState,
     link_state,
-    vehicle_state,
 )
 from m2pem_plugin_mavlink.vehicle.streams import RequestedStreams, telemetry_streams
 from m2pem_plugin_mavlink.vehicle.telemetry_decoder import TelemetryDecoder
@@ -233,13 +232,21 @@ class Vehicle:
             readiness: Readiness | None = Readiness(False, (refused,))
         else:
             readiness = driver.readiness() if driver is not None else None
-        known = driver is not None and state.custom_mode is not None
-        return vehicle_state(
+        number = state.custom_mode
+        return VehicleState(
             self.resource,
             self._clock.now_us(),
-            state,
-            driver.mode_name(state.custom_mode or 0) if driver is not None and known else "",
-            readiness,
+            state.position,
+            state.altitude_above_home_m,
+            state.velocity_enu_m_s,
+            state.roll_rad or 0.0,
+            state.pitch_rad or 0.0,
+            state.yaw_rad,
+            state.battery_fraction,
+            driver.mode_name(number) if driver is not None and number is not None else "",
+            state.armed,
+            readiness.ready if readiness else None,
+            readiness.reasons if readiness else (),
             link,
         )
 
@@ -288,8 +295,8 @@ class Vehicle:
         self._driver = _DRIVERS[found.firmware](self, found)
         self._streams = RequestedStreams(telemetry_streams(found.firmware))
         self._decoder = TelemetryDecoder(self.state, modes_of(found), flies=flies)
-        if fixed_wing.must_circle(found):
-            fixed_wing.assume_default_radii(self.state, found)
+        if found.kind in WINGED:
+            assume_default_radii(self.state, found)
             self._go(self._ask_for_radii(found))
         self._receive(message, sender)
         self._stop_listening.append(self.link.listen(self._decoder.wants, self._receive))
@@ -404,7 +411,7 @@ class Vehicle:
     async def _ask_for_radii(self, found: Identity) -> None:
         while True:
             try:
-                await fixed_wing.read_radii(self.state, found, self.link)
+                await read_radii(self.state, found, self.link)
             except ExchangeError as error:
                 self._logger.debug(
                     "%s: the radii of its circles are not known: %s", self.resource, error
