@@ -52,14 +52,10 @@ RUN_ONBOARD_MISSION = BehaviorSpec(
 )
 
 
+@cache
 def offered(domain: str) -> tuple[BehaviorSpec, ...]:
     """Return the behaviors of a domain; they are the same over MAVSDK."""
-    return _offered(domain if domain in _BY_DOMAIN else "ground")
-
-
-@cache
-def _offered(domain: str) -> tuple[BehaviorSpec, ...]:
-    names = _BY_DOMAIN[domain]
+    names = _BY_DOMAIN.get(domain, _BY_DOMAIN["ground"])
     shared = (
         _bounded(spec)
         for (name, type_), spec in SHARED.items()

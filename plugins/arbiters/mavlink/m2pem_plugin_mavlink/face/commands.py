@@ -172,14 +172,6 @@ def _takeoff(command: Command, vehicle: ShownVehicle) -> Order:
     return Order(vehicle.resource, "takeoff", {"altitude": f"{altitude_m} m"})
 
 
-def _land(command: Command, vehicle: ShownVehicle) -> Order:
-    return Order(vehicle.resource, "land")
-
-
-def _return(command: Command, vehicle: ShownVehicle) -> Order:
-    return Order(vehicle.resource, "return_to_launch")
-
-
 def _speed(command: Command, vehicle: ShownVehicle) -> Order:
     speed = command.params[1]
     if not math.isfinite(speed) or speed <= 0:
@@ -312,8 +304,10 @@ def _camera_order(command: Command, camera: Camera) -> Order:
 _READ: Mapping[int, Read] = {
     dialect.MAV_CMD_DO_REPOSITION: _reposition,
     dialect.MAV_CMD_NAV_TAKEOFF: _takeoff,
-    dialect.MAV_CMD_NAV_LAND: _land,
-    dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH: _return,
+    dialect.MAV_CMD_NAV_LAND: lambda _, vehicle: Order(vehicle.resource, "land"),
+    dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH: lambda _, vehicle: Order(
+        vehicle.resource, "return_to_launch"
+    ),
     dialect.MAV_CMD_DO_CHANGE_SPEED: _speed,
     dialect.MAV_CMD_DO_PAUSE_CONTINUE: _pause,
     dialect.MAV_CMD_NAV_LOITER_UNLIM: _loiter,

@@ -6,7 +6,6 @@ does, and what the run did there ends.
 """
 
 import asyncio
-import logging
 from collections import OrderedDict
 from collections.abc import Callable, Collection, Coroutine
 from dataclasses import dataclass
@@ -28,8 +27,6 @@ from m2pem_plugin_mavlink.face.stations import Station
 from m2pem_plugin_mavlink.face.vehicle import ShownVehicle
 from m2pem_plugin_mavlink.link.route import Peer
 from m2pem_plugin_mavlink.protocol.messages import Address, message_type
-
-_logger = logging.getLogger(__name__)
 
 FAILED: int = dialect.MAV_RESULT_FAILED
 IN_PROGRESS: int = dialect.MAV_RESULT_IN_PROGRESS

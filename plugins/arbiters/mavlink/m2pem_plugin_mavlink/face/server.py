@@ -1,7 +1,6 @@
 """Serves ground stations: what they send goes to whom it concerns, and they get what there is."""
 
 import asyncio
-import logging
 from collections import OrderedDict
 from contextlib import ExitStack, suppress
 
@@ -48,8 +47,6 @@ from m2pem_plugin_mavlink.microservices.commands import message_name
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, types_by_id
 from m2pem_plugin_mavlink.protocol.raw_frames import RawFrame
 from m2pem_plugin_mavlink.settings import GCS_SYSTEM_ID
-
-_logger = logging.getLogger(__name__)
 
 ONBOARD_COMPUTER: int = dialect.MAV_COMP_ID_ONBOARD_COMPUTER
 """m2pem speaks as it for a forwarded vehicle, whose autopilot numbers its own frames."""

@@ -11,6 +11,7 @@ from m2pem.api import VehicleState, ellipsoidal_m
 from m2pem_plugin_mavlink.face import modes
 from m2pem_plugin_mavlink.face.vehicle import ShownVehicle
 from m2pem_plugin_mavlink.protocol.messages import Message, message_type
+from m2pem_plugin_mavlink.vehicle.telemetry_decoder import enu_yaw
 
 TYPES: Mapping[str, int] = {
     "ground": dialect.MAV_TYPE_GROUND_ROVER,
@@ -45,11 +46,6 @@ Maker: TypeAlias = Callable[[ShownVehicle], Message | None]
 def wrapped_degrees(yaw_rad: float) -> float:
     """Return a heading (from north, clockwise, 0 to 360) of a yaw from east."""
     return (90.0 - math.degrees(yaw_rad)) % 360.0
-
-
-def north_yaw_rad(yaw_rad: float) -> float:
-    """Return a yaw from north, clockwise, -pi to pi, of one from east."""
-    return math.remainder(math.pi / 2 - yaw_rad, 2 * math.pi)
 
 
 def boot_ms(state: VehicleState) -> int:
@@ -109,7 +105,7 @@ def _attitude(vehicle: ShownVehicle) -> Message | None:
         time_boot_ms=boot_ms(state),
         roll=state.roll_rad,
         pitch=-state.pitch_rad,
-        yaw=north_yaw_rad(state.yaw_rad),
+        yaw=enu_yaw(state.yaw_rad),
     )
 
 
@@ -232,20 +228,13 @@ def _home(vehicle: ShownVehicle) -> Message | None:
 
 def _mission_current(vehicle: ShownVehicle) -> Message:
     plan = vehicle.plan
-    if not plan.items:
-        state = dialect.MISSION_STATE_NO_MISSION
-    else:
-        state = dialect.MISSION_STATE_ACTIVE
+    state = dialect.MISSION_STATE_ACTIVE if plan.items else dialect.MISSION_STATE_NO_MISSION
     return message_type("MISSION_CURRENT").make(
         seq=plan.current,
         total=len(plan.items) if plan.items else UINT16_UNKNOWN,
         mission_state=state,
         mission_mode=1 if vehicle.mode is modes.MISSION else 2,
     )
-
-
-def _current_mode(vehicle: ShownVehicle) -> Message:
-    return modes.current_mode(vehicle.mode)
 
 
 def _system_time(vehicle: ShownVehicle) -> Message | None:
@@ -281,7 +270,7 @@ _PERIODIC: Mapping[str, Maker] = {
 }
 MAKERS: Mapping[int, Maker] = {
     **{message_type(name).id: maker for name, maker in {**_PERIODIC, **_ON_REQUEST}.items()},
-    modes.CURRENT_MODE: _current_mode,
+    modes.CURRENT_MODE: lambda vehicle: modes.current_mode(vehicle.mode),
 }
 """What the autopilot sends, by message id; None: not known now."""
 

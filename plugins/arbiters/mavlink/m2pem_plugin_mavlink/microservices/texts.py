@@ -113,13 +113,11 @@ class StatusTexts:
         )
         return tuple(sorted(found, key=lambda each: each.at_s))
 
-    def _add(self, text: Text) -> None:
-        self._texts.append(text)
-        self._read(text)
-
     def _close(self, key: tuple[Address, int]) -> None:
         pieces = self._coming.pop(key)
-        self._add(Text(pieces.text(), pieces.severity, key[0], pieces.at_s))
+        text = Text(pieces.text(), pieces.severity, key[0], pieces.at_s)
+        self._texts.append(text)
+        self._read(text)
         self._closed_s.pop(key, None)
         self._closed_s[key] = pieces.at_s
         if len(self._closed_s) > KEPT:

@@ -73,7 +73,8 @@ class Arming(Component):
         """Stop the motors; not in flight, unless forced. `by`: the reason."""
         if not self.armed:
             return True
-        if not (force or self._may_disarm()):
+        surface = self.autopilot.spec.kind in SURFACE
+        if not (force or surface or self.autopilot.body.on_ground):
             return False
         self.armed = False
         self.autopilot.mission.disarmed()
@@ -86,9 +87,6 @@ class Arming(Component):
         if self.armed:
             self.autopilot.log_event("landed")
             self.disarm(by="landing")
-
-    def _may_disarm(self) -> bool:
-        return self.autopilot.spec.kind in SURFACE or self.autopilot.body.on_ground
 
     def step(self, dt_s: float) -> None:
         """Disarm a copter that stays on the ground for DISARM_DELAY."""

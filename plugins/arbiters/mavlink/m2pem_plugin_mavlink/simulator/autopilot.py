@@ -6,7 +6,6 @@ passes; `take_outbox` returns the messages to send. Time is simulated time: its 
 fast it passes.
 """
 
-import logging
 from collections.abc import Mapping
 from typing import Any, TypeVar
 
@@ -71,8 +70,6 @@ REBOOT_S = 2.0
 """For how long a rebooting autopilot is silent."""
 
 P = TypeVar("P", bound=Component)
-
-logger = logging.getLogger(__name__)
 
 
 class Autopilot:

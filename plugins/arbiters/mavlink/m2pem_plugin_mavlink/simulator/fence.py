@@ -56,11 +56,6 @@ class CircleZone:
 Zone = PolygonZone | CircleZone
 
 
-def zones_of(items: Sequence[Item], frame: LocalFrame) -> tuple[Zone, ...]:
-    """Return the zones. A polygon with missing corners (its upload was abandoned) is left out."""
-    return tuple(_zones(items, frame))
-
-
 def is_whole(items: Sequence[Item]) -> bool:
     """Return whether every polygon has as many corners as its items say, and at least three."""
     index = 0
@@ -77,7 +72,8 @@ def is_whole(items: Sequence[Item]) -> bool:
     return True
 
 
-def _zones(items: Sequence[Item], frame: LocalFrame) -> Iterator[Zone]:
+def zones_of(items: Sequence[Item], frame: LocalFrame) -> Iterator[Zone]:
+    """Yield the zones. A polygon with missing corners (its upload was abandoned) is left out."""
     index = 0
     while index < len(items):
         item = items[index]
@@ -139,7 +135,7 @@ class Fence(Component):
         plans = self.autopilot.plans
         if self._changes != plans.changes:
             self._changes = plans.changes
-            self._zones = zones_of(plans[FENCE], self.autopilot.frame)
+            self._zones = tuple(zones_of(plans[FENCE], self.autopilot.frame))
         return self._zones
 
     def at(self, point: Point, rules: FenceRules) -> Breach | None:

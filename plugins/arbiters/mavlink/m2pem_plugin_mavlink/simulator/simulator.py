@@ -5,7 +5,6 @@ async with Simulator([VehicleSpec(), VehicleSpec(Kind.ROVER, system=2)], speed=1
 """
 
 import asyncio
-import logging
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Self
 
@@ -22,8 +21,6 @@ MOST_BEHIND_S = 0.25
 """If the computer does not keep up, simulated time is behind; it catches up no more than that."""
 FAST = 20
 """From this speed on, a vehicle is moved on in bigger steps."""
-
-logger = logging.getLogger(__name__)
 
 
 class SimulatedVehicle:

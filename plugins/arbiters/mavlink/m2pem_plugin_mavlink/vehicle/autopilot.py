@@ -298,7 +298,8 @@ class Autopilot(ABC):
 
     async def _locate(self) -> None:
         """Wait until the position is known."""
-        await self._until(self._is_located, LOCATED_WITHIN_S)
+        firmware, now_s = self.identity.firmware, self.link.now_s
+        await self._until(lambda: not unlocated(firmware, self.state, now_s()), LOCATED_WITHIN_S)
 
     async def _until(self, ready: Callable[[], bool], within_s: float) -> None:
         """Wait; show operators the reasons, and changes of them."""
@@ -311,19 +312,13 @@ class Autopilot(ABC):
         while not ready():
             left_s = end_s - self.link.now_s()
             if left_s <= 0:
-                raise self._not_ready()
+                raise not_now("not ready: " + "; ".join(self.readiness().reasons))
             if (now := reasons()) and now != shown:
                 shown = now
                 self.vehicle.warn(f"waits until it is ready: {shown}")
             await self.vehicle.until(lambda shown=shown: ready() or reasons() != shown, left_s)  # type: ignore[misc]
         if shown:
             self.vehicle.warn("is ready")
-
-    def _is_located(self) -> bool:
-        return not unlocated(self.identity.firmware, self.state, self.link.now_s())
-
-    def _not_ready(self) -> RefusedError:
-        return not_now("not ready: " + "; ".join(self.readiness().reasons))
 
     async def _have_it_checked(self) -> None:
         """Request the reasons against arming now; unasked, ArduPilot sends them every 30 s, and PX4

@@ -34,15 +34,9 @@ _BREACHES = {
 
 
 def enu_yaw(heading_rad: float) -> float:
-    """Convert a heading (from north, clockwise) to a yaw (from east, counter-clockwise), in
-    -pi..pi."""
+    """Convert a heading (from north, clockwise) to a yaw (from east, counter-clockwise), or a yaw
+    to a heading, in -pi..pi."""
     return math.remainder(math.pi / 2 - heading_rad, math.tau)
-
-
-def heading(yaw_rad: float) -> float:
-    """Convert a yaw (from east, counter-clockwise) to a heading (from north, clockwise), in 0..2
-    pi."""
-    return (math.pi / 2 - yaw_rad) % math.tau
 
 
 class TelemetryDecoder:

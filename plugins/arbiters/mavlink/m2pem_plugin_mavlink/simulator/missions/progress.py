@@ -1,6 +1,5 @@
 """The progress of the mission: the current item, the state, and their messages."""
 
-from enum import IntEnum
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -24,16 +23,8 @@ MOST_JUMPS = 64
 
 A_MOMENT_S = 0.1
 MISSION_MODE_ACTIVE, MISSION_MODE_SUSPENDED = 1, 2
-
-
-class MissionState(IntEnum):
-    """MISSION_STATE."""
-
-    NO_MISSION = 1
-    NOT_STARTED = 2
-    ACTIVE = 3
-    PAUSED = 4
-    COMPLETE = 5
+NO_MISSION, NOT_STARTED, ACTIVE, PAUSED, COMPLETE = range(1, 6)
+"""MISSION_STATE."""
 
 
 class MissionProgress(Component):
@@ -69,17 +60,17 @@ class MissionProgress(Component):
         return len(self.items) <= self.first
 
     @property
-    def state(self) -> MissionState:
-        """As MISSION_CURRENT has it; ArduPilot has no pause, PX4 goes by its mode."""
+    def state(self) -> int:
+        """MISSION_STATE; ArduPilot has no pause, PX4 goes by its mode."""
         ardupilot = self.autopilot.firmware.is_ardupilot
         if self.empty:
-            return MissionState.NO_MISSION
+            return NO_MISSION
         if self.complete:
-            return MissionState.COMPLETE
+            return COMPLETE
         if self.running if ardupilot else self._mode == MISSION_MODE_ACTIVE:
-            return MissionState.ACTIVE
+            return ACTIVE
         paused = self.begun and not ardupilot
-        return MissionState.PAUSED if paused else MissionState.NOT_STARTED
+        return PAUSED if paused else NOT_STARTED
 
     @property
     def _mode(self) -> int:
