@@ -65,6 +65,8 @@ class Behavior(ABC):
 
     name: ClassVar[str]
     modes: frozenset[FlightMode]
+    plane_modes: ClassVar[frozenset[FlightMode]] = frozenset()
+    """Further modes of a vehicle that cannot stop in the air."""
     moves_vehicle: ClassVar[bool] = True
     max_still_s: ClassVar[float | None] = None
     """For how long its vehicle may stand still before it has failed, in s; None: for ever."""
@@ -72,6 +74,8 @@ class Behavior(ABC):
     def __init__(self, context: BehaviorContext) -> None:
         self.context = context
         self.vehicle = context.vehicle
+        if self.vehicle.state.loiter_radius_m is not None:
+            self.modes |= self.plane_modes
 
     def refusal(self) -> str:
         """Return why the behavior cannot be executed; "" if it can. Send nothing."""

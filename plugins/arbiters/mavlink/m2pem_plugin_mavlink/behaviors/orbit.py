@@ -34,6 +34,7 @@ class Orbit(MissionFlight):
 
     name = "orbit"
     modes = frozenset({FlightMode.MISSION, FlightMode.ORBIT})
+    plane_modes = frozenset({FlightMode.GUIDED})  # a plane is sent to a place with a radius
 
     def __init__(self, context: BehaviorContext) -> None:
         super().__init__(context)
@@ -47,8 +48,6 @@ class Orbit(MissionFlight):
         self._turned_rad = 0.0
         self._bearing_rad: float | None = None
         self._done = False
-        if self.vehicle.state.loiter_radius_m is not None:
-            self.modes |= {FlightMode.GUIDED}  # a plane is sent to a place with a radius
 
     ends = True
     """Whether it ends after one turn by default."""

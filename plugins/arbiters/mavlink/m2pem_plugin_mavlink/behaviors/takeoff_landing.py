@@ -108,11 +108,7 @@ class Takeoff(ChangeAltitude):
 
     name = "takeoff"
     modes = frozenset({FlightMode.GUIDED, FlightMode.TAKEOFF})
-
-    def __init__(self, context: BehaviorContext) -> None:
-        super().__init__(context)
-        if self.vehicle.state.loiter_radius_m is not None:
-            self.modes |= {FlightMode.MISSION}
+    plane_modes = frozenset({FlightMode.MISSION})
 
     def refusal(self) -> str:
         """Check that the height is above home."""
@@ -180,12 +176,8 @@ class Land(Behavior):
 
     name = "land"
     modes = frozenset({FlightMode.LAND})
+    plane_modes = frozenset({FlightMode.MISSION})
     max_still_s = MOVES_WITHIN_S
-
-    def __init__(self, context: BehaviorContext) -> None:
-        super().__init__(context)
-        if self.vehicle.state.loiter_radius_m is not None:
-            self.modes |= {FlightMode.MISSION}
 
     async def begin(self) -> None:
         """Land, unless the vehicle has landed already."""

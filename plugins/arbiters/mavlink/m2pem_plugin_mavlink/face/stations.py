@@ -34,7 +34,9 @@ _logger = logging.getLogger(__name__)
 class Station:
     """A peer: one ground station, or a router with several. `addresses`: those that send over it.
     `ignored`: its frames that were dropped, as there were too many. `ardupilot_modes`: it is sent
-    ArduPilot's numbers of modes. `sends_targets`: as PX4 needs them before its Offboard mode."""
+    ArduPilot's numbers of modes. `sends_targets`: as PX4 needs them before its Offboard mode.
+    `intervals_s`: those that it has set itself, by the system and the message, and `queued`: the
+    numbers of their entries in the queue of `Streams`."""
 
     def __init__(self, peer: Peer, now_s: float) -> None:
         self.peer = peer
@@ -43,6 +45,8 @@ class Station:
         self.ignored = 0
         self.ardupilot_modes = False
         self.sends_targets = False
+        self.intervals_s: dict[tuple[int, int], float] = {}
+        self.queued: dict[tuple[int, int], int] = {}
         self._budget = MOST_FRAMES_AT_ONCE
         self._refilled_s = now_s
 

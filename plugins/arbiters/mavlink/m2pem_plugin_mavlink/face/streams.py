@@ -10,7 +10,6 @@ from m2pem_plugin_mavlink.face.settings import FASTEST_HZ
 from m2pem_plugin_mavlink.face.stations import HEARTBEAT, Station, Stations
 from m2pem_plugin_mavlink.face.telemetry import MAKERS
 from m2pem_plugin_mavlink.face.vehicle import ShownVehicle
-from m2pem_plugin_mavlink.link.route import Peer
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
 
 LONGEST_WAIT_S = 0.05
@@ -59,8 +58,6 @@ class Streams:
         self._stations = stations
         self._vehicles = vehicles
         self._default_s = {message_type(name).id: 1 / rate for name, rate in rates_hz.items()}
-        self._own_s: dict[Peer, dict[tuple[int, int], float]] = {}
-        self._queued: dict[Peer, dict[tuple[int, int], int]] = {}
         self.now_s = now_s
         self._queue: list[_Entry] = []
         self._numbers = count()
@@ -68,7 +65,7 @@ class Streams:
 
     def interval_s(self, station: Station, vehicle: ShownVehicle, id_: int) -> float:
         """Return the interval of a message to a station; 0: it is not sent."""
-        own = self._own_s.get(station.peer, {}).get((vehicle.system, id_))
+        own = station.intervals_s.get((vehicle.system, id_))
         return self._default_s.get(id_, 0.0) if own is None else own
 
     def set_interval(
@@ -76,11 +73,10 @@ class Streams:
     ) -> bool:
         """Set the interval to a station. 0: the default one; below it: none. Intervals that are too
         short become the shortest. Return False if the station has set too many."""
-        own = self._own_s.setdefault(station.peer, {})
-        key = vehicle.system, id_
+        own, key = station.intervals_s, (vehicle.system, id_)
         if key not in own and len(own) >= MOST_INTERVALS and interval_s != 0:
             return False
-        self._queued.setdefault(station.peer, {}).pop(key, None)
+        station.queued.pop(key, None)
         if interval_s == 0:
             own.pop(key, None)
             return True
@@ -102,38 +98,38 @@ class Streams:
                 await self._send(heapq.heappop(self._queue), now_s)
             due_s = self._queue[0][0] if self._queue else now_s + LONGEST_WAIT_S
             await asyncio.sleep(min(max(due_s - self.now_s(), 0.0), LONGEST_WAIT_S))
-            self._forget()
 
     def _push(self, due_s: float, station: Station | None, vehicle: ShownVehicle, id_: int) -> None:
         number = next(self._numbers)
         if station is not None:
-            self._queued.setdefault(station.peer, {})[vehicle.system, id_] = number
+            station.queued[vehicle.system, id_] = number
         heapq.heappush(self._queue, (due_s, number, station, vehicle, id_))
 
     def _drop_replaced(self) -> None:
         """Bound the queue: a station may change its intervals often, and long ones stay long."""
         in_use = len(self._default_s) * len(self._vehicles)
-        in_use += sum(len(each) for each in self._queued.values())
+        in_use += sum(len(station.queued) for station in self._stations)
         if len(self._queue) > in_use + MOST_INTERVALS:
             self._queue = [each for each in self._queue if self._is_queued(each)]
             heapq.heapify(self._queue)
 
     def _is_queued(self, entry: _Entry) -> bool:
-        """Return whether no later entry has replaced this one."""
+        """Return whether no later entry has replaced this one, and its station is there."""
         _, number, station, vehicle, id_ = entry
         if station is None:
             return True
-        return self._queued.get(station.peer, {}).get((vehicle.system, id_)) == number
+        return station.peer.open and station.queued.get((vehicle.system, id_)) == number
 
     async def _send(self, entry: _Entry, now_s: float) -> None:
         due_s, _, station, vehicle, id_ = entry
+        key = vehicle.system, id_
         if not self._is_queued(entry):
             return
         if station is None:
             interval_s = self._default_s[id_]
-            stations = [each for each in self._stations if not self._has_own(each, vehicle, id_)]
+            stations = [each for each in self._stations if key not in each.intervals_s]
         else:
-            if not station.peer.open or not self._has_own(station, vehicle, id_):
+            if key not in station.intervals_s:
                 return
             interval_s = self.interval_s(station, vehicle, id_)
             stations = [station]
@@ -150,12 +146,3 @@ class Streams:
         # After a suspension of the machine, skip what was missed.
         next_s = due_s + interval_s
         self._push(next_s if next_s > now_s else now_s + interval_s, station, vehicle, id_)
-
-    def _has_own(self, station: Station, vehicle: ShownVehicle, id_: int) -> bool:
-        own = self._own_s.get(station.peer)
-        return own is not None and (vehicle.system, id_) in own
-
-    def _forget(self) -> None:
-        for peer in [peer for peer in self._own_s if not peer.open]:
-            del self._own_s[peer]
-            self._queued.pop(peer, None)

@@ -83,10 +83,6 @@ class Hub:
         for watch in list(self.link_watchers):
             watch(link)
 
-    def remove_link(self, link: VehicleLink) -> None:
-        """A link is closed."""
-        self.links.remove(link)
-
     def owners(self, system: int, component: int) -> list[Peer]:
         """Return the peers that own a component of a system, on all endpoints."""
         found = (each.owner(system, component) for each in self._opened.values())

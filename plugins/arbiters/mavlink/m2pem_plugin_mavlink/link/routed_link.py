@@ -152,7 +152,7 @@ class RoutedLink(VehicleLink):
         """Release the vehicle, and endpoints without other users. Active exchanges fail."""
         if self._closed:
             return
-        self._hub.remove_link(self)
+        self._hub.links.remove(self)
         self._end_exchanges()
         for wanted, listener in self._listening:
             for route in self._routes:

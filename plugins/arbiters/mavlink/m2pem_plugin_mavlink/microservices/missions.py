@@ -148,13 +148,8 @@ class ReadMissionItem(_Question[MissionItem]):
     wants = frozenset({ITEM_INT.id, ITEM_FLOAT.id, _ACK.id})
     retry_policy = RETRIES
 
-    def __init__(
-        self,
-        target: Address,
-        sequence: int,
-        mission_type: MissionType = MissionType.MISSION,
-    ) -> None:
-        super().__init__(target, mission_type)
+    def __init__(self, target: Address, sequence: int) -> None:
+        super().__init__(target, MissionType.MISSION)
         self.title = f"item {sequence}"
         self._sequence = sequence
 

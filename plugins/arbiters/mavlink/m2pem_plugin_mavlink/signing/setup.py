@@ -108,21 +108,12 @@ async def _send(
 
 async def _received(link: RoutedLink) -> bool:
     """Wait for a heartbeat of the vehicle."""
-    received = asyncio.Event()
-
-    def hear(_: Message, sender: Address) -> None:
-        if sender == link.address:
-            received.set()
-
-    stop = link.listen((HEARTBEAT,), hear)
+    senders: set[Address] = set()
+    stop = link.listen((HEARTBEAT,), lambda _, sender: senders.add(sender))
     try:
-        async with asyncio.timeout(RECEIVED_WITHIN_S):
-            await received.wait()
-    except TimeoutError:
-        return False
+        return await _until(lambda: link.address in senders)
     finally:
         stop()
-    return True
 
 
 async def _until(true: Callable[[], bool], within_s: float = RECEIVED_WITHIN_S) -> bool:

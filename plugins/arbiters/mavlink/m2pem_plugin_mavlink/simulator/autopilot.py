@@ -54,17 +54,6 @@ from m2pem_plugin_mavlink.simulator.streams import Streams
 FIRMWARES: Mapping[str, type[Firmware]] = {"ardupilot": ArduPilot, "px4": Px4}
 
 
-def equipment_of(spec: VehicleSpec) -> tuple[type[Component], ...]:
-    """Return the components that do not depend on the firmware."""
-    gimbal = spec.kind is Kind.COPTER if spec.gimbal is None else spec.gimbal
-    components: list[type[Component]] = [Fence]
-    if gimbal:
-        components.append(Gimbal)
-    if spec.camera:
-        components.append(Camera)
-    return tuple(components)
-
-
 AUTOPILOT_COMPONENT = 1
 REBOOT_S = 2.0
 """For how long a rebooting autopilot is silent."""
@@ -103,38 +92,29 @@ class Autopilot:
 
     def _boot(self) -> None:
         """Create all components anew; permanent memory (parameters, plans, key) stays."""
+        spec = self.spec
         self.booted_s = self._silent_until_s
-        self.texts = Texts(self)
-        self.estimator = Estimator(self)
-        self.battery = Battery(self)
-        self.home = Home(self)
-        self.modes = ModeSwitch(self)
-        self.arming = Arming(self)
-        self.guided = MotionCommands(self)
-        self.mission = MissionProgress(self)
-        self.missions = MissionServer(self)
-        self.payload = Payload(self)
-        self.streams = Streams(self)
-        self.components: list[Component] = [
-            self.texts,
-            self.estimator,
-            self.battery,
-            self.home,
-            self.modes,
-            self.arming,
-            self.guided,
-            self.mission,
-            self.missions,
-            self.payload,
-            ParameterServer(self),
-            Identity(self),
-            SystemCommands(self),
-            Reports(self),
-        ]
-        own = (*equipment_of(self.spec), *self.firmware.components())
-        self.components.extend(component(self) for component in own)
-        self._commands = CommandServer(self)
-        self.components += [self._commands, self.streams]
+        self.components: list[Component] = []
+        self.texts = self._add(Texts)
+        self.estimator = self._add(Estimator)
+        self.battery = self._add(Battery)
+        self.home = self._add(Home)
+        self.modes = self._add(ModeSwitch)
+        self.arming = self._add(Arming)
+        self.guided = self._add(MotionCommands)
+        self.mission = self._add(MissionProgress)
+        self.missions = self._add(MissionServer)
+        self.payload = self._add(Payload)
+        for kind in (ParameterServer, Identity, SystemCommands, Reports, Fence):
+            self._add(kind)
+        if spec.kind is Kind.COPTER if spec.gimbal is None else spec.gimbal:
+            self._add(Gimbal)
+        if spec.camera:
+            self._add(Camera)
+        for own in self.firmware.components():
+            self._add(own)
+        self._commands = self._add(CommandServer)
+        self.streams = self._add(Streams)
         self._handlers: dict[tuple[int, str], list[MessageHandler]] = {}
         for component in self.components:
             self._commands.handlers.update(component.commands())
@@ -146,6 +126,11 @@ class Autopilot:
         for peer in self.peers:
             self.streams.meet(peer)
         self.modes.start()
+
+    def _add(self, kind: type[P]) -> P:
+        component = kind(self)
+        self.components.append(component)
+        return component
 
     @property
     def since_boot_s(self) -> float:

@@ -101,12 +101,12 @@ FACING_M = 3.0
 """Nearer than that to where it goes, it no longer turns to face it."""
 
 
-def approach_mps(distance_m: float, deceleration_mps2: float, gain: float = 1.0) -> float:
+def approach_mps(distance_m: float, deceleration_mps2: float) -> float:
     """Return the speed from which to stop within a distance: proportional when near, by braking
     when far."""
-    near_m = deceleration_mps2 / gain**2
+    near_m = deceleration_mps2  # there, one metre more is one metre per second more
     if distance_m <= near_m:
-        return gain * distance_m
+        return distance_m
     return math.sqrt(2 * deceleration_mps2 * (distance_m - near_m / 2))
 
 

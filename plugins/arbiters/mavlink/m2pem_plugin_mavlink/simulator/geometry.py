@@ -13,6 +13,12 @@ class Location(NamedTuple):
     longitude_deg: float
     altitude_amsl_m: float
 
+    @property
+    def scaled(self) -> tuple[int, int, int]:
+        """In 1e-7 degrees and millimetres, as messages have it."""
+        latitude_e7, longitude_e7 = round(self.latitude_deg * 1e7), round(self.longitude_deg * 1e7)
+        return latitude_e7, longitude_e7, round(self.altitude_amsl_m * 1e3)
+
 
 class Point(NamedTuple):
     """A place in metres from the origin of a `LocalFrame`, axes north, east, up."""

@@ -42,9 +42,7 @@ class Home(Component):
             return None
         place = self.autopilot.frame.to_location(self.point)
         return dialect.MAVLink_home_position_message(
-            round(place.latitude_deg * 1e7),
-            round(place.longitude_deg * 1e7),
-            round(place.altitude_amsl_m * 1e3),
+            *place.scaled,
             self.point.north_m,
             self.point.east_m,
             -self.point.up_m,
@@ -59,8 +57,5 @@ class Home(Component):
             return None
         origin = self.autopilot.frame.origin
         return dialect.MAVLink_gps_global_origin_message(
-            round(origin.latitude_deg * 1e7),
-            round(origin.longitude_deg * 1e7),
-            round(origin.altitude_amsl_m * 1e3),
-            int(self.autopilot.since_boot_s * 1e6),
+            *origin.scaled, int(self.autopilot.since_boot_s * 1e6)
         )

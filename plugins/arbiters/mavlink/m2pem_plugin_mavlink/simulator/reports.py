@@ -121,8 +121,7 @@ class Reports(Component):
             autopilot.boot_ms,
             dialect.MAV_FRAME_GLOBAL,
             PLACE_ALONE,
-            round(place.latitude_deg * 1e7),
-            round(place.longitude_deg * 1e7),
+            *place.scaled[:2],
             place.altitude_amsl_m,
             *[0.0] * 8,
         )
@@ -135,9 +134,7 @@ class Reports(Component):
         known = autopilot.estimator.ready or autopilot.estimator.found
         return dialect.MAVLink_global_position_int_message(
             autopilot.boot_ms,
-            round(place.latitude_deg * 1e7) if known else 0,
-            round(place.longitude_deg * 1e7) if known else 0,
-            round(place.altitude_amsl_m * 1e3) if known else 0,
+            *(place.scaled if known else (0, 0, 0)),
             round((body.up_m - autopilot.home.point.up_m) * 1e3),
             round(body.north_mps * 100),
             round(body.east_mps * 100),
@@ -228,8 +225,7 @@ class Reports(Component):
         place = autopilot.frame.to_location(autopilot.position)
         known = autopilot.estimator.ready or autopilot.estimator.found
         return dialect.MAVLink_terrain_report_message(
-            round(place.latitude_deg * 1e7) if known else 0,
-            round(place.longitude_deg * 1e7) if known else 0,
+            *(place.scaled[:2] if known else (0, 0)),
             0,
             0.0,
             place.altitude_amsl_m if known else 0.0,

@@ -65,27 +65,21 @@ class Estimator(Component):
     def _gps(self) -> object:
         """The receiver has a fix long before the estimator uses it."""
         autopilot, body = self.autopilot, self.autopilot.body
+        course_deg = math.degrees(math.atan2(body.east_mps, body.north_mps))
         fixed = self._waited >= 0.1 and not self.gps_lost
         place = autopilot.frame.to_location(autopilot.position)
         height_m = ellipsoidal_m(place.latitude_deg, place.longitude_deg, place.altitude_amsl_m)
         return dialect.MAVLink_gps_raw_int_message(
             int(autopilot.since_boot_s * 1e6),
             dialect.GPS_FIX_TYPE_RTK_FIXED if fixed else dialect.GPS_FIX_TYPE_NO_FIX,
-            round(place.latitude_deg * 1e7) if fixed else 0,
-            round(place.longitude_deg * 1e7) if fixed else 0,
-            round(place.altitude_amsl_m * 1e3) if fixed else 0,
+            *(place.scaled if fixed else (0, 0, 0)),
             121 if fixed else 9999,
             200 if fixed else 9999,
             round(body.ground_speed_mps * 100),
-            round(course_cdeg(body.north_mps, body.east_mps)),
+            round(course_deg % 360 * 100),
             10 if fixed else 0,
             alt_ellipsoid=round(height_m * 1e3) if fixed else 0,
         )
-
-
-def course_cdeg(north_mps: float, east_mps: float) -> float:
-    """Direction of movement, 0..36000."""
-    return math.degrees(math.atan2(east_mps, north_mps)) % 360 * 100
 
 
 FULL_V, EMPTY_V = 12.6, 10.2

@@ -123,8 +123,7 @@ class Px4Reports(Component):
             self._time_us,
             maneuver.circle.radius_m,
             dialect.MAV_FRAME_GLOBAL,
-            round(center.latitude_deg * 1e7),
-            round(center.longitude_deg * 1e7),
+            *center.scaled[:2],
             center.altitude_amsl_m,
         )
 

@@ -39,14 +39,6 @@ class Upload:
         """The index of the item that is to come."""
         return len(self.items)
 
-    def should_ask(self, now_s: float, after_s: float) -> bool:
-        """It is time to ask again for an item that did not come."""
-        return now_s - self.asked_s >= after_s
-
-    def abandoned(self, now_s: float, after_s: float) -> bool:
-        """No item has come for so long."""
-        return now_s - self.received_s > after_s
-
 
 ERROR, UNSUPPORTED, NO_SPACE = 1, 3, 4
 INVALID_SEQUENCE, DENIED, CANCELLED = 13, 14, 15
@@ -81,14 +73,16 @@ class MissionServer(Component):
         upload, now_s = self.upload, self.autopilot.now_s
         if upload is None:
             return
-        if upload.abandoned(now_s, GIVE_UP_S if self._ardupilot else PX4_GIVES_UP_S):
+        give_up_s = GIVE_UP_S if self._ardupilot else PX4_GIVES_UP_S
+        ask_again_s = ASK_AGAIN_S if self._ardupilot else PX4_ASKS_AGAIN_S
+        if now_s - upload.received_s > give_up_s:
             self.upload = None
             if self._ardupilot:
                 self.autopilot.warn(f"{NAMES[upload.kind]} upload timeout")
                 self._acknowledge(upload.uploader, upload.kind, CANCELLED)
             else:
                 self.autopilot.warn("Mission sync timeout")
-        elif upload.should_ask(now_s, ASK_AGAIN_S if self._ardupilot else PX4_ASKS_AGAIN_S):
+        elif now_s - upload.asked_s >= ask_again_s:
             self._ask(upload)
 
     @property
@@ -230,8 +224,7 @@ class MissionServer(Component):
         """Item 0 is the home position, whatever was uploaded there."""
         autopilot = self.autopilot
         place = autopilot.frame.to_location(autopilot.home.point)
-        x, y = round(place.latitude_deg * 1e7), round(place.longitude_deg * 1e7)
-        return Item(0, 16, 0, 0, 0, 0, x, y, round(place.altitude_amsl_m, 2))
+        return Item(0, 16, 0, 0, 0, 0, *place.scaled[:2], round(place.altitude_amsl_m, 2))
 
     @on_message("MISSION_CLEAR_ALL")
     def _clear(self, message: Any, sender: Sender) -> None:
