@@ -43,9 +43,16 @@ _TYPES = ("LineString", "MultiPoint", "Polygon", "Point", "Feature", "FeatureCol
 
 
 class GeometryError(M2pemError, ValueError):
-    """A geometry cannot be used; the message says where in it, why, and what would be right."""
+    """A geometry cannot be used; the message says where in it, why, and what would be right.
+
+    `remedy`: what would be right, where a list of problems has it apart from the message.
+    """
 
     exit_status = 2
+
+    def __init__(self, message: str, remedy: str = "") -> None:
+        super().__init__(message)
+        self.remedy = remedy
 
 
 def parse_geojson(value: Mapping[str, Any]) -> Point | Route | Area:

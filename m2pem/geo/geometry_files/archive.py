@@ -5,7 +5,6 @@ from io import BytesIO
 from zipfile import BadZipFile, ZipFile
 
 from m2pem.geo.geojson import GeometryError
-from m2pem.geo.geometry_files.contents import FeatureProblemError
 
 MAX_MEMBERS = 1_000
 MAX_UNPACKED_BYTES = 50_000_000
@@ -30,7 +29,7 @@ def archive_of(content: bytes) -> Archive:
     except (BadZipFile, ValueError, NotImplementedError, OSError) as error:
         raise GeometryError(f"is no ZIP archive: {error}") from None
     if len(archive.infolist()) > MAX_MEMBERS:
-        raise FeatureProblemError(
+        raise GeometryError(
             f"has more than {MAX_MEMBERS} members", "put only the geometries into it"
         )
     return archive
@@ -54,6 +53,6 @@ def member(archive: Archive, name: str) -> bytes:
         before = " with what was read before it" if archive.left_bytes < MAX_UNPACKED_BYTES else ""
         archive.left_bytes = 0
         limit = f"{MAX_UNPACKED_BYTES / 1_000_000:g} MB"
-        raise FeatureProblemError(f"{name} is larger than {limit} unpacked{before}", "split it")
+        raise GeometryError(f"{name} is larger than {limit} unpacked{before}", "split it")
     archive.left_bytes -= len(content)
     return content

@@ -56,14 +56,6 @@ class GeometryFile:
     problems: tuple[FileProblem, ...]
 
 
-class FeatureProblemError(GeometryError):
-    """A `GeometryError` with what would be right."""
-
-    def __init__(self, message: str, remedy: str) -> None:
-        super().__init__(message)
-        self.remedy = remedy
-
-
 class Contents:
     """Collects the geometries and problems of one file.
 
@@ -88,8 +80,7 @@ class Contents:
         try:
             yield
         except GeometryError as error:
-            remedy = error.remedy if isinstance(error, FeatureProblemError) else ""
-            self.note(FileProblem(Severity.ERROR, name, str(error), remedy, kind))
+            self.note(FileProblem(Severity.ERROR, name, str(error), error.remedy, kind))
 
     def add(self, name: str, geometry: Point | Route | Area) -> None:
         """Add a geometry under a valid and unique form of its name, with altitudes above mean sea
@@ -100,9 +91,7 @@ class Contents:
         """
         if len(self._geometries) >= MAX_FEATURES:
             self.is_full = True
-            raise FeatureProblemError(
-                f"is beyond the first {MAX_FEATURES} features", "split the file"
-            )
+            raise GeometryError(f"is beyond the first {MAX_FEATURES} features", "split the file")
         count = _count(geometry)
         self.expect(count)
         self._positions += count
@@ -117,7 +106,7 @@ class Contents:
             GeometryError: the file has too many.
         """
         if self._positions + positions > MAX_POSITIONS:
-            raise FeatureProblemError(
+            raise GeometryError(
                 f"the file has more than {MAX_POSITIONS:,} positions", "simplify its lines"
             )
 

@@ -21,12 +21,7 @@ from m2pem.geo.geojson import (
     with_frames,
     with_speeds,
 )
-from m2pem.geo.geometry_files.contents import (
-    MAX_POSITIONS,
-    Contents,
-    FeatureProblemError,
-    NamedGeometry,
-)
+from m2pem.geo.geometry_files.contents import MAX_POSITIONS, Contents, NamedGeometry
 from m2pem.mission.geometry import Area, Coordinate, Point, Route
 from m2pem.suggestions import suggest
 from m2pem.units import LENGTHS_IN_FILES, UNITS, Dimension
@@ -156,7 +151,7 @@ def read_csv(content: bytes, contents: Contents) -> None:
         for index in commands:
             text, is_command = row[index], _COMMAND.fullmatch(header[index])
             if _NO_WAYPOINT.fullmatch(text) or (is_command and text.lower() not in _WAYPOINTS):
-                raise FeatureProblemError(
+                raise GeometryError(
                     f"line {number}: {header[index]} {text[:40]!r} is no waypoint",
                     "leave its row out, and draw it as a task of the mission",
                 )
@@ -247,7 +242,7 @@ def _columns(
 ) -> tuple[dict[int, Column], list[int]]:
     """Return the columns that are read, by their index, and the indices of those that command."""
     if len(header) > MAX_COLUMNS:
-        raise FeatureProblemError(f"{where}: has more than {MAX_COLUMNS} columns", "leave some out")
+        raise GeometryError(f"{where}: has more than {MAX_COLUMNS} columns", "leave some out")
     columns: dict[str, tuple[int, Column]] = {}
     left, commands, stops = [], [], []
     for index, text in enumerate(header):
@@ -269,14 +264,14 @@ def _columns(
             columns[column.name] = (index, column)
     for needed in ("lat", "lon"):
         if needed not in columns:
-            raise FeatureProblemError(
+            raise GeometryError(
                 f"{where}: there is no column '{needed}' among {', '.join(header)[:200]!r}",
                 "the header is, for example, name,lat_deg,lon_deg,alt_m",
             )
     if "altitude_frame" in columns and "alt" in columns and columns["alt"][1].frame:
         stops.append((f"{where}: two columns say what heights are above", "leave one of them out"))
     if stops:
-        raise FeatureProblemError(*stops[0])
+        raise GeometryError(*stops[0])
     if "alt" in columns:
         index, column = columns["alt"]
         if not column.unit:
@@ -336,13 +331,13 @@ def _geometry(rows: Iterable[tuple[int, _Cells]], default: str) -> Point | Route
         where = f"line {number}"
         given = _cell(cells, "kind").lower() or kind
         if given and given not in _KINDS:
-            raise FeatureProblemError(
+            raise GeometryError(
                 f"{where}: kind {given!r} is not known", f"one of {', '.join(_KINDS)}"
             )
         frames.append(_frame(cells, where))
         is_mixed = frames[-1] != frames[0] and (given or default) in ("area", "point")
         if (kind and given != kind) or is_mixed:
-            raise FeatureProblemError(
+            raise GeometryError(
                 f"{where}: kind or altitude_frame differs from the rows before",
                 "rows of one name have the same ones, but the altitude_frame of a route",
             )

@@ -6,12 +6,7 @@ from pathlib import PurePath
 from typing import TypeAlias
 
 from m2pem.geo.geojson import GeometryError
-from m2pem.geo.geometry_files.contents import (
-    Contents,
-    FeatureProblemError,
-    GeometryFile,
-    NamedGeometry,
-)
+from m2pem.geo.geometry_files.contents import Contents, GeometryFile, NamedGeometry
 from m2pem.geo.geometry_files.csv_file import read_csv, write_csv
 from m2pem.geo.geometry_files.geojson_file import read_geojson, write_geojson
 from m2pem.geo.geometry_files.kml_file import read_kml, read_kmz, write_kml
@@ -80,12 +75,12 @@ def read_geometry_file(name: str, content: bytes, kind: str = "") -> GeometryFil
         reader = _READERS.get(suffix)
         if reader is None:
             known = ", ".join(READ_SUFFIXES)
-            raise FeatureProblemError(
+            raise GeometryError(
                 f"has the suffix {suffix!r}" if suffix else "its name has no suffix",
                 _HINTS.get(suffix, f"one of {known} is read"),
             )
         if len(content) > MAX_BYTES:
-            raise FeatureProblemError(
+            raise GeometryError(
                 f"is larger than {MAX_BYTES / 1_000_000:g} MB", "split it, or simplify its lines"
             )
         reader(content, contents)

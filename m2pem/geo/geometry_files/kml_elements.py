@@ -8,7 +8,6 @@ from typing import TypeAlias
 from lxml import etree
 
 from m2pem.geo.geojson import GeometryError, coordinate
-from m2pem.geo.geometry_files.contents import FeatureProblemError
 from m2pem.mission.geometry import Coordinate
 
 Element: TypeAlias = etree._Element
@@ -39,7 +38,7 @@ def kml_root(content: bytes) -> Element:
     """
     # Before the parser: a document type could declare entities, and those could be huge.
     if b"<!DOCTYPE" in content[:100_000].upper() or b"<!ENTITY" in content[:100_000].upper():
-        raise FeatureProblemError("has a document type", "save it as KML without one")
+        raise GeometryError("has a document type", "save it as KML without one")
     try:
         root = _parsed(content)
     except (etree.XMLSyntaxError, ValueError, OSError) as error:
@@ -48,7 +47,7 @@ def kml_root(content: bytes) -> Element:
         except (etree.XMLSyntaxError, ValueError, OSError):
             raise GeometryError(f"is not XML: {str(error)[:200]}") from None
     if root.getroottree().docinfo.internalDTD is not None:
-        raise FeatureProblemError("has a document type", "save it as KML without one")
+        raise GeometryError("has a document type", "save it as KML without one")
     if local_name(root) not in _ROOTS:
         found = local_name(root)
         raise GeometryError(f"is not KML: its root is {found!r}, where 'kml' is expected")
@@ -110,7 +109,7 @@ def coordinates(element: Element, keeps_altitude: bool) -> list[Coordinate]:
     for number, word in enumerate(_SPACE_AFTER_COMMA.sub(",", text).split(), start=1):
         parts = word.split(",")
         if not 2 <= len(parts) <= 3:
-            raise FeatureProblemError(
+            raise GeometryError(
                 f"position {number}: {word[:60]!r} is no position", "write longitude,latitude"
             )
         positions.append(position(parts, keeps_altitude, number))

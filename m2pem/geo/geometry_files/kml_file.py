@@ -26,12 +26,7 @@ from m2pem.geo.geojson import (
     with_speeds,
 )
 from m2pem.geo.geometry_files.archive import archive_of, member
-from m2pem.geo.geometry_files.contents import (
-    MAX_POSITIONS,
-    Contents,
-    FeatureProblemError,
-    NamedGeometry,
-)
+from m2pem.geo.geometry_files.contents import MAX_POSITIONS, Contents, NamedGeometry
 from m2pem.geo.geometry_files.csv_file import warn_of_fields
 from m2pem.geo.geometry_files.kml_elements import (
     POSITION,
@@ -71,7 +66,7 @@ def read_kmz(content: bytes, contents: Contents) -> None:
         members = [name for name in archive.namelist() if name.lower().endswith(".kml")]
         waylines = [each for each in archive.namelist() if each.lower().endswith("waylines.wpml")]
         if not members and not waylines:
-            raise FeatureProblemError("has no .kml", "save it again as .kml or .kmz")
+            raise GeometryError("has no .kml", "save it again as .kml or .kmz")
         first = (waylines or [each for each in members if each == "doc.kml"] or members)[0]
         documents = [first]
         for name in documents:  # which grows by what they link
@@ -168,10 +163,10 @@ def _geometry(
     local = local_name(element)
     mode = _mode(element)
     if local == "Model":
-        raise FeatureProblemError("a Model is not read", "give its place as a Point")
+        raise GeometryError("a Model is not read", "give its place as a Point")
     if not own_frame and mode not in ("", *KML_CLAMPED, *KML_FRAMES):
         is_known = "is above the sea floor" if mode == "relativeToSeaFloor" else "is not known"
-        raise FeatureProblemError(
+        raise GeometryError(
             f"altitudeMode {mode!r} {is_known}", f"one of clampToGround, {', '.join(KML_FRAMES)}"
         )
     keeps = bool(own_frame) or mode in KML_FRAMES

@@ -11,11 +11,7 @@ from typing import Any
 
 from m2pem.geo.file_text import decoded, parsed_json
 from m2pem.geo.geojson import GeometryError, coordinate
-from m2pem.geo.geometry_files.contents import (
-    Contents,
-    FeatureProblemError,
-    NamedGeometry,
-)
+from m2pem.geo.geometry_files.contents import Contents, NamedGeometry
 from m2pem.geo.geometry_files.mission_commands import KEEP_OUT
 from m2pem.geo.geometry_files.mission_items import (
     LARGEST_M,
@@ -86,7 +82,7 @@ def read_plan(content: bytes, contents: Contents) -> None:
     mission = _mapping(plan.get("mission"))
     versions = plan.get("version", 1), mission.get("version", 2)
     if versions != (1, 2):
-        raise FeatureProblemError(
+        raise GeometryError(
             f"has the versions {versions} of the plan and its mission; (1, 2) are known",
             "open it in QGroundControl and save it again",
         )
@@ -119,7 +115,7 @@ def _simple_item_of(item: Mapping[str, Any], number: int, where: str) -> Mission
     if isinstance(place, list) and len(params) == 4:
         params = [*params, *place]  # as QGroundControl wrote it at first
     if item.get("AltitudeMode") == _CALCULATED and params[6:] == [None]:
-        raise FeatureProblemError(
+        raise GeometryError(
             f"{where}: its altitude above the terrain is not calculated",
             "save the plan again in QGroundControl, once it has the heights of the ground",
         )
@@ -150,9 +146,9 @@ def _read_complex(
             contents.warn(where, "a landing is left out", remedy, "route")
         elif kind == "StructureScan":
             remedy = "a task `orbit` around its middle, or a route around it at each height"
-            raise FeatureProblemError("its polygon is a building, no area to survey", remedy)
+            raise GeometryError("its polygon is a building, no area to survey", remedy)
         else:
-            raise FeatureProblemError("is not read", "draw what it does as tasks of the mission")
+            raise GeometryError("is not read", "draw what it does as tasks of the mission")
 
 
 def _mapping(value: object) -> Mapping[str, Any]:
@@ -169,7 +165,7 @@ def _corridor(item: Mapping[str, Any]) -> Area:
     if not isinstance(line, list) or len(line) < 2:
         raise GeometryError("polyline: at least two positions are expected")
     if not isinstance(width_m, int | float) or not 0 < width_m < LARGEST_M:
-        raise FeatureProblemError("its CorridorWidth is no width", "give it one in metres")
+        raise GeometryError("its CorridorWidth is no width", "give it one in metres")
     places = [_corner(each, f"polyline[{index}]") for index, each in enumerate(line)]
     frame = LocalFrame(places[0])
     middle = [(*frame.to_local(place), 0.0) for place in places]
@@ -178,7 +174,7 @@ def _corridor(item: Mapping[str, Any]) -> Area:
         return polygon([frame.to_latlon(each[:2]) for each in sides])
     except GeometryError as error:
         remedy = f"draw it as an area, {width_m:g} m wide"
-        raise FeatureProblemError(f"its sides cross: {error}", remedy) from None
+        raise GeometryError(f"its sides cross: {error}", remedy) from None
 
 
 def _read_fence(plan: Mapping[str, Any], contents: Contents) -> None:
@@ -243,7 +239,7 @@ def read_waypoints(content: bytes, contents: Contents) -> None:
     rows = [(number, line) for number, line in enumerate(lines, 1) if line and line[0][0] != "#"]
     header = " ".join(rows[0][1]) if rows else ""
     if header not in (WPL_HEADER, _WITHOUT_HOME):
-        raise FeatureProblemError(
+        raise GeometryError(
             f"is not a waypoint file: line {rows[0][0] if rows else 1} is not '{WPL_HEADER}'",
             "save the mission, fence or rally points again by the ground station",
         )

@@ -14,8 +14,8 @@ from pyproj import CRS
 from pyproj.exceptions import CRSError, ProjError
 
 from m2pem.geo.datums import DatumError, ToSeaLevel, heights_of, to_wgs84, unbound
-from m2pem.geo.geojson import crs_name
-from m2pem.geo.geometry_files.contents import Contents, FeatureProblemError
+from m2pem.geo.geojson import GeometryError, crs_name
+from m2pem.geo.geometry_files.contents import Contents
 
 MAX_WKT_CHARACTERS = 20_000
 _EXPORT = "export it as WGS 84 (EPSG:4326), with heights in metres"
@@ -35,7 +35,7 @@ class ReferenceSystem:
     `has_heights`: it says what its Z values are, so that they can be above mean sea level.
 
     Raises:
-        FeatureProblemError: positions of this system cannot be converted; it says why.
+        GeometryError: positions of this system cannot be converted; it says why.
     """
 
     def __init__(self, crs: CRS) -> None:
@@ -61,7 +61,7 @@ class ReferenceSystem:
         system that has some are above mean sea level afterwards.
 
         Raises:
-            FeatureProblemError: a position, or a height, cannot be converted.
+            GeometryError: a position, or a height, cannot be converted.
         """
         result = []
         for given, (longitude, latitude, height) in zip(
@@ -91,13 +91,13 @@ class ReferenceSystem:
         try:
             return heights_of(self._crs)
         except DatumError as error:
-            raise FeatureProblemError(str(error), _EXPORT_HEIGHTS) from None
+            raise GeometryError(str(error), _EXPORT_HEIGHTS) from None
 
     def _unit_m(self, height: float) -> float:
         is_metre = self._axis.unit_conversion_factor == 1.0 or _ANGLE.match(self._axis.unit_name)
         if height and not (self.has_heights or is_metre):
             what = f"{self.name!r} is in {self._axis.unit_name!r} and does not say in which"
-            raise FeatureProblemError(f"{what} unit the height {height:g} is", _EXPORT)
+            raise GeometryError(f"{what} unit the height {height:g} is", _EXPORT)
         return self._heights[0]
 
     def _converted(
@@ -136,40 +136,40 @@ class ReferenceSystem:
             self._accuracies_m[used[0]] = operation.accuracy
         return True
 
-    def _refused(self, why: str) -> FeatureProblemError:
+    def _refused(self, why: str) -> GeometryError:
         message = f"is of {self.name!r}, which cannot be converted: {why}"
-        return FeatureProblemError(message, _EXPORT)
+        return GeometryError(message, _EXPORT)
 
 
 def system_of_wkt(text: str) -> ReferenceSystem:
     """Return the system of a .prj: WKT as Esri or GDAL write it, or WKT 2 (OGC 18-010r7).
 
     Raises:
-        FeatureProblemError: it is none, or one whose positions cannot be converted.
+        GeometryError: it is none, or one whose positions cannot be converted.
     """
     name = " ".join(text.partition('"')[2].partition('"')[0].split())[:80]
     if len(text) > MAX_WKT_CHARACTERS or _NAMES_A_FILE.search(text):
-        raise FeatureProblemError(f"its .prj {name!r} refers to a grid, or is too long", _EXPORT)
+        raise GeometryError(f"its .prj {name!r} refers to a grid, or is too long", _EXPORT)
     try:
         return ReferenceSystem(CRS.from_wkt(text))
     except CRSError as error:
         message = f"its .prj {name!r} cannot be read: {str(error)[:120]}"
-        raise FeatureProblemError(message, _EXPORT) from None
+        raise GeometryError(message, _EXPORT) from None
 
 
 def system_named(crs: object) -> ReferenceSystem:
     """Return a system by its name, such as EPSG:25832, or by the `crs` of GeoJSON of 2008.
 
     Raises:
-        FeatureProblemError: it names none by authority and code, or one that cannot be converted.
+        GeometryError: it names none by authority and code, or one that cannot be converted.
     """
     name = crs_name(crs)
     found = _AUTHORITY.fullmatch(name)
     if found is None:
         message = f"its 'crs' {(name or str(crs))[:80]!r} is not known"
-        raise FeatureProblemError(message, "name it as EPSG:25832, say")
+        raise GeometryError(message, "name it as EPSG:25832, say")
     try:
         return ReferenceSystem(CRS.from_authority(found[1].upper(), found[2]))
     except CRSError:
         message = f"its 'crs' {name[:80]!r} is not known to PROJ"
-        raise FeatureProblemError(message, _EXPORT) from None
+        raise GeometryError(message, _EXPORT) from None

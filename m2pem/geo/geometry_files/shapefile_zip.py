@@ -10,7 +10,7 @@ import shapefile
 
 from m2pem.geo.geojson import GeometryError, stated_frame
 from m2pem.geo.geometry_files.archive import Archive, archive_of, member
-from m2pem.geo.geometry_files.contents import MAX_FEATURES, Contents, FeatureProblemError
+from m2pem.geo.geometry_files.contents import MAX_FEATURES, Contents
 from m2pem.geo.geometry_files.csv_file import warn_of_fields
 from m2pem.geo.geometry_files.geojson_file import read_feature
 from m2pem.geo.geometry_files.reference_system import ReferenceSystem, system_named, system_of_wkt
@@ -38,7 +38,7 @@ def read_shapefiles(content: bytes, contents: Contents) -> None:
     with archive_of(content) as archive:
         layers = [name for name in archive.namelist() if name.lower().endswith(".shp")]
         if not layers:
-            raise FeatureProblemError("has no .shp", "put .shp, .dbf, .shx and .prj into it")
+            raise GeometryError("has no .shp", "put .shp, .dbf, .shx and .prj into it")
         for name in layers:
             with contents.feature(name):
                 _read_layer(archive, name, contents)
@@ -81,7 +81,7 @@ def _read_shapes(
     warned = False
     for index in range(len(layer)):
         if index > MAX_FEATURES:
-            raise FeatureProblemError(f"has more than {MAX_FEATURES} shapes", "split the layer")
+            raise GeometryError(f"has more than {MAX_FEATURES} shapes", "split the layer")
         shape = layer.shape(index)
         values = layer.record(index).as_dict() if has_records else {}
         lower = {str(key).lower(): value for key, value in values.items()}
@@ -136,7 +136,7 @@ def _geometry(shape: "shapefile.Shape", where: str, contents: Contents) -> dict[
         return {"type": "MultiPoint", "coordinates": places}
     if kind not in (*_LINES, *_POLYGONS):
         remedy = "export points, multi-points, lines or polygons"
-        raise FeatureProblemError(f"is a {shape.shapeTypeName}", remedy)
+        raise GeometryError(f"is a {shape.shapeTypeName}", remedy)
     ends = [*shape.parts[1:], len(places)]
     parts = [places[start:end] for start, end in zip(shape.parts, ends, strict=True)]
     if kind in _LINES:

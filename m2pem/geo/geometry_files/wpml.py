@@ -9,7 +9,7 @@ from collections import defaultdict
 from math import isfinite, nan
 
 from m2pem.geo.geojson import GeometryError
-from m2pem.geo.geometry_files.contents import Contents, FeatureProblemError
+from m2pem.geo.geometry_files.contents import Contents
 from m2pem.geo.geometry_files.kml_elements import Element, child_text, coordinates
 from m2pem.mission.geometry import Coordinate, Route
 
@@ -55,7 +55,7 @@ def read_waylines(root: Element, contents: Contents) -> None:
         with contents.feature(where):
             kind = child_text(folder, "templateType") or "waypoint"
             if kind != "waypoint":
-                raise FeatureProblemError(
+                raise GeometryError(
                     f"is a template of {kind!r}", "export the KMZ with its waylines.wpml"
                 )
             route = _route(folder)
@@ -69,7 +69,7 @@ def _route(folder: Element) -> Route:
         mode = mode or child_text(system, "heightMode")
     if mode not in _FRAME_OF:
         known = ", ".join(_FRAME_OF)
-        raise FeatureProblemError(f"its height mode {mode!r} is not known", f"one of {known}")
+        raise GeometryError(f"its height mode {mode!r} is not known", f"one of {known}")
     waypoints: list[Coordinate] = []
     speeds: list[float] = []
     for number, placemark in _in_order(folder):
