@@ -6,7 +6,7 @@ https://mavlink.io/en/file_formats/.
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import zip_longest
+from itertools import count, zip_longest
 from typing import Any
 
 from m2pem.geo.file_text import decoded, parsed_json
@@ -23,6 +23,7 @@ from m2pem.geo.geometry_files.mission_items import (
 )
 from m2pem.geo.local_frame import LatLon, LocalFrame
 from m2pem.geo.polyline import shifted
+from m2pem.geo.positions import positions
 from m2pem.mission.geometry import Area, Coordinate, Point, Route
 
 _WAYPOINT = 16
@@ -43,8 +44,8 @@ _MISSION_FRAME = 2
 _FRAME_NUMBERS = {"amsl": 0, "relative": 3, "terrain": 10}
 """MAV_FRAME_GLOBAL, _RELATIVE_ALT, _TERRAIN_ALT."""
 
-_ALTITUDE_MODES = {"relative": 1, "amsl": 2, "terrain": 4}
-"""QGroundControl's AltitudeMode."""
+_ALTITUDE_MODES: Mapping[object, int] = {3: 1, 0: 2, 10: 4}
+"""QGroundControl's AltitudeMode, by MAV_FRAME."""
 _CALCULATED = 3
 """AltitudeMode of a height above ground that QGroundControl has made an altitude above sea level:
 the altitude is null until it knows the ground."""
@@ -279,9 +280,8 @@ def write_plan(geometries: Sequence[NamedGeometry], altitude_m: float | None) ->
     Raises:
         GeometryError: there are two routes, or a waypoint has no altitude.
     """
-    route = _only_route(geometries)
-    waypoints = list(_waypoints(route, altitude_m)) if route is not None else []
-    frames = _frames(route)
+    name, route = _only_route(geometries)
+    items = [_simple_item(item) for item in _items(name, route, altitude_m)]
     polygons = [
         {
             "polygon": [list(corner[:2]) for corner in ring[:-1]],
@@ -292,8 +292,13 @@ def write_plan(geometries: Sequence[NamedGeometry], altitude_m: float | None) ->
         if isinstance(each.geometry, Area)
         for index, ring in enumerate(each.geometry.rings)
     ]
-    rally = [_rally(each, altitude_m) for each in geometries if isinstance(each.geometry, Point)]
-    home = next((place[:2] for place in waypoints), None) or next(_places(geometries))[:2]
+    rally = [
+        _rally(each.name, each.geometry, altitude_m)
+        for each in geometries
+        if isinstance(each.geometry, Point)
+    ]
+    home = next(positions(route if route.waypoints else geometries[0].geometry))[:2]
+    is_mixed = len(set(route.frames)) > 1
     plan = {
         "fileType": "Plan",
         "version": 1,
@@ -304,14 +309,11 @@ def write_plan(geometries: Sequence[NamedGeometry], altitude_m: float | None) ->
             "vehicleType": 2,
             "cruiseSpeed": 15,
             "hoverSpeed": 5,
-            "globalPlanAltitudeMode": _ALTITUDE_MODES[frames[0]]
-            if len(set(frames)) == 1
-            else _MIXED,
+            "globalPlanAltitudeMode": _MIXED
+            if is_mixed
+            else _ALTITUDE_MODES[_FRAME_NUMBERS[route.altitude_frame]],
             "plannedHomePosition": [*home, 0],
-            "items": [
-                _simple_item(number, *item)
-                for number, item in enumerate(_items(route, waypoints), start=1)
-            ],
+            "items": items,
         },
         "geoFence": {"version": 2, "circles": [], "polygons": polygons},
         "rallyPoints": {"version": 2, "points": rally},
@@ -325,104 +327,80 @@ def write_waypoints(geometries: Sequence[NamedGeometry], altitude_m: float | Non
     Raises:
         GeometryError: there is not one route alone, or a waypoint has no altitude.
     """
-    route = _only_route(geometries)
-    others = [each.name for each in geometries if not isinstance(each.geometry, Route)]
-    if others or route is None:
+    name, route = _only_route(geometries)
+    if len(geometries) > 1 or not route.waypoints:
         raise GeometryError(
             "holds one route and nothing else: choose a route, or .plan or .geojson"
         )
-    waypoints = list(_waypoints(route, altitude_m))
-    rows: list[tuple[float, ...]] = [(0, 1, 0, _WAYPOINT, 0, 0, 0, 0, *waypoints[0][:2], 0.0, 1)]
-    for index, (command, params, frame) in enumerate(_items(route, waypoints), start=1):
-        own = _FRAME_NUMBERS[frame] if command == _WAYPOINT else _MISSION_FRAME
-        rows.append((index, 0, own, command, *(each or 0 for each in params), 1))
+    home = route.waypoints[0][:2]
+    rows: list[tuple[object, ...]] = [(0, 1, 0, _WAYPOINT, 0, 0, 0, 0, *home, 0.0, 1)]
+    for item in _items(name, route, altitude_m):
+        params = (each or 0 for each in item.params)
+        rows.append((item.number, 0, item.frame, item.command, *params, 1))
     lines = ("\t".join(str(number) for number in row) for row in rows)
     return "\n".join((WPL_HEADER, *lines, "")).encode()
 
 
-def _items(
-    route: NamedGeometry | None, waypoints: Sequence[tuple[float, float, float]]
-) -> Iterator[tuple[int, tuple[float | None, ...], str]]:
-    """Yield the commands of a route with their seven parameters and altitude frames: waypoints, and
-    the speed behind each that has one."""
-    geometry = route.geometry if route is not None else None
-    speeds = geometry.speeds_m_s if isinstance(geometry, Route) else ()
-    for place, frame, speed in zip_longest(waypoints, _frames(route)[: len(waypoints)], speeds):
-        yield _WAYPOINT, (0, 0, 0, None, *place), frame
+def _items(name: str, route: Route, altitude_m: float | None) -> Iterator[MissionItem]:
+    """Yield the waypoints of a route, and the speed behind each that has one."""
+    number = count(1)
+    places = _with_altitudes(name, route.waypoints, altitude_m)
+    for place, frame, speed in zip_longest(places, route.frames, route.speeds_m_s):
+        params = (0, 0, 0, None, *place)
+        yield MissionItem(next(number), "", _WAYPOINT, _FRAME_NUMBERS[frame], params)
         if speed is not None:
-            yield _CHANGE_SPEED, (_GROUND_SPEED, speed, -1, 0, 0, 0, 0), frame
+            params = (_GROUND_SPEED, speed, -1, 0, 0, 0, 0)
+            yield MissionItem(next(number), "", _CHANGE_SPEED, _MISSION_FRAME, params)
 
 
-def _frames(route: NamedGeometry | None) -> tuple[str, ...]:
-    geometry = route.geometry if route is not None else None
-    return geometry.frames if isinstance(geometry, Route) else ("relative",)
-
-
-def _simple_item(
-    number: int, command: int, params: Sequence[float | None], frame: str
-) -> dict[str, Any]:
-    item = {
+def _simple_item(item: MissionItem) -> dict[str, Any]:
+    simple = {
         "type": "SimpleItem",
-        "command": command,
-        "frame": _FRAME_NUMBERS[frame] if command == _WAYPOINT else _MISSION_FRAME,
-        "params": list(params),
+        "command": item.command,
+        "frame": item.frame,
+        "params": list(item.params),
         "autoContinue": True,
-        "doJumpId": number,
+        "doJumpId": item.number,
     }
-    if command != _WAYPOINT:
-        return item
-    return {
-        **item,
-        "AltitudeMode": _ALTITUDE_MODES[frame],
-        "Altitude": params[6],
-        "AMSLAltAboveTerrain": None,
-    }
+    if item.command == _WAYPOINT:
+        simple["AltitudeMode"] = _ALTITUDE_MODES[item.frame]
+        simple["Altitude"] = item.params[6]
+        simple["AMSLAltAboveTerrain"] = None
+    return simple
 
 
-def _only_route(geometries: Sequence[NamedGeometry]) -> NamedGeometry | None:
-    routes = [each for each in geometries if isinstance(each.geometry, Route)]
+def _only_route(geometries: Sequence[NamedGeometry]) -> tuple[str, Route]:
+    """Return the one route and its name; one without waypoints: there is none."""
+    routes = [(each.name, each.geometry) for each in geometries if isinstance(each.geometry, Route)]
     if len(routes) > 1:
-        names = ", ".join(each.name for each in routes[:5])
+        names = ", ".join(name for name, _ in routes[:5])
         raise GeometryError(f"holds one route, not {len(routes)} ({names}): choose one")
-    return routes[0] if routes else None
+    return routes[0] if routes else ("", Route(()))
 
 
-def _waypoints(
-    route: NamedGeometry, altitude_m: float | None
+def _with_altitudes(
+    name: str, waypoints: Sequence[Coordinate], altitude_m: float | None
 ) -> Iterator[tuple[float, float, float]]:
-    positions = route.geometry.waypoints if isinstance(route.geometry, Route) else ()
-    for number, (latitude, longitude, altitude) in enumerate(positions, start=1):
+    for number, (latitude, longitude, altitude) in enumerate(waypoints, start=1):
         height = altitude_m if altitude is None else altitude
         if height is None:
             raise GeometryError(
-                f"{route.name}: waypoint {number} has no altitude, and one is needed: give it one, "
+                f"{name}: waypoint {number} has no altitude, and one is needed: give it one, "
                 "or say which those without one get (altitude_m)"
             )
         if not latitude and not longitude:
             raise GeometryError(
-                f"{route.name}: waypoint {number} is at 0, 0, which in such files means where the "
+                f"{name}: waypoint {number} is at 0, 0, which in such files means where the "
                 "vehicle is: move it by a little"
             )
         yield latitude, longitude, height
 
 
-def _rally(point: NamedGeometry, altitude_m: float | None) -> list[float]:
-    place = point.geometry.position if isinstance(point.geometry, Point) else (0.0, 0.0, None)
-    if point.geometry.altitude_frame != "relative":
+def _rally(name: str, point: Point, altitude_m: float | None) -> list[float]:
+    if point.altitude_frame != "relative":
         raise GeometryError(
-            f"{point.name}: a rally point is {point.geometry.altitude_frame}, and only altitudes "
+            f"{name}: a rally point is {point.altitude_frame}, and only altitudes "
             "above home can be written"
         )
-    ((latitude, longitude, height),) = _waypoints(
-        NamedGeometry(point.name, Route((place,))), altitude_m
-    )
-    return [latitude, longitude, height]
-
-
-def _places(geometries: Sequence[NamedGeometry]) -> Iterator[Coordinate]:
-    for each in geometries:
-        geometry = each.geometry
-        if isinstance(geometry, Point):
-            yield geometry.position
-        else:
-            yield from geometry.waypoints if isinstance(geometry, Route) else geometry.rings[0]
+    (place,) = _with_altitudes(name, (point.position,), altitude_m)
+    return list(place)
