@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from m2pem.findings import Severity
 from m2pem.geo.geojson import GeometryError, above_sea_level, kind_of
+from m2pem.geo.positions import positions
 from m2pem.mission.geometry import Area, Point, Route
 
 MAX_FEATURES = 1_000
@@ -92,7 +93,7 @@ class Contents:
         if len(self._geometries) >= MAX_FEATURES:
             self.is_full = True
             raise GeometryError(f"is beyond the first {MAX_FEATURES} features", "split the file")
-        count = _count(geometry)
+        count = sum(1 for _ in positions(geometry))
         self.expect(count)
         self._positions += count
         self._geometries.append(
@@ -153,11 +154,3 @@ def valid_name(text: str) -> str:
     """
     name = _NO_NAME.sub("_", unicodedata.normalize("NFC", text))
     return name.strip("._")[:MAX_NAME_CHARACTERS].rstrip(".")
-
-
-def _count(geometry: Point | Route | Area) -> int:
-    if isinstance(geometry, Route):
-        return len(geometry.waypoints)
-    if isinstance(geometry, Area):
-        return sum(len(ring) for ring in geometry.rings)
-    return 1

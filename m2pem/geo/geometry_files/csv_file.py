@@ -16,18 +16,17 @@ from m2pem.geo.geojson import (
     SPEEDS,
     GeometryError,
     checked,
+    checked_frame,
     coordinate,
     kind_of,
-    with_frames,
     with_speeds,
 )
 from m2pem.geo.geometry_files.contents import MAX_POSITIONS, Contents, NamedGeometry
+from m2pem.geo.positions import positions
 from m2pem.mission.geometry import Area, Coordinate, Point, Route
-from m2pem.suggestions import suggest
 from m2pem.units import LENGTHS_IN_FILES, UNITS, Dimension
 
-_SPEED = "speed_m_s"
-_HEADER = ("name", "kind", "ring", "lat_deg", "lon_deg", "alt_m", "altitude_frame")
+_HEADER = ("name", "kind", "ring", "lat_deg", "lon_deg", "alt_m", "altitude_frame", "speed_m_s")
 _NAMES = {
     **{name: name for name in ("lat", "lon", "alt", "name", "kind", "ring")},
     **dict.fromkeys(("latitude", "y", "breitengrad"), "lat"),
@@ -35,7 +34,7 @@ _NAMES = {
     **dict.fromkeys(("route", "title", "label", "id"), "name"),
     "type": "kind",
     **dict.fromkeys(("frame", "altitudeframe", "altitudemode", "altmode"), "altitude_frame"),
-    **dict.fromkeys(("speed", "velocity", "groundspeed"), _SPEED),
+    **dict.fromkeys(("speed", "velocity", "groundspeed"), "speed"),
 }
 """What a column holds, by its name without unit, spaces and underscores."""
 
@@ -74,7 +73,7 @@ _DEGREES = {
     **dict.fromkeys(("deg", "degree", "degrees", "°", "dd", "decimal", "decimal_degrees"), 1.0),
     **dict.fromkeys(("wgs84", "n", "e", "degrees_north", "degrees_east"), 1.0),
 }
-_UNITS = {"lat": _DEGREES, "lon": _DEGREES, "alt": LENGTHS_IN_FILES, _SPEED: _SPEEDS}
+_UNITS = {"lat": _DEGREES, "lon": _DEGREES, "alt": LENGTHS_IN_FILES, "speed": _SPEEDS}
 _FRAMES = f"in a column altitude_frame one of {', '.join(FILE_FRAMES)}; or leave it out"
 _OF_FLIGHT = {
     re.compile(r"(?!.*wind_?s).*(speed|velocity|geschwindigkeit)|(.*_)?vel(_|$)"): (
@@ -182,8 +181,8 @@ def _cells(row: Sequence[str], columns: Mapping[int, Column], is_litchi: bool) -
             (_LITCHI.get(word) if is_litchi else None) or _MODES.get(word, text),
             column,
         )
-    if is_litchi and _cell(cells, _SPEED) in ("0", "0.0"):
-        del cells[_SPEED]
+    if is_litchi and _cell(cells, "speed") in ("0", "0.0"):
+        del cells["speed"]
     return cells
 
 
@@ -192,28 +191,17 @@ def write_csv(geometries: Sequence[NamedGeometry]) -> bytes:
     and speed_m_s if a route has speeds."""
     table = StringIO()
     out = writer(table, lineterminator="\n")
-    have_speeds = any(_speeds(each.geometry) for each in geometries)
-    out.writerow((*_HEADER, _SPEED) if have_speeds else _HEADER)
+    speeds = (getattr(each.geometry, "speeds_m_s", ()) for each in geometries)
+    width = len(_HEADER) if any(speeds) else len(_HEADER) - 1
+    out.writerow(_HEADER[:width])
     for each in geometries:
-        geometry = each.geometry
-        kind = kind_of(geometry)
-        for ring, positions in enumerate(_rings(geometry)):
-            frames = geometry.frames if isinstance(geometry, Route) else ()
-            frames = frames or (geometry.altitude_frame,) * len(positions)
-            for position, frame, speed in zip_longest(positions, frames, _speeds(geometry)):
-                row = (each.name, kind, ring, *position, frame, speed)
-                out.writerow(row if have_speeds else row[:-1])
+        geometry, kind = each.geometry, kind_of(each.geometry)
+        rings = geometry.rings if isinstance(geometry, Area) else [tuple(positions(geometry))]
+        for number, ring in enumerate(rings):
+            line = geometry if isinstance(geometry, Route) else Route(ring, geometry.altitude_frame)
+            for place, frame, speed in zip_longest(ring, line.frames, line.speeds_m_s):
+                out.writerow((each.name, kind, number, *place, frame, speed)[:width])
     return table.getvalue().encode()
-
-
-def _speeds(geometry: Point | Route | Area) -> Sequence[float | None]:
-    return geometry.speeds_m_s if isinstance(geometry, Route) else ()
-
-
-def _rings(geometry: Point | Route | Area) -> Sequence[Sequence[Coordinate]]:
-    if isinstance(geometry, Area):
-        return geometry.rings
-    return ((geometry.position,),) if isinstance(geometry, Point) else (geometry.waypoints,)
 
 
 def _rows(text: str, delimiter: str) -> Iterator[tuple[int, list[str]]]:
@@ -311,7 +299,7 @@ def _column(text: str) -> tuple[Column | None, str]:
         key, unit = "".join(words[:start] + words[end:]), "_".join(words[start:end])
         name = "alt" if key in _HEIGHTS else _NAMES.get(key, "")
         scales = _UNITS.get(name, {})
-        if name and (unit in scales or (not unit and name != _SPEED)):
+        if name and (unit in scales or (not unit and name != "speed")):
             frame = _HEIGHTS[key] if name == "alt" else ""
             return Column(name, scales.get(unit, 1.0), frame, unit), "_".join(words)
     return None, "_".join(words)
@@ -334,7 +322,7 @@ def _geometry(rows: Iterable[tuple[int, _Cells]], default: str) -> Point | Route
             raise GeometryError(
                 f"{where}: kind {given!r} is not known", f"one of {', '.join(_KINDS)}"
             )
-        frames.append(_frame(cells, where))
+        frames.append(checked_frame(_cell(cells, "altitude_frame") or "relative", f"{where}: "))
         is_mixed = frames[-1] != frames[0] and (given or default) in ("area", "point")
         if (kind and given != kind) or is_mixed:
             raise GeometryError(
@@ -342,80 +330,48 @@ def _geometry(rows: Iterable[tuple[int, _Cells]], default: str) -> Point | Route
                 "rows of one name have the same ones, but the altitude_frame of a route",
             )
         kind = given
-        rings.setdefault(_cell(cells, "ring"), []).append(_position(cells, where))
-        speeds.append(_speed(cells, where))
-    kind, frame = kind or default, frames[0]
-    if kind == "area" and len(rings) > 1:
-        areas = [_positions_as(ring, frame, "area") for ring in rings.values()]
-        return Area(
-            checked(tuple(area.rings[0] for area in areas if isinstance(area, Area))), frame
+        latitude, longitude, altitude, speed = (
+            _number(cells, name, where) for name in ("lat", "lon", "alt", "speed")
         )
-    positions = [position for ring in rings.values() for position in ring]
-    is_route = len(positions) > 1 or any(speeds)
-    geometry = _positions_as(positions, frame, kind or ("route" if is_route else "point"))
-    geometry = with_frames(geometry, frames) if isinstance(geometry, Route) else geometry
+        place = coordinate(latitude, longitude, altitude, where)
+        rings.setdefault(_cell(cells, "ring"), []).append(place)
+        speeds.append(speed)
+    places = [place for ring in rings.values() for place in ring]
+    kind = kind or default or ("route" if len(places) > 1 or any(speeds) else "point")
+    geometry: Point | Route | Area
+    if kind == "area":
+        geometry = Area(checked(tuple(map(_closed, rings.values()))), frames[0])
+    elif kind == "point":
+        if len(places) > 1:
+            raise GeometryError(f"has {len(places)} positions; a point is one")
+        geometry = Point(places[0], frames[0])
+    else:
+        geometry = Route.of(places, frames)
     return with_speeds(geometry, speeds) if any(each is not None for each in speeds) else geometry
-
-
-def _speed(cells: _Cells, where: str) -> float | None:
-    text, column = cells.get(_SPEED, ("", Column(_SPEED)))
-    if not text:
-        return None
-    try:
-        return float(text) * column.scale
-    except ValueError:
-        raise GeometryError(f"{where}: speed {text[:20]!r} is not a number") from None
 
 
 def _cell(cells: _Cells, name: str) -> str:
     return cells[name][0] if name in cells else ""
 
 
-def _position(cells: _Cells, where: str) -> Coordinate:
-    """Return the position of a row. `cells`: by the names of their columns.
+def _number(cells: _Cells, name: str, where: str) -> float | None:
+    """Return a value of a row in SI; None: it has none, which no latitude and longitude may.
 
     Raises:
-        GeometryError: latitude, longitude or altitude is not a number, or is out of range.
+        GeometryError: it is not a number.
     """
-    numbers: dict[str, float | None] = {"alt": None}
-    for name in ("lat", "lon", "alt"):
-        text, column = cells.get(name, ("", None))
-        if column is None or (name == "alt" and not text):
-            continue
-        try:
-            numbers[name] = float(text) * column.scale
-        except ValueError:
-            hint = "; decimals are written with a point" if "," in text else ""
-            raise GeometryError(f"{where}: {name} {text!r} is not a number{hint}") from None
-    return coordinate(numbers["lat"], numbers["lon"], numbers["alt"], where)
+    text, column = cells.get(name, ("", None))
+    if column is None or (name in ("alt", "speed") and not text):
+        return None
+    try:
+        return float(text) * column.scale
+    except ValueError:
+        hint = "; decimals are written with a point" if "," in text else ""
+        raise GeometryError(f"{where}: {name} {text!r} is not a number{hint}") from None
 
 
-def _frame(cells: _Cells, where: str) -> str:
-    """Return the altitude frame of a row; "relative" if it names none.
-
-    Raises:
-        GeometryError: the frame is not known.
-    """
-    frame = cells["altitude_frame"][0] if "altitude_frame" in cells else ""
-    if frame and frame not in FILE_FRAMES:
-        hint = suggest(frame, FILE_FRAMES, "frames")
-        raise GeometryError(f"{where}: altitude_frame {frame!r} is not known; {hint}")
-    return frame or "relative"
-
-
-def _positions_as(positions: Sequence[Coordinate], frame: str, kind: str) -> Point | Route | Area:
-    """Return positions as a geometry of `kind`: "route", "area" or "point".
-
-    Raises:
-        GeometryError: there are too many for a point, or the ring bounds no area.
-    """
-    if kind == "point":
-        if len(positions) > 1:
-            raise GeometryError(f"has {len(positions)} positions; a point is one")
-        return Point(positions[0], frame)
-    if kind == "area":
-        ring = positions if positions[0][:2] == positions[-1][:2] else [*positions, positions[0]]
-        if len({corner[:2] for corner in ring}) < 3:
-            raise GeometryError("an area has at least three different corners")
-        return Area(checked((tuple(ring),)), frame)
-    return Route(tuple(positions), frame)
+def _closed(corners: Sequence[Coordinate]) -> tuple[Coordinate, ...]:
+    if len({corner[:2] for corner in corners}) < 3:
+        raise GeometryError("an area has at least three different corners")
+    is_closed = corners[0][:2] == corners[-1][:2]
+    return tuple(corners) if is_closed else (*corners, corners[0])

@@ -267,6 +267,11 @@ def test_spaces_quotes_comments_and_empty_lines_are_no_positions() -> None:
         ),
         ("lat_deg,lon_deg\n1,2\n3,4\n", "point", "has 2 positions; a point is one"),
         ("lat_deg,lon_deg\n1,2\n3,4\n1,2\n", "area", "at least three different corners"),
+        (
+            "lat,lon,ring,speed_m_s\n0,0,0,5\n0,9,0,\n9,9,0,\n1,2,1,\n1,3,1,\n2,3,1,",
+            "area",
+            "only a route has speeds, not an area",
+        ),
     ],
 )
 def test_rows_that_cannot_be_read_are_refused_with_their_line(
