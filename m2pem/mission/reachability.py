@@ -4,6 +4,8 @@ from collections import OrderedDict
 from collections.abc import Collection, Hashable, Iterable, Mapping
 from typing import TypeVar
 
+import rustworkx
+
 from m2pem.mission.elements import (
     Activity,
     BoundaryEvent,
@@ -91,31 +93,17 @@ N = TypeVar("N", bound=Hashable)
 def components(successors: Mapping[N, Collection[N]]) -> dict[N, int]:
     """Return a number for each node; nodes that can reach each other have the same one.
 
-    Kosaraju's algorithm, without recursion. Successors that are no keys are not in the graph.
+    Successors that are no keys are not in the graph.
     """
-    before: dict[N, list[N]] = {node: [] for node in successors}
-    for node, following in successors.items():
-        for each in following:
-            if each in before:
-                before[each].append(node)
-    finished: list[N] = []
-    seen: set[N] = set()
-    for start in successors:
-        waiting = [(start, False)]
-        while waiting:
-            node, done = waiting.pop()
-            if done:
-                finished.append(node)
-            elif node not in seen:
-                seen.add(node)
-                waiting.append((node, True))
-                waiting += [(each, False) for each in successors[node] if each in before]
-    number: dict[N, int] = {}
-    for count, last in enumerate(reversed(finished)):
-        members = [last]
-        while members:
-            node = members.pop()
-            if node not in number:
-                number[node] = count
-                members += before[node]
-    return number
+    graph: rustworkx.PyDiGraph = rustworkx.PyDiGraph()
+    index = dict(zip(successors, graph.add_nodes_from(tuple(successors)), strict=True))
+    graph.add_edges_from_no_data(
+        [
+            (index[node], index[each])
+            for node, following in successors.items()
+            for each in following
+            if each in index
+        ]
+    )
+    found = rustworkx.strongly_connected_components(graph)
+    return {graph[at]: number for number, members in enumerate(found) for at in members}
