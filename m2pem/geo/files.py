@@ -6,7 +6,7 @@ from pathlib import Path
 from m2pem.findings import Severity, unreadable_remedy
 from m2pem.geo.file_text import decoded, parsed_json
 from m2pem.geo.geojson import GeometryError, is_wgs84, kind_of, parse_geojson
-from m2pem.geo.geometry_files import KEEP_OUT, FileProblem, read_geometry_file
+from m2pem.geo.geometry_files import KEEP_OUT, READ_SUFFIXES, FileProblem, read_geometry_file
 from m2pem.mission.geometry import Area, Point, Route
 from m2pem.units import article
 
@@ -16,10 +16,8 @@ MAX_BYTES = 5_000_000
 _SHOWN = 3
 """Errors of a file that a message has; of more, it has the number."""
 
-_OF_MANY = (*(".csv", ".plan", ".waypoints", ".mission", ".txt", ".kml", ".kmz", ".wpml", ".zip"),)
-"""Files of any number of geometries: one of the kind that is asked for is expected."""
-
-_SUFFIXES = (".geojson", ".json", *_OF_MANY)
+_OF_ONE = (".geojson", ".json")
+"""Files that are expected to hold one geometry; of the others one of the kind that is asked for."""
 
 
 def read_geometry(
@@ -46,8 +44,8 @@ def read_geometry(
 def _read(
     path: Path, kind: str, warn: Callable[[FileProblem], object] | None
 ) -> Point | Route | Area:
-    if path.suffix.lower() not in _SUFFIXES:
-        raise GeometryError(f"has another suffix than {', '.join(_SUFFIXES)}")
+    if path.suffix.lower() not in READ_SUFFIXES:
+        raise GeometryError(f"has another suffix than {', '.join(READ_SUFFIXES)}")
     try:
         with path.open("rb") as file:
             content = file.read(MAX_BYTES + 1)
@@ -56,7 +54,7 @@ def _read(
         raise GeometryError(f"cannot be read: {error.strerror}; {remedy}") from None
     if len(content) > MAX_BYTES:
         raise GeometryError(f"is larger than {MAX_BYTES:,} bytes")
-    if path.suffix.lower() in _OF_MANY:
+    if path.suffix.lower() not in _OF_ONE:
         return _only_one(path, content, kind, warn)
     value = parsed_json(decoded(content))
     if not isinstance(value, Mapping):
