@@ -94,8 +94,7 @@ def local_name(element: Element) -> str:
 
 def child_text(element: Element, child: str) -> str:
     """Return the text of its first child of a name, without space around it; "" without one."""
-    found = next((each for each in element if local_name(each) == child), None)
-    return "" if found is None else (found.text or "").strip()
+    return (element.findtext(f"{{*}}{child}") or "").strip()
 
 
 def coordinates(element: Element, keeps_altitude: bool) -> list[Coordinate]:

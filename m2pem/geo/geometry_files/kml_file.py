@@ -6,12 +6,13 @@ a route's waypoints.
 """
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import islice
 from posixpath import dirname, join, normpath
 from urllib.parse import unquote
 
 from lxml import etree
+from lxml.builder import ElementMaker
 
 from m2pem.geo.file_text import parsed_json
 from m2pem.geo.geojson import (
@@ -20,6 +21,7 @@ from m2pem.geo.geojson import (
     KML_FRAMES,
     SPEEDS,
     GeometryError,
+    as_geojson,
     checked,
     checked_frame,
     with_frames,
@@ -41,6 +43,7 @@ from m2pem.geo.geometry_files.wpml import has_waylines, read_waylines
 from m2pem.mission.geometry import Area, Coordinate, Point, Route
 
 _KML = "http://www.opengis.net/kml/2.2"
+_element: Callable[..., Element] = ElementMaker(namespace=_KML, nsmap={None: _KML})
 _MODE_OF = {"relative": "relativeToGround", "terrain": "relativeToGround", "amsl": "absolute"}
 _PARTS = ("MultiGeometry", "MultiTrack")
 _SINGLE = ("Point", "LineString", "LinearRing", "Polygon", "Track", "Model", *_PARTS)
@@ -175,7 +178,7 @@ def _geometry(
         rings = [
             _raised(element, coordinates(ring, keeps))
             for boundary in ("outerBoundaryIs", "innerBoundaryIs")
-            for ring in _rings(element, boundary)
+            for ring in element.iterfind(f"{{*}}{boundary}/{{*}}LinearRing")
         ]
         if not rings:
             raise GeometryError("a polygon has an outerBoundaryIs")
@@ -195,12 +198,6 @@ def _geometry(
     if not own_frame and 0 < len(missing) < len(positions):
         contents.warn(where, f"has no altitude at position {', '.join(missing)[:200]}")
     return Route(tuple(positions), frame)
-
-
-def _rings(polygon: Element, boundary: str) -> Iterator[Element]:
-    for child in polygon:
-        if local_name(child) == boundary:
-            yield from (ring for ring in child if local_name(ring) == "LinearRing")
 
 
 def _closed(ring: Sequence[Coordinate]) -> tuple[Coordinate, ...]:
@@ -234,9 +231,9 @@ def _track(
 ) -> list[Coordinate]:
     """Return the samples of a track. An empty one means that there was no fix: GDAL 3.12.4 reads it
     as 0, 0, 0."""
-    found = [child.text or "" for child in element if local_name(child) == "coord"]
     positions = []
-    for number, text in enumerate(found, start=1):
+    for number, child in enumerate(element.iterchildren("{*}coord"), start=1):
+        text = child.text or ""
         parts = text.split()
         if not parts:
             contents.warn(where, f"position {number}: is empty, and left out")
@@ -248,69 +245,48 @@ def _track(
 
 
 def _data(placemark: Element, name: str) -> str:
-    for extended in placemark:
-        if local_name(extended) == "ExtendedData":
-            for data in extended.iter(etree.Element):
-                if data.get("name") == name:
-                    return child_text(data, "value") or (data.text or "").strip()
-    return ""
+    found = placemark.find(f"{{*}}ExtendedData//*[@name='{name}']")
+    return "" if found is None else child_text(found, "value") or (found.text or "").strip()
 
 
 def write_kml(geometries: Sequence[NamedGeometry]) -> bytes:
     """Return a KML document with a placemark for each geometry."""
-    root = etree.Element(f"{{{_KML}}}kml", nsmap={None: _KML})  # type: ignore[dict-item]
-    document = _child(root, "Document")
+    document = _element("Document")
     for each in geometries:
-        placemark = _child(document, "Placemark")
-        _child(placemark, "name", each.name)
-        data = {"altitude_frame": each.geometry.altitude_frame}
-        if isinstance(each.geometry, Route) and each.geometry.speeds_m_s:
-            data[SPEEDS] = json.dumps(each.geometry.speeds_m_s)
-        if isinstance(each.geometry, Route) and each.geometry.altitude_frames:
-            data[FRAMES] = json.dumps(each.geometry.altitude_frames)
-        extended = _child(placemark, "ExtendedData")
-        for name, value in data.items():
-            element = _child(extended, "Data")
-            element.set("name", name)
-            _child(element, "value", value)
-        _write_geometry(placemark, each.geometry)
+        extended = _element("ExtendedData")
+        for name, value in as_geojson(each.geometry)["properties"].items():
+            text = value if isinstance(value, str) else json.dumps(value)
+            extended.append(_element("Data", _element("value", text), name=name))
+        title = _element("name", each.name)
+        document.append(_element("Placemark", title, extended, _written(each.geometry)))
+    root = _element("kml", document)
     return etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True)
 
 
-def _write_geometry(placemark: Element, geometry: Point | Route | Area) -> None:
+def _written(geometry: Point | Route | Area) -> Element:
+    frame = geometry.altitude_frame
     if isinstance(geometry, Area):
-        mode = _mode_of(geometry.rings[0], geometry.altitude_frame)
-        polygon = _child(placemark, "Polygon")
-        _child(polygon, "altitudeMode", mode)
-        for index, ring in enumerate(geometry.rings):
-            boundary = _child(polygon, "innerBoundaryIs" if index else "outerBoundaryIs")
-            _child(_child(boundary, "LinearRing"), "coordinates", _written(ring))
-        return
-    point = isinstance(geometry, Point)
-    positions = (geometry.position,) if isinstance(geometry, Point) else geometry.waypoints
-    element = _child(placemark, "Point" if point else "LineString")
-    if not point:
-        _child(element, "tessellate", "1")  # where it is clamped to the ground
-    # One mode holds for all of a line.
-    mixed = isinstance(geometry, Route) and geometry.altitude_frames
-    mode = _mode_of(() if mixed else positions, geometry.altitude_frame)
-    _child(element, "altitudeMode", mode)
-    _child(element, "coordinates", _written(positions))
+        outer, *holes = (_element("LinearRing", _coordinates(ring)) for ring in geometry.rings)
+        inner = (_element("innerBoundaryIs", hole) for hole in holes)
+        mode = _altitude_mode(geometry.rings[0], frame)
+        return _element("Polygon", mode, _element("outerBoundaryIs", outer), *inner)
+    if isinstance(geometry, Point):
+        place = [geometry.position]
+        return _element("Point", _altitude_mode(place, frame), _coordinates(place))
+    places = geometry.waypoints
+    # One mode holds for all of a line; where it is clamped to the ground, it follows it.
+    mode = _altitude_mode([] if geometry.altitude_frames else places, frame)
+    return _element("LineString", _element("tessellate", "1"), mode, _coordinates(places))
 
 
-def _mode_of(positions: Sequence[Coordinate], frame: str) -> str:
+def _altitude_mode(positions: Sequence[Coordinate], frame: str) -> Element:
     has_altitude = any(altitude_m is not None for _, _, altitude_m in positions)
-    return _MODE_OF[frame] if has_altitude else "clampToGround"
+    return _element("altitudeMode", _MODE_OF[frame] if has_altitude else "clampToGround")
 
 
-def _written(positions: Sequence[Coordinate]) -> str:
-    return " ".join(
-        ",".join(repr(number) for number in (longitude, latitude, altitude) if number is not None)
+def _coordinates(positions: Sequence[Coordinate]) -> Element:
+    places = (
+        ",".join(repr(each) for each in (longitude, latitude, altitude) if each is not None)
         for latitude, longitude, altitude in positions
     )
-
-
-def _child(parent: Element, name: str, text: str | None = None) -> Element:
-    child = etree.SubElement(parent, f"{{{_KML}}}{name}")
-    child.text = text
-    return child
+    return _element("coordinates", " ".join(places))

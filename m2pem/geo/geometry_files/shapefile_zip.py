@@ -17,10 +17,6 @@ from m2pem.geo.geometry_files.reference_system import ReferenceSystem, system_na
 
 _NAME_FIELDS = ("name", "title", "label", "id")
 
-_POINTS = frozenset({shapefile.POINT, shapefile.POINTM, shapefile.POINTZ})
-_MULTIPOINTS = frozenset({shapefile.MULTIPOINT, shapefile.MULTIPOINTM, shapefile.MULTIPOINTZ})
-_LINES = frozenset({shapefile.POLYLINE, shapefile.POLYLINEM, shapefile.POLYLINEZ})
-_POLYGONS = frozenset({shapefile.POLYGON, shapefile.POLYGONM, shapefile.POLYGONZ})
 _WITH_Z = frozenset(
     {shapefile.POINTZ, shapefile.POLYLINEZ, shapefile.POLYGONZ, shapefile.MULTIPOINTZ}
 )
@@ -130,16 +126,16 @@ def _geometry(shape: "shapefile.Shape", where: str, contents: Contents) -> dict[
             contents.warn(where, f"has no height at position {', '.join(missing)[:200]}")
     if any(each is not None for each in getattr(shape, "m", ())):
         contents.warn(where, "its measures (M values) are not read")
-    if kind in _POINTS:
+    if kind in shapefile.Point_shapeTypes:
         return {"type": "Point", "coordinates": places[0] if places else []}
-    if kind in _MULTIPOINTS:
+    if kind in shapefile.MultiPoint_shapeTypes:
         return {"type": "MultiPoint", "coordinates": places}
-    if kind not in (*_LINES, *_POLYGONS):
+    if kind not in (*shapefile.Polyline_shapeTypes, *shapefile.Polygon_shapeTypes):
         remedy = "export points, multi-points, lines or polygons"
         raise GeometryError(f"is a {shape.shapeTypeName}", remedy)
     ends = [*shape.parts[1:], len(places)]
     parts = [places[start:end] for start, end in zip(shape.parts, ends, strict=True)]
-    if kind in _LINES:
+    if kind in shapefile.Polyline_shapeTypes:
         return {"type": "MultiLineString", "coordinates": parts}
     # pyshp decides by x and y which ring is a hole of which, and returns the lists that it got.
     flat = [[(x, y) for x, y, *_ in part] for part in parts]
@@ -156,9 +152,9 @@ def _position_count(shp: bytes) -> int:
         while at + 12 <= len(shp):
             (words,) = struct.unpack_from(">i", shp, at + 4)
             (kind,) = struct.unpack_from("<i", shp, at + 8)
-            if kind in _POINTS:
+            if kind in shapefile.Point_shapeTypes:
                 count += 1
-            elif kind in _MULTIPOINTS:
+            elif kind in shapefile.MultiPoint_shapeTypes:
                 count += max(0, struct.unpack_from("<i", shp, at + 44)[0])
             elif kind != shapefile.NULL:
                 count += max(0, struct.unpack_from("<i", shp, at + 48)[0])
