@@ -1,8 +1,8 @@
-"""Waylines of WPML, the KML of DJI and others (DJI Cloud API, `template.kml` and `waylines.wpml`).
+"""Waylines of WPML, the KML of DJI and others (DJI Cloud API, `waylines.wpml`).
 
 A wayline is a route: its points in the order of `wpml:index`, with heights and speeds that are
-beside their coordinates. `waylines.wpml` has them as they are executed, `template.kml` as they were
-planned. What a wayline commands besides is left out, with a warning that names the waypoints.
+beside their coordinates. What it commands besides is left out, with a warning that names the
+waypoints. A `template.kml`, of what was planned and not of what is executed, is refused.
 """
 
 from collections import defaultdict
@@ -32,7 +32,6 @@ _OF_MISSION = (
 
 _STRAIGHT = ("", "toPointAndStopWithDiscontinuityCurvature")
 _AS_ROUTES = ("", "followWayline")
-_HEADING = "waypointHeadingMode"
 
 
 def has_waylines(root: Element) -> bool:
@@ -48,16 +47,14 @@ def read_waylines(root: Element, contents: Contents) -> None:
         if left:
             contents.warn("missionConfig", f"not read: {', '.join(left)}", "draw it in the mission")
     for folder in root.iter("{*}Folder"):
-        name = child_text(folder, "waylineId") or child_text(folder, "templateId")
-        if not name:
+        name, kind = child_text(folder, "waylineId"), child_text(folder, "templateType")
+        if not (name or kind):
             continue
-        where = f"wayline {name}"
+        where = f"wayline {name or child_text(folder, 'templateId')}"
         with contents.feature(where):
-            kind = child_text(folder, "templateType") or "waypoint"
-            if kind != "waypoint":
-                raise GeometryError(
-                    f"is a template of {kind!r}", "export the KMZ with its waylines.wpml"
-                )
+            if kind:
+                remedy = "export the KMZ with its waylines.wpml"
+                raise GeometryError(f"is a template of {kind!r}", remedy)
             route = _route(folder)
             _warn_of_commands(folder, where, contents)
             contents.add(f"wayline_{name}", route)
@@ -65,23 +62,19 @@ def read_waylines(root: Element, contents: Contents) -> None:
 
 def _route(folder: Element) -> Route:
     mode = child_text(folder, "executeHeightMode")
-    for system in folder.iter("{*}waylineCoordinateSysParam"):
-        mode = mode or child_text(system, "heightMode")
     if mode not in _FRAME_OF:
         known = ", ".join(_FRAME_OF)
         raise GeometryError(f"its height mode {mode!r} is not known", f"one of {known}")
     waypoints: list[Coordinate] = []
     speeds: list[float] = []
     for number, placemark in _in_order(folder):
-        height_m = _number(_height(placemark, folder, mode), "height", number)
+        height_m = _number(child_text(placemark, "executeHeight"), "height", number)
         found = [each for point in placemark.iter("{*}Point") for each in coordinates(point, False)]
         if len(found) != 1:
             raise GeometryError(f"waypoint {number}: has {len(found)} positions")
         latitude, longitude, _ = found[0]
         waypoints.append((latitude, longitude, height_m))
-        speed = child_text(placemark, "waypointSpeed")
-        if not speed or child_text(placemark, "useGlobalSpeed") == "1":
-            speed = child_text(folder, "autoFlightSpeed")
+        speed = child_text(placemark, "waypointSpeed") or child_text(folder, "autoFlightSpeed")
         speeds.append(_number(speed, "speed", number))
     if not waypoints:
         raise GeometryError("has no waypoint")
@@ -100,15 +93,6 @@ def _in_order(folder: Element) -> list[tuple[int, Element]]:
     return sorted(numbered.items(), key=lambda each: each[0])
 
 
-def _height(placemark: Element, folder: Element, mode: str) -> str:
-    if executed := child_text(placemark, "executeHeight"):
-        return executed
-    # Of the two heights of a template only the one for all is above the start point in each mode.
-    if mode == "relativeToStartPoint" and child_text(placemark, "useGlobalHeight") == "1":
-        return child_text(folder, "globalHeight")
-    return child_text(placemark, "ellipsoidHeight" if mode == "WGS84" else "height")
-
-
 def _number(text: str, what: str, waypoint: int) -> float:
     try:
         number = float(text)
@@ -124,14 +108,11 @@ def _warn_of_commands(folder: Element, where: str, contents: Contents) -> None:
     for group in folder.iter("{*}startActionGroup"):
         for each in group.iter("{*}actionActuatorFunc"):
             at[f"action {each.text}"].append("before the first one")
-    turns, headings = child_text(folder, "globalWaypointTurnMode"), ""
-    for each in folder.iter("{*}globalWaypointHeadingParam"):
-        headings = child_text(each, _HEADING)
     for number, placemark in _in_order(folder):
-        turn = _first(placemark, "waypointTurnMode", turns)
-        heading = _first(placemark, _HEADING, headings)
+        turn = _first(placemark, "waypointTurnMode")
+        heading = _first(placemark, "waypointHeadingMode")
         commands = {f"action {each.text}" for each in placemark.iter("{*}actionActuatorFunc")}
-        pitch = _first(placemark, "waypointGimbalPitchAngle", "0")
+        pitch = _first(placemark, "waypointGimbalPitchAngle")
         commands |= set() if pitch in ("", "0") else {f"gimbal pitch {pitch}"}
         commands |= set() if turn in _STRAIGHT else {f"turn mode {turn}"}
         commands |= set() if heading in _AS_ROUTES else {f"heading mode {heading}"}
@@ -142,6 +123,5 @@ def _warn_of_commands(folder: Element, where: str, contents: Contents) -> None:
         contents.warn(where, message, "draw it in the mission")
 
 
-def _first(element: Element, name: str, default: str) -> str:
-    found = next(element.iter(f"{{*}}{name}"), None)
-    return default if found is None else (found.text or "").strip()
+def _first(element: Element, name: str) -> str:
+    return (element.findtext(f".//{{*}}{name}") or "").strip()

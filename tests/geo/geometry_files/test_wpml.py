@@ -1,4 +1,4 @@
-"""Waylines as DJI's Cloud API says of `template.kml` and `waylines.wpml`, version 1.0.2."""
+"""Waylines as DJI's Cloud API says of `waylines.wpml`, version 1.0.2."""
 
 import zipfile
 from io import BytesIO
@@ -92,45 +92,6 @@ def test_what_heights_are_above(mode: str, frame: str) -> None:
     assert ellipsoid == pytest.approx(30.0 + 33.97, abs=0.05)
 
 
-@pytest.mark.parametrize(
-    ("mode", "heights", "frame"),
-    [
-        ("EGM96", (120.0, 121.0), "amsl"),
-        ("WGS84", (mean_sea_level_m(53, 7, 160), mean_sea_level_m(54, 8, 161)), "amsl"),
-        ("aboveGroundLevel", (120.0, 121.0), "terrain"),
-        ("relativeToStartPoint", (120.0, 90.0), "relative"),
-    ],
-)
-def test_a_template_has_heights_and_speeds_for_all_and_for_each(
-    mode: str, heights: tuple[float, float], frame: str
-) -> None:
-    """Its height for all is above the start point, in whichever mode those of the points are."""
-
-    def of(number: int, use_global: int) -> str:
-        return (
-            f"<wpml:ellipsoidHeight>{160 + number}</wpml:ellipsoidHeight>"
-            f"<wpml:height>{120 + number}</wpml:height>"
-            f"<wpml:useGlobalHeight>{use_global}</wpml:useGlobalHeight>"
-            f"<wpml:useGlobalSpeed>{use_global}</wpml:useGlobalSpeed>"
-            "<wpml:waypointSpeed>5</wpml:waypointSpeed>"
-        )
-
-    file = read(
-        wpml(
-            "<Folder><wpml:templateType>waypoint</wpml:templateType><wpml:templateId>7"
-            "</wpml:templateId><wpml:autoFlightSpeed>8</wpml:autoFlightSpeed>"
-            "<wpml:globalHeight>90</wpml:globalHeight><wpml:waylineCoordinateSysParam>"
-            f"<wpml:heightMode>{mode}</wpml:heightMode></wpml:waylineCoordinateSysParam>"
-            f"{waypoint(0, '7,53', of(0, 0))}{waypoint(1, '8,54', of(1, 1))}</Folder>"
-        )
-    )
-    (route,) = file.geometries
-    assert isinstance(route.geometry, Route)
-    assert route.name == "wayline_7"
-    assert tuple(each[2] for each in route.geometry.waypoints) == heights
-    assert (route.geometry.altitude_frame, route.geometry.speeds_m_s) == (frame, (5.0, 8.0))
-
-
 def test_several_waylines_are_several_routes() -> None:
     file = read(wpml(wayline(TWO) + wayline(TWO, "EGM96", 1)))
     assert [each.name for each in file.geometries] == ["wayline_0", "wayline_1"]
@@ -181,10 +142,13 @@ def test_what_else_is_commanded_is_left_out_with_the_numbers_of_its_waypoints() 
         (wayline(waypoint("1.5", "7,53", height(1))), "wpml:index 1.5 is not one whole number"),
         (wayline(TWO + TWO), "two waypoints have the same wpml:index"),
         (wayline(""), "has no waypoint"),
-        (
-            "<Folder><wpml:templateType>mapping2d</wpml:templateType><wpml:templateId>0"
-            "</wpml:templateId></Folder>",
-            "is a template of 'mapping2d'; export the KMZ with its waylines.wpml",
+        *(
+            (
+                f"<Folder><wpml:templateType>{kind}</wpml:templateType><wpml:templateId>7"
+                f"</wpml:templateId><wpml:autoFlightSpeed>8</wpml:autoFlightSpeed>{TWO}</Folder>",
+                f"wayline 7: is a template of '{kind}'; export the KMZ with its waylines.wpml",
+            )
+            for kind in ("waypoint", "mapping2d")
         ),
     ],
 )
