@@ -10,7 +10,7 @@ from itertools import pairwise
 from typing import TypeAlias
 
 from m2pem.geo.local_frame import EastNorth
-from m2pem.geo.polygon import Edge
+from m2pem.geo.polygon import Edge, turned
 
 Ring: TypeAlias = Sequence[EastNorth]
 """A closed ring; the first point is repeated last."""
@@ -47,25 +47,23 @@ def lawn_mower(
     Raises:
         ValueError: it would take more than `MAX_STRIPS` passes.
     """
-    cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
-    turned = [[(e * cos + n * sin, n * cos - e * sin) for e, n in ring] for ring in rings]
-    low, strips, width = _strips(turned[0], spacing_m)
+    level = [[turned(corner, yaw_rad) for corner in ring] for ring in rings]
+    low, strips, width = _strips(level[0], spacing_m)
     points: list[tuple[float, float]] = []
     for strip in range(strips):
         bottom = low + strip * width
-        passes = _passes(turned, bottom, bottom + width)
+        passes = _passes(level, bottom, bottom + width)
         middle = bottom + width / 2
         row = [((a - overshoot_m, middle), (b + overshoot_m, middle)) for a, b in passes]
         if strip % 2:
             row = [(b, a) for a, b in reversed(row)]
         points.extend(point for pair in row for point in pair)
-    return [(x * cos - y * sin, x * sin + y * cos) for x, y in points]
+    return [turned(point, -yaw_rad) for point in points]
 
 
 def strip_width_m(ring: Ring, spacing_m: float, yaw_rad: float) -> float:
     """Return the width of each strip of `lawn_mower` over an area with that outer ring."""
-    cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
-    return _strips([(e * cos + n * sin, n * cos - e * sin) for e, n in ring], spacing_m)[2]
+    return _strips([turned(corner, yaw_rad) for corner in ring], spacing_m)[2]
 
 
 def _strips(ring: Ring, spacing_m: float) -> tuple[float, int, float]:

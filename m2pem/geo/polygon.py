@@ -57,6 +57,12 @@ def nearest_on(edge: Edge, point: EastNorth) -> EastNorth:
     return ae + de * part, an + dn * part
 
 
+def turned(point: EastNorth, angle_rad: float) -> EastNorth:
+    """Return a point in axes that are turned by an angle, counter-clockwise."""
+    cos, sin = math.cos(angle_rad), math.sin(angle_rad)
+    return point[0] * cos + point[1] * sin, point[1] * cos - point[0] * sin
+
+
 def middle_of(corners: Sequence[EastNorth]) -> EastNorth:
     """Return the mean of the corners of a polygon, each given once."""
     return (

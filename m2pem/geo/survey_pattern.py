@@ -18,7 +18,7 @@ from shapely.geometry.base import BaseGeometry
 from m2pem.geo.geojson import GeometryError
 from m2pem.geo.lawn_mower import lawn_mower
 from m2pem.geo.local_frame import EastNorth, LocalFrame
-from m2pem.geo.polygon import convex_hull
+from m2pem.geo.polygon import convex_hull, turned
 from m2pem.geo.work_shares import owners, reach_m, split
 from m2pem.mission.geometry import Area, Coordinate, Route
 
@@ -255,7 +255,7 @@ def _yaw(pattern: SurveyPattern, ground: _Ground) -> float:
 
 
 def _width_m(hull: Sequence[EastNorth], yaw: float) -> float:
-    norths = [_turned(corner, yaw)[1] for corner in hull]
+    norths = [turned(corner, yaw)[1] for corner in hull]
     return max(norths) - min(norths)
 
 
@@ -273,11 +273,11 @@ def _passes(pattern: SurveyPattern, ground: _Ground, yaw: float) -> list[Pass]:
         points = lawn_mower(rings, pattern.spacing_m, yaw)
         for a, b in zip(points[::2], points[1::2], strict=True):
             for start, end in _outside((a, b), ground.closed):
-                (ax, ay), (bx, _) = _turned(start, yaw), _turned(end, yaw)
+                (ax, ay), (bx, _) = turned(start, yaw), turned(end, yaw)
                 rows.setdefault(round(ay, _ROW_DIGITS), []).append((min(ax, bx), max(ax, bx)))
         cells += _cells([(y, sorted(spans)) for y, spans in sorted(rows.items())])
     ordered = _ordered(cells, pattern.corner)
-    return [(_turned(a, -yaw), _turned(b, -yaw)) for a, b in ordered]
+    return [(turned(a, -yaw), turned(b, -yaw)) for a, b in ordered]
 
 
 def _outside(line: Pass, closed: BaseGeometry) -> Iterator[Pass]:
@@ -403,9 +403,3 @@ def _beyond(a: EastNorth, b: EastNorth, by_m: float, ground: _Ground) -> EastNor
 
 def _length_m(lines: Sequence[Pass]) -> float:
     return sum(math.dist(a, b) for a, b in lines)
-
-
-def _turned(place: EastNorth, angle_rad: float) -> EastNorth:
-    """Return a place in axes that are turned by an angle, counter-clockwise."""
-    cos, sin = math.cos(angle_rad), math.sin(angle_rad)
-    return place[0] * cos + place[1] * sin, place[1] * cos - place[0] * sin

@@ -11,6 +11,7 @@ from itertools import pairwise
 from typing import TypeAlias
 
 from m2pem.geo.local_frame import EastNorth
+from m2pem.geo.polygon import turned
 from m2pem.geo.polyline import Polyline
 
 Span: TypeAlias = tuple[float, float]
@@ -49,7 +50,7 @@ class SurveyTracks:
 
     def spacing_m(self, rings: Sequence[Sequence[EastNorth]]) -> float:
         """Return the spacing with which tracks over a part are as these, in any local frame."""
-        norths = [self._turned(corner)[1] for corner in rings[0]]
+        norths = [turned(corner, self.yaw_rad)[1] for corner in rings[0]]
         count = max(1, round((max(norths) - min(norths)) / self.width_m))
         return self.width_m * (1 + _SLACK / count)
 
@@ -65,7 +66,7 @@ class SurveyTracks:
         if len(outer) != 1:
             return []
         holes = [ring for ring in rings if _area(ring) < 0]
-        return [[self._turned_back(corner) for corner in ring] for ring in (outer[0], *holes)]
+        return [[turned(corner, -self.yaw_rad) for corner in ring] for ring in (outer[0], *holes)]
 
     def _strips(self, from_m: float, to_m: float) -> list[tuple[float, list[Span]]]:
         """Return the middle of each strip and its spans, from the lowest strip to the highest."""
@@ -78,7 +79,7 @@ class SurveyTracks:
                 continue
             segment = self.line.segments[index]
             (ax, ay), (bx, _) = (
-                self._turned(segment.at(along_m - begin_m)) for along_m in (low_m, high_m)
+                turned(segment.at(along_m - begin_m), self.yaw_rad) for along_m in (low_m, high_m)
             )
             span = round(min(ax, bx), _DIGITS), round(max(ax, bx), _DIGITS)
             same = next((s for y, s in strips if abs(y - ay) < self.width_m / 2), None)
@@ -87,14 +88,6 @@ class SurveyTracks:
             else:
                 same.append(span)
         return sorted((y, sorted(spans)) for y, spans in strips)
-
-    def _turned(self, point: EastNorth) -> EastNorth:
-        cos, sin = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
-        return point[0] * cos + point[1] * sin, point[1] * cos - point[0] * sin
-
-    def _turned_back(self, point: EastNorth) -> EastNorth:
-        cos, sin = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
-        return point[0] * cos - point[1] * sin, point[0] * sin + point[1] * cos
 
 
 def _slabs(strips: Sequence[tuple[float, Sequence[Span]]], width_m: float) -> list[Slab]:
