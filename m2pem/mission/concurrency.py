@@ -13,7 +13,7 @@ about. Whether one condition can be true by itself is not asked.
 import heapq
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
 from m2pem.errors import ExpressionError
@@ -84,6 +84,10 @@ class Together:
     weight: int = 0
     tasks: tuple[Occurrence, ...] = ()
     names: frozenset[str] = frozenset()
+
+    def behind(self, branch: tuple[int, int]) -> tuple[Occurrence, ...]:
+        """Return its tasks behind one branch more: the number of a fork, and of its branch."""
+        return tuple(Occurrence(each.task, (branch, *each.where)) for each in self.tasks)
 
 
 @dataclass(frozen=True, slots=True)
@@ -239,14 +243,9 @@ class ConcurrentTasks:
         return True
 
     def _may_come(self, definition: EventDefinition) -> bool:
-        match definition:
-            case SignalEventDefinition():
-                return definition.signal.id not in self._thrown
-            case MessageEventDefinition():
-                return definition.message.id not in self._thrown
-            case ConditionalEventDefinition():
-                return False
-        return True
+        if isinstance(definition, ConditionalEventDefinition):
+            return False
+        return _sent_by(definition).isdisjoint(self._thrown)
 
     # --- what may be active together --------------------------------------------------------------
 
@@ -369,8 +368,7 @@ class _Heaviest:
             for node, read in branch.only:
                 found = self.of_node(node, depth + 1)
                 if found.weight > best.weight and names.isdisjoint(found.names | read):
-                    where = (fork.number, number)
-                    tasks = tuple(Occurrence(e.task, (where, *e.where)) for e in found.tasks)
+                    tasks = found.behind((fork.number, number))
                     best = Together(found.weight, tasks, found.names | read)
             if best.weight:
                 parts.append(best)
@@ -387,8 +385,8 @@ class _Heaviest:
         if fork is None:
             return active
         if active.weight:
-            at = tuple(Occurrence(e.task, ((fork.number, HOST), *e.where)) for e in active.tasks)
-            active = self._sum(fork, depth + 1, Together(active.weight, at, active.names))
+            host = replace(active, tasks=active.behind((fork.number, HOST)))
+            active = self._sum(fork, depth + 1, host)
         left = self.of_fork(fork, depth + 1)
         return left if left.weight > active.weight else active
 
@@ -402,11 +400,8 @@ class _Heaviest:
             found = Together(weight, (Occurrence(activity),) if weight else ())
         times = instances_at_once(activity) if found.weight else 1
         if times > 1:
-            tasks = tuple(
-                Occurrence(each.task, ((INSTANCE, number), *each.where))
-                for number in range(min(times, 1 + MOST_INSTANCES // len(found.tasks)))
-                for each in found.tasks
-            )
+            numbers = range(min(times, 1 + MOST_INSTANCES // len(found.tasks)))
+            tasks = tuple(each for number in numbers for each in found.behind((INSTANCE, number)))
             found = Together(found.weight * times, tasks, found.names)
         return found
 
@@ -420,13 +415,8 @@ class _Heaviest:
                 continue
             more = self.of_container(each, depth + 1)
             if more.weight and found.names.isdisjoint(more.names):
-                tasks = tuple(
-                    Occurrence(e.task, ((EVENT_SUBPROCESS, each.index), *e.where))
-                    for e in more.tasks
-                )
-                found = Together(
-                    found.weight + more.weight, (*found.tasks, *tasks), found.names | more.names
-                )
+                tasks = (*found.tasks, *more.behind((EVENT_SUBPROCESS, each.index)))
+                found = Together(found.weight + more.weight, tasks, found.names | more.names)
         return found
 
 
@@ -490,21 +480,25 @@ def _thrown(mission: Mission) -> set[str]:
         elif isinstance(node, Event) and not isinstance(
             node, IntermediateCatchEvent | BoundaryEvent | StartEvent
         ):
-            for each in node.definitions:
-                if isinstance(each, SignalEventDefinition):
-                    found.add(each.signal.id)
-                elif isinstance(each, MessageEventDefinition):
-                    found.add(each.message.id)
+            found.update(*map(_sent_by, node.definitions))
     found |= {each.id for each in mission.signals.values() if each.returned}
     return found
+
+
+def _sent_by(definition: EventDefinition) -> set[str]:
+    """Return the id of the signal or message of a definition."""
+    match definition:
+        case SignalEventDefinition():
+            return {definition.signal.id}
+        case MessageEventDefinition():
+            return {definition.message.id}
+    return set()
 
 
 def _begins_at_once(activity: Activity) -> bool:
     """Whether an activity certainly begins, once, or all its instances, as a token enters it."""
     loop = activity.loop
-    if isinstance(loop, MultiInstance) and (loop.sequential or instances_at_once(activity) < 2):
-        return False
-    if loop is not None and not isinstance(loop, MultiInstance):
+    if loop is not None and instances_at_once(activity) < 2:
         return False
     conditions = (
         isinstance(each, ConditionalEventDefinition)
@@ -517,9 +511,8 @@ def _begins_at_once(activity: Activity) -> bool:
 
 def _leads_at_once_to(node: FlowNode) -> Sequence[FlowNode] | None:
     """Return where a token may be in the step in which it enters an element; None: it waits."""
-    if isinstance(node, Gateway) and not isinstance(node, EventBasedGateway):
-        return [flow.target for flow in node.outgoing]
-    if _passes_at_once(node):
+    is_passed = isinstance(node, Gateway) and not isinstance(node, EventBasedGateway)
+    if is_passed or _passes_at_once(node):
         return [flow.target for flow in node.outgoing]
     return None
 
