@@ -45,22 +45,17 @@ class Fence:
         for index, (place, level) in enumerate(zip(way, levels, strict=True)):
             if (by_m := self._outside_m(level)) > MARGIN_M:
                 return f"{name(index)}, {_text(place)}, is {_by(by_m)} outside the fleet's fence"
-        if start is not None and levels:
-            began = self._frame.to_local(start)
-            if self._outside_m(began) <= MARGIN_M and (out := self._worst(began, levels[0])):
-                return (
-                    f"the way to {name(0)} leaves the fleet's fence {self._describe_breach(*out)}"
-                )
-        for index, (a, b) in enumerate(pairwise(levels)):
+        ways = [
+            (f"between {name(index)} and {name(index + 1)}", *ends)
+            for index, ends in enumerate(pairwise(levels))
+        ]
+        if start is not None and levels and self.outside_m(start) <= MARGIN_M:
+            ways.insert(0, (f"to {name(0)}", self._frame.to_local(start), levels[0]))
+        for ends, a, b in ways:
             if out := self._worst(a, b):
-                ends = f"{name(index)} and {name(index + 1)}"
-                return (
-                    f"the way between {ends} leaves the fleet's fence {self._describe_breach(*out)}"
-                )
+                where = f"by {_by(out[1])} at {_text(self._frame.to_latlon(out[0]))}"
+                return f"the way {ends} leaves the fleet's fence {where}"
         return ""
-
-    def _describe_breach(self, level: EastNorth, by_m: float) -> str:
-        return f"by {_by(by_m)} at {_text(self._frame.to_latlon(level))}"
 
     def _outside_m(self, level: EastNorth) -> float:
         if edges_enclose(self._edges, level):

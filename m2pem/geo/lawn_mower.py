@@ -94,7 +94,7 @@ def _passes(rings: Sequence[Ring], bottom: float, top: float) -> list[tuple[floa
                     max(_x(right, low), _x(right, high)),
                 )
             )
-    return list(_merged(sorted(spans)))
+    return _merged(spans)
 
 
 def _edges_at(rings: Sequence[Ring], y: float) -> Iterator[Edge]:
@@ -110,15 +110,12 @@ def _x(edge: Edge, y: float) -> float:
     return ax + (bx - ax) * part
 
 
-def _merged(spans: Iterable[tuple[float, float]]) -> Iterator[tuple[float, float]]:
-    current: tuple[float, float] | None = None
-    for span in spans:
-        if current is None:
-            current = span
-        elif span[0] <= current[1]:
-            current = (current[0], max(current[1], span[1]))
+def _merged(spans: Iterable[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Return spans in order, those that touch as one."""
+    merged: list[tuple[float, float]] = []
+    for low, high in sorted(spans):
+        if merged and low <= merged[-1][1]:
+            merged[-1] = merged[-1][0], max(merged[-1][1], high)
         else:
-            yield current
-            current = span
-    if current is not None:
-        yield current
+            merged.append((low, high))
+    return merged

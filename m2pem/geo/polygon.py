@@ -242,15 +242,12 @@ def _crosses(a: Edge, b: Edge) -> bool:
 
 def _side(a: LatLon, b: LatLon, c: LatLon) -> int:
     """On which side of the line from a to b the corner c lies: 1, -1, or 0 when it is on it."""
-    turn = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+    turn = _turn(a, b, c)
     return (turn > 0) - (turn < 0)
 
 
 def _within(corner: LatLon, edge: Edge) -> bool:
-    (lat_a, lon_a), (lat_b, lon_b) = edge
-    return min(lat_a, lat_b) <= corner[0] <= max(lat_a, lat_b) and min(lon_a, lon_b) <= corner[
-        1
-    ] <= max(lon_a, lon_b)
+    return all(min(a, b) <= at <= max(a, b) for a, b, at in zip(*edge, corner, strict=True))
 
 
 def _hole_problem(rings: Sequence[Sequence[Coordinate]]) -> str:

@@ -131,10 +131,6 @@ def trimmed(points: Sequence[EastNorthUp], back_m: float) -> list[EastNorthUp]:
     length = math.dist(kept[-1], kept[-2])
     if length > 0:
         part = 1 - back_m / length
-        a, b = kept[-2], kept[-1]
-        kept[-1] = (
-            a[0] + (b[0] - a[0]) * part,
-            a[1] + (b[1] - a[1]) * part,
-            a[2] + (b[2] - a[2]) * part,
-        )
+        east, north, up = (a + (b - a) * part for a, b in zip(*kept[-2:], strict=True))
+        kept[-1] = east, north, up
     return kept

@@ -9,7 +9,7 @@ import heapq
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import Any, TypeAlias
 
 import shapely
@@ -337,16 +337,9 @@ def _ordered(cells: Sequence[_Cell], corner: int) -> list[Pass]:
 def _serpentines(cell: _Cell) -> list[list[Pass]]:
     """Return the four ways to cover a cell: from each of its corners."""
     ways = []
-    for rows in (cell, cell[::-1]):
-        for first in (0, 1):
-            ways.append(
-                [
-                    ((span[0], y), (span[1], y))
-                    if (row + first) % 2 == 0
-                    else ((span[1], y), (span[0], y))
-                    for row, (y, span) in enumerate(rows)
-                ]
-            )
+    for rows, first in product((cell, cell[::-1]), (0, 1)):
+        ends = [((span[0], y), (span[1], y)) for y, span in rows]
+        ways.append([(a, b) if row % 2 == first else (b, a) for row, (a, b) in enumerate(ends)])
     return ways
 
 

@@ -184,9 +184,5 @@ def along_route(
 
 def lowest(points: Sequence[ProfilePoint]) -> ProfilePoint | None:
     """Return where a route is nearest to the ground; None: it is not known anywhere."""
-    known = [(each.above_ground_m, each) for each in points]
-    return min(
-        ((height, each) for height, each in known if height is not None),
-        key=lambda found: found[0],
-        default=(0.0, None),
-    )[1]
+    known = (each for each in points if each.above_ground_m is not None)
+    return min(known, key=lambda each: each.above_ground_m or 0.0, default=None)
