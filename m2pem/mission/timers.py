@@ -175,7 +175,7 @@ def text_from(value: Value, what: str, otherwise: str = "") -> str:
 
 
 def _refuse(message: str, text: str) -> NoReturn:
-    raise ExpressionSyntaxError(message, shorten(text), 0)
+    raise ExpressionSyntaxError(message, shorten(text), 0) from None
 
 
 _SECOND = timedelta(seconds=1)
@@ -253,24 +253,22 @@ def parse_cron(text: str) -> Cron:
     """
     stripped = text.strip()
     if len(stripped) > _MAX_CHARACTERS:
-        raise _wrong(text, f"a cron text has at most {_MAX_CHARACTERS} characters")
+        _refuse(f"a cron text has at most {_MAX_CHARACTERS} characters", text)
     if stripped.startswith("@"):
         macro = MACROS.get(stripped.lower())
         if macro is None:
-            raise _wrong(text, f"expected one of {', '.join(MACROS)}")
+            _refuse(f"expected one of {', '.join(MACROS)}", text)
         return Cron(macro, None)
     words = stripped.upper().split()
     if len(words) not in (5, 6, 7):
-        raise _wrong(
-            text, f"a cron text has 5, 6 (seconds first) or 7 fields (years last), not {len(words)}"
+        _refuse(
+            f"a cron text has 5, 6 (seconds first) or 7 fields (years last), not {len(words)}", text
         )
     quartz = len(words) == 7
     years = _years(text, words.pop()) if quartz else None
     day, weekday = words[-3], words[-1]
     if len(words) == 6 and not (_is_any(day) or _is_any(weekday)):
-        raise _wrong(
-            text, "give the day of the month or the day of the week, and '?' for the other"
-        )
+        _refuse("give the day of the month or the day of the week, and '?' for the other", text)
     words[-3] = day.replace("?", "*")
     if len(words) == 6:
         words[-1] = _weekdays(text, weekday, quartz)
@@ -281,7 +279,7 @@ def parse_cron(text: str) -> Cron:
     try:
         CronSim(fields, _EPOCH)
     except CronSimError as error:
-        raise _wrong(text, f"{str(error).lower()} in the cron text") from None
+        _refuse(f"{str(error).lower()} in the cron text", text)
     return Cron(fields, years)
 
 
@@ -306,9 +304,7 @@ def _weekdays(text: str, field: str, quartz: bool) -> str:
     for term in field.split(","):
         match = _DAY_TERM.fullmatch(term)
         if match is None:
-            raise _wrong(
-                text, f"'{term}' is no day of the week such as MON, MON-FRI, FRIL or MON#1"
-            )
+            _refuse(f"'{term}' is no day of the week such as MON, MON-FRI, FRIL or MON#1", text)
         if match["day"]:
             found.append(f"{_weekday(text, match['day'], quartz)}{match['which']}")
             continue
@@ -328,13 +324,13 @@ def _weekday(text: str, name: str, quartz: bool) -> int:
     if name in _DAYS:
         return _DAYS.index(name)
     if not quartz:
-        raise _wrong(
-            text,
+        _refuse(
             f"which day of the week '{name}' is depends on the engine (1 is Sunday for Quartz, "
             "Monday for Spring): write MON, TUE, ...",
+            text,
         )
     if not 1 <= int(name) <= 7:
-        raise _wrong(text, f"'{name}' is no day of the week: 1 (SUN) to 7 (SAT)")
+        _refuse(f"'{name}' is no day of the week: 1 (SUN) to 7 (SAT)", text)
     return int(name) - 1
 
 
@@ -345,20 +341,16 @@ def _years(text: str, field: str) -> tuple[int, ...] | None:
     for term in field.split(","):
         match = _YEAR_TERM.fullmatch(term)
         if match is None:
-            raise _wrong(text, f"'{term}' is no year such as 2026, 2026-2028 or 2026/2")
+            _refuse(f"'{term}' is no year such as 2026, 2026-2028 or 2026/2", text)
         first = _FIRST_YEAR if match["first"] == "*" else int(match["first"])
         if match["last"]:
             last = int(match["last"])
         else:
             last = _LAST_YEAR if match["step"] or match["first"] == "*" else first
         if not _FIRST_YEAR <= first <= last <= _LAST_YEAR:
-            raise _wrong(text, f"years are {_FIRST_YEAR} to {_LAST_YEAR}, the first one first")
+            _refuse(f"years are {_FIRST_YEAR} to {_LAST_YEAR}, the first one first", text)
         found.update(range(first, last + 1, int(match["step"] or 1)))
     return tuple(sorted(found))
-
-
-def _wrong(text: str, message: str) -> ExpressionSyntaxError:
-    return ExpressionSyntaxError(message, shorten(text), 0)
 
 
 _WHAT = "a cycle such as R3/PT10S, R/PT1M or R3/2026-01-01T12:00:00Z/PT10S"
