@@ -109,18 +109,21 @@ _KINDS = ("route", "area", "point")
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """A column's name ("lat", "lon", "alt" or "altitude_frame") and what makes its values SI.
+    """A column by its place in the header, and its name ("lat", "lon", "alt" and so on).
 
-    `frame`: what heights are above, and `unit`: their unit, where the header says so.
+    `scale` makes its values SI. `frame`: what heights are above, and `unit`: their unit, where the
+    header says so.
     """
 
+    index: int
     name: str
     scale: float = 1.0
     frame: str = ""
     unit: str = ""
 
 
-_Cells: TypeAlias = dict[str, tuple[str, Column]]
+_Cells: TypeAlias = dict[str, str]
+"""The texts of a row by the names of their columns."""
 
 
 def read_csv(content: bytes, contents: Contents) -> None:
@@ -140,7 +143,6 @@ def read_csv(content: bytes, contents: Contents) -> None:
     rows = _rows(text, delimiter)
     line, header = next(rows, (1, [""]))
     columns, commands = _columns(header, f"line {line}", contents)
-    index_of_name = next((at for at, each in columns.items() if each.name == "name"), None)
     groups: dict[str, list[tuple[int, list[str]]]] = {}
     for number, row in rows:
         if len(row) != len(header):
@@ -154,7 +156,7 @@ def read_csv(content: bytes, contents: Contents) -> None:
                     f"line {number}: {header[index]} {text[:40]!r} is no waypoint",
                     "leave its row out, and draw it as a task of the mission",
                 )
-        name = "" if index_of_name is None else row[index_of_name]
+        name = row[columns["name"].index] if "name" in columns else ""
         groups.setdefault(name, []).append((number, row))
     if not groups:
         raise GeometryError("has no row below its header")
@@ -166,22 +168,18 @@ def read_csv(content: bytes, contents: Contents) -> None:
         with contents.feature(f"line {group[0][0]} {name!r}" if name else ""):
             # One after the other: with all rows as mappings a table takes three times the memory.
             rows_of_it = ((number, _cells(row, columns, is_litchi)) for number, row in group)
-            contents.add(name, _geometry(rows_of_it, contents.kind))
+            contents.add(name, _geometry(rows_of_it, columns, contents.kind))
 
 
-def _cells(row: Sequence[str], columns: Mapping[int, Column], is_litchi: bool) -> _Cells:
-    """Return the cells of a row by what they hold."""
-    cells: _Cells = {column.name: (row[index], column) for index, column in columns.items()}
-    if "alt" in cells and cells["alt"][1].frame:
-        cells["altitude_frame"] = (cells["alt"][1].frame, cells["alt"][1])
-    elif "altitude_frame" in cells:
-        text, column = cells["altitude_frame"]
+def _cells(row: Sequence[str], columns: Mapping[str, Column], is_litchi: bool) -> _Cells:
+    cells = {name: row[column.index] for name, column in columns.items()}
+    if "alt" in columns and columns["alt"].frame:
+        cells["altitude_frame"] = columns["alt"].frame
+    elif text := cells.get("altitude_frame"):
         word = "".join(_words(text))
-        cells["altitude_frame"] = (
-            (_LITCHI.get(word) if is_litchi else None) or _MODES.get(word, text),
-            column,
-        )
-    if is_litchi and _cell(cells, "speed") in ("0", "0.0"):
+        frame = _LITCHI.get(word) if is_litchi else None
+        cells["altitude_frame"] = frame or _MODES.get(word, text)
+    if is_litchi and cells.get("speed") in ("0", "0.0"):
         del cells["speed"]
     return cells
 
@@ -227,14 +225,14 @@ def _delimiter(text: str) -> str:
 
 def _columns(
     header: Sequence[str], where: str, contents: Contents
-) -> tuple[dict[int, Column], list[int]]:
-    """Return the columns that are read, by their index, and the indices of those that command."""
+) -> tuple[dict[str, Column], list[int]]:
+    """Return the columns that are read, by their name, and the indices of those that command."""
     if len(header) > MAX_COLUMNS:
         raise GeometryError(f"{where}: has more than {MAX_COLUMNS} columns", "leave some out")
-    columns: dict[str, tuple[int, Column]] = {}
+    columns: dict[str, Column] = {}
     left, commands, stops = [], [], []
     for index, text in enumerate(header):
-        column, words = _column(text)
+        column, words = _column(index, text)
         if column is None:
             hint = next((hint for sign, hint in _OF_FLIGHT.items() if sign.match(words)), "")
             if _COMMANDS.match(words):
@@ -246,27 +244,27 @@ def _columns(
         elif column.name in columns and column.name in ("name", "kind", "ring"):
             left.append(text)
         elif column.name in columns:
-            both = f"{header[columns[column.name][0]]!r} and {text!r}"
+            both = f"{header[columns[column.name].index]!r} and {text!r}"
             stops.append((f"{where}: columns {both} hold the same", "leave one of them out"))
         else:
-            columns[column.name] = (index, column)
+            columns[column.name] = column
     for needed in ("lat", "lon"):
         if needed not in columns:
             raise GeometryError(
                 f"{where}: there is no column '{needed}' among {', '.join(header)[:200]!r}",
                 "the header is, for example, name,lat_deg,lon_deg,alt_m",
             )
-    if "altitude_frame" in columns and "alt" in columns and columns["alt"][1].frame:
+    if "altitude_frame" in columns and "alt" in columns and columns["alt"].frame:
         stops.append((f"{where}: two columns say what heights are above", "leave one of them out"))
     if stops:
         raise GeometryError(*stops[0])
     if "alt" in columns:
-        index, column = columns["alt"]
+        column, text = columns["alt"], header[columns["alt"].index]
         if not column.unit:
-            message = f"column {header[index]!r} has no unit: taken as metres"
+            message = f"column {text!r} has no unit: taken as metres"
             contents.warn(where, message, "write, say, alt_ft")
-        if "ele" in header[index].lower() and not (column.frame or "altitude_frame" in columns):
-            message = f"column {header[index]!r} is taken as heights above home"
+        if "ele" in text.lower() and not (column.frame or "altitude_frame" in columns):
+            message = f"column {text!r} is taken as heights above home"
             contents.warn(where, message, f"write {_FRAMES}")
     if left:
         contents.warn(where, f"columns that are not read: {', '.join(left)[:200]}")
@@ -274,7 +272,7 @@ def _columns(
         names = ", ".join(dict.fromkeys(header[each].rstrip("0123456789") for each in commands))
         what = f"columns that command more than a place are not read: {names[:400]}"
         contents.warn(where, what, "draw it in the mission")
-    return dict(columns.values()), commands
+    return columns, commands
 
 
 def warn_of_fields(names: Iterable[str], where: str, contents: Contents) -> None:
@@ -291,7 +289,7 @@ def warn_of_fields(names: Iterable[str], where: str, contents: Contents) -> None
         contents.warn(where, what, "give the geometry its heights, or draw it in the mission")
 
 
-def _column(text: str) -> tuple[Column | None, str]:
+def _column(index: int, text: str) -> tuple[Column | None, str]:
     """Return what a column holds, if it can be read, and the words of its name joined by `_`."""
     words = _words(text[:200])[:_MOST_WORDS]
     spans = [(at, at + size) for size in (3, 2, 1) for at in range(1, len(words) - size + 1)]
@@ -301,7 +299,7 @@ def _column(text: str) -> tuple[Column | None, str]:
         scales = _UNITS.get(name, {})
         if name and (unit in scales or (not unit and name != "speed")):
             frame = _HEIGHTS[key] if name == "alt" else ""
-            return Column(name, scales.get(unit, 1.0), frame, unit), "_".join(words)
+            return Column(index, name, scales.get(unit, 1.0), frame, unit), "_".join(words)
     return None, "_".join(words)
 
 
@@ -310,19 +308,21 @@ def _words(text: str) -> list[str]:
     return [each for each in re.split(r"[\s_/.,()\[\]-]+", spaced) if each]
 
 
-def _geometry(rows: Iterable[tuple[int, _Cells]], default: str) -> Point | Route | Area:
+def _geometry(
+    rows: Iterable[tuple[int, _Cells]], columns: Mapping[str, Column], default: str
+) -> Point | Route | Area:
     kind = ""
     frames: list[str] = []
     rings: dict[str, list[Coordinate]] = {}
     speeds = []
     for number, cells in rows:
         where = f"line {number}"
-        given = _cell(cells, "kind").lower() or kind
+        given = cells.get("kind", "").lower() or kind
         if given and given not in _KINDS:
             raise GeometryError(
                 f"{where}: kind {given!r} is not known", f"one of {', '.join(_KINDS)}"
             )
-        frames.append(checked_frame(_cell(cells, "altitude_frame") or "relative", f"{where}: "))
+        frames.append(checked_frame(cells.get("altitude_frame") or "relative", f"{where}: "))
         is_mixed = frames[-1] != frames[0] and (given or default) in ("area", "point")
         if (kind and given != kind) or is_mixed:
             raise GeometryError(
@@ -331,10 +331,10 @@ def _geometry(rows: Iterable[tuple[int, _Cells]], default: str) -> Point | Route
             )
         kind = given
         latitude, longitude, altitude, speed = (
-            _number(cells, name, where) for name in ("lat", "lon", "alt", "speed")
+            _number(cells, columns, name, where) for name in ("lat", "lon", "alt", "speed")
         )
         place = coordinate(latitude, longitude, altitude, where)
-        rings.setdefault(_cell(cells, "ring"), []).append(place)
+        rings.setdefault(cells.get("ring", ""), []).append(place)
         speeds.append(speed)
     places = [place for ring in rings.values() for place in ring]
     kind = kind or default or ("route" if len(places) > 1 or any(speeds) else "point")
@@ -350,21 +350,17 @@ def _geometry(rows: Iterable[tuple[int, _Cells]], default: str) -> Point | Route
     return with_speeds(geometry, speeds) if any(each is not None for each in speeds) else geometry
 
 
-def _cell(cells: _Cells, name: str) -> str:
-    return cells[name][0] if name in cells else ""
-
-
-def _number(cells: _Cells, name: str, where: str) -> float | None:
+def _number(cells: _Cells, columns: Mapping[str, Column], name: str, where: str) -> float | None:
     """Return a value of a row in SI; None: it has none, which no latitude and longitude may.
 
     Raises:
         GeometryError: it is not a number.
     """
-    text, column = cells.get(name, ("", None))
-    if column is None or (name in ("alt", "speed") and not text):
+    text = cells.get(name)
+    if text is None or (not text and name in ("alt", "speed")):
         return None
     try:
-        return float(text) * column.scale
+        return float(text) * columns[name].scale
     except ValueError:
         hint = "; decimals are written with a point" if "," in text else ""
         raise GeometryError(f"{where}: {name} {text!r} is not a number{hint}") from None
