@@ -137,7 +137,7 @@ def _print_versions(found: "list[dict[str, Any]]", output: str) -> None:
         click.echo(as_json(found))
         return
     from m2pem.cli.table import table
-    from m2pem.mission.version import SHORT
+    from m2pem.mission.mission import SHORT
 
     if not found:
         click.echo("no runs yet")

@@ -14,9 +14,8 @@ from m2pem.engine.run import MissionRun
 from m2pem.executive.run_summary import summary
 from m2pem.journal.base import RunInfo
 from m2pem.journal.mission import fleet_of, mission_of
-from m2pem.mission.mission import Mission
+from m2pem.mission.mission import SHORT, Mission, version_of
 from m2pem.mission.values import Value
-from m2pem.mission.version import SHORT, version_of
 
 
 def run_of(line: RunInfo) -> MissionRun:

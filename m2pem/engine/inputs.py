@@ -332,7 +332,7 @@ class ControlRequestEnded(_Input, frozen=True):
 class Revise(_Input, frozen=True):
     """Replace the mission of the run by a new version of its files, which the input carries.
 
-    `version`: of the files (`m2pem.mission.version`). `mission_name`, `mission`, `library`: as in
+    `version`: of the files (`m2pem.mission.mission`). `mission_name`, `mission`, `library`: as in
     the header of a run. `moves`: where a token on an element goes first, by the ids of elements or,
     at a join, of sequence flows; "": it ends there. `plan`: the digest of the plan that was shown;
     the run is only revised if that is what the revision does now. `requirements`: those that the

@@ -8,7 +8,7 @@ from m2pem.api.revision import RunVersion
 from m2pem.engine.inputs import StartRun
 from m2pem.errors import OperatorError
 from m2pem.journal.base import Journal, RunInfo
-from m2pem.mission.version import SHORT, version_of_files
+from m2pem.mission.mission import SHORT, version_of_files
 
 
 async def versions_of(

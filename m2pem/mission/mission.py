@@ -1,6 +1,8 @@
-"""A mission as a whole: what a BPMN file, and those that it calls into, hold."""
+"""A mission as a whole: what a BPMN file, and those that it calls into, hold, and what names a
+version of it: a hash of these files."""
 
-from collections.abc import Iterator, Mapping
+import hashlib
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 from m2pem.findings import Finding
@@ -15,6 +17,9 @@ from m2pem.mission.events import (
 )
 from m2pem.mission.geometry import Geometry
 from m2pem.mission.library import MissionFile, Source
+
+SHORT = 12
+"""Digits of a version that people read: no two versions of a mission will have the same."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -117,3 +122,21 @@ class Mission:
         """Whether a behavior gets its resources only when its task starts (docs/allocation.md)."""
         behaviors = (getattr(task, "behavior", None) for task in self.activities())
         return any(each is not None and each.allocated_at_start for each in behaviors)
+
+
+def version_of_files(mission: bytes, library: Iterable[Source]) -> str:
+    """Return the version of a mission's file with the other files that it uses: 64 hexadecimal
+    digits. The names of the files are no part of it, but for those by which the mission asks."""
+    whole = hashlib.sha256()
+    parts = [mission]
+    for source in library:
+        parts += [repr(source.answers).encode(), source.data]
+    for part in parts:
+        whole.update(len(part).to_bytes(8))
+        whole.update(part)
+    return whole.hexdigest()
+
+
+def version_of(mission: Mission) -> str:
+    """Return the version of a mission that was read."""
+    return version_of_files(mission.source, mission.library)

@@ -28,7 +28,7 @@ from m2pem.engine.run import MissionRun
 from m2pem.engine.state import BehaviorPhase, RunState, RunStatus, Scope, Token, Wait
 from m2pem.engine.throwing import catcher_of_error
 from m2pem.mission.catalogue import BehaviorState
-from m2pem.mission.version import version_of
+from m2pem.mission.mission import version_of
 
 Key: TypeAlias = tuple[Any, ...]
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from m2pem import load_mission
-from m2pem.mission.version import version_of_files
+from m2pem.mission.mission import version_of_files
 from tests.cli.conftest import Invoke
 from tests.command_line import ANSWERS, MISSION, CommandLine
 from tests.executive.conftest import flow, mission

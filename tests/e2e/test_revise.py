@@ -4,7 +4,7 @@ import itertools
 import json
 from pathlib import Path
 
-from m2pem.mission.version import version_of_files
+from m2pem.mission.mission import version_of_files
 from tests.command_line import CommandLine
 
 _FLEET = """

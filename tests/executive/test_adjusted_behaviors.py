@@ -13,7 +13,7 @@ from m2pem.api.telemetry import VehicleState
 from m2pem.engine.inputs import BehaviorReported, Revise
 from m2pem.fleet.fleet import Domain
 from m2pem.mission.catalogue import BehaviorState
-from m2pem.mission.version import version_of_files
+from m2pem.mission.mission import version_of_files
 from m2pem.testing import scenarios
 from m2pem.testing.fake_arbiter import FakeArbiter
 

@@ -8,8 +8,7 @@ from m2pem.engine.inputs import Revise
 from m2pem.engine.records import MissionRevised
 from m2pem.errors import MissionError, OperatorError
 from m2pem.mission.catalogue import BehaviorState
-from m2pem.mission.mission import Mission
-from m2pem.mission.version import version_of_files
+from m2pem.mission.mission import Mission, version_of_files
 
 from .conftest import World, behavior, mission, question, sequence
 from .test_recovery import left_behind, resumed

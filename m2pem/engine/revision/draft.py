@@ -15,8 +15,7 @@ from m2pem.engine.revision.targets import candidates, moved_with, way_out
 from m2pem.engine.state import RunState, Scope, Token, Wait
 from m2pem.mission.difference import Difference, difference
 from m2pem.mission.elements import Container
-from m2pem.mission.mission import Mission
-from m2pem.mission.version import version_of
+from m2pem.mission.mission import Mission, version_of
 
 
 class PlanDraft:

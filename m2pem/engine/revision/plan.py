@@ -90,7 +90,7 @@ class Adjustment:
 class RevisionPlan:
     """What a revision does to a run in the state for which the plan was made.
 
-    `version`, `previous`: of the files (`m2pem.mission.version`). `requested`: where tokens were
+    `version`, `previous`: of the files (`m2pem.mission.mission`). `requested`: where tokens were
     asked to go, by element. The last six fields are what carrying it out needs; `rechecked`:
     scopes of ad-hoc subprocesses that offer or begin other activities now.
     """

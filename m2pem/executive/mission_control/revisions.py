@@ -12,7 +12,7 @@ from m2pem.errors import OperatorError, StuckError
 from m2pem.executive.ended_runs import refuse_ended
 from m2pem.executive.mission_control.parts import ControlParts
 from m2pem.executive.run_versions import files_of, versions_of
-from m2pem.mission.version import version_of
+from m2pem.mission.mission import version_of
 
 
 class RevisionOperations(ControlParts):
