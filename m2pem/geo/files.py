@@ -4,8 +4,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from m2pem.findings import Severity, unreadable_remedy
-from m2pem.geo.file_text import decoded, parsed_json
-from m2pem.geo.geojson import GeometryError, is_wgs84, kind_of, parse_geojson
+from m2pem.geo.geojson import GeometryError, decoded, is_wgs84, kind_of, parse_geojson, parsed_json
 from m2pem.geo.geometry_files import KEEP_OUT, READ_SUFFIXES, FileProblem, read_geometry_file
 from m2pem.mission.geometry import Area, Point, Route
 from m2pem.units import article

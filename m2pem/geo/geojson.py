@@ -6,11 +6,12 @@ relative to home unless a Feature's properties say `"altitude_frame": "amsl"`, `
 route's property `"speeds_m_s"` has a speed or null for each position (`Route.speeds_m_s`).
 """
 
+import json
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NoReturn
 
 from m2pem.errors import M2pemError
 from m2pem.geo.geoid import mean_sea_level_m
@@ -251,9 +252,19 @@ def _ring(value: object, where: str) -> tuple[Coordinate, ...]:
     ring = _positions(value, where, 4)
     if ring[0][:2] != ring[-1][:2]:
         raise GeometryError(f"{where}: a ring ends where it begins; repeat its first position")
-    if len({corner[:2] for corner in ring}) < 3:
-        raise GeometryError(f"{where}: a ring has at least three different corners")
-    return ring
+    return closed_ring(ring, f"{where}: ")
+
+
+def closed_ring(corners: Sequence[Coordinate], where: str = "") -> tuple[Coordinate, ...]:
+    """Return corners as a ring that ends where it begins; `where` is for the error.
+
+    Raises:
+        GeometryError: fewer than three of them differ.
+    """
+    if len({corner[:2] for corner in corners}) < 3:
+        raise GeometryError(f"{where}a ring has at least three different corners")
+    is_closed = corners[0][:2] == corners[-1][:2]
+    return tuple(corners) if is_closed else (*corners, corners[0])
 
 
 def checked(rings: tuple[tuple[Coordinate, ...], ...]) -> tuple[tuple[Coordinate, ...], ...]:
@@ -313,6 +324,40 @@ def _number(value: object, what: str, where: str) -> float:
     if not math.isfinite(number):
         raise GeometryError(f"{where}: {what} {value!r} is not finite")
     return number
+
+
+def decoded(content: bytes) -> str:
+    """Return the text of a file in UTF-8, with or without a byte order mark.
+
+    Raises:
+        GeometryError: it is not UTF-8.
+    """
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise GeometryError("is not UTF-8 text") from None
+
+
+def parsed_json(text: str) -> Any:
+    """Return the value of a JSON text.
+
+    Raises:
+        GeometryError: it is not JSON, holds NaN or Infinity, or is nested too deep.
+    """
+    try:
+        return json.loads(text, parse_constant=_refuse_constant)
+    except json.JSONDecodeError as error:
+        raise GeometryError(f"line {error.lineno}: is not JSON: {error.msg}") from None
+    except RecursionError:
+        raise GeometryError("is nested too deep") from None
+    except GeometryError:
+        raise
+    except ValueError as error:  # a whole number of thousands of digits
+        raise GeometryError(f"is not JSON: {error}") from None
+
+
+def _refuse_constant(name: str) -> NoReturn:
+    raise GeometryError(f"holds {name}, which is not a finite number")
 
 
 def kind_of(geometry: Geometry) -> str:

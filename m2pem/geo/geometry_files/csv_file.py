@@ -8,7 +8,6 @@ from io import StringIO
 from itertools import islice, zip_longest
 from typing import TypeAlias
 
-from m2pem.geo.file_text import decoded
 from m2pem.geo.geojson import (
     FILE_FRAMES,
     FRAME_KEYS,
@@ -17,7 +16,9 @@ from m2pem.geo.geojson import (
     GeometryError,
     checked,
     checked_frame,
+    closed_ring,
     coordinate,
+    decoded,
     kind_of,
     with_speeds,
 )
@@ -340,7 +341,7 @@ def _geometry(
     kind = kind or default or ("route" if len(places) > 1 or any(speeds) else "point")
     geometry: Point | Route | Area
     if kind == "area":
-        geometry = Area(checked(tuple(map(_closed, rings.values()))), frames[0])
+        geometry = Area(checked(tuple(map(closed_ring, rings.values()))), frames[0])
     elif kind == "point":
         if len(places) > 1:
             raise GeometryError(f"has {len(places)} positions; a point is one")
@@ -364,10 +365,3 @@ def _number(cells: _Cells, columns: Mapping[str, Column], name: str, where: str)
     except ValueError:
         hint = "; decimals are written with a point" if "," in text else ""
         raise GeometryError(f"{where}: {name} {text!r} is not a number{hint}") from None
-
-
-def _closed(corners: Sequence[Coordinate]) -> tuple[Coordinate, ...]:
-    if len({corner[:2] for corner in corners}) < 3:
-        raise GeometryError("an area has at least three different corners")
-    is_closed = corners[0][:2] == corners[-1][:2]
-    return tuple(corners) if is_closed else (*corners, corners[0])

@@ -6,14 +6,15 @@ from collections.abc import Mapping, Sequence
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
-from m2pem.geo.file_text import decoded, parsed_json
 from m2pem.geo.geojson import (
     FRAMES,
     GeometryError,
     as_geojson,
     check_crs,
+    decoded,
     is_wgs84,
     parse_geojson,
+    parsed_json,
     stated_frame,
 )
 from m2pem.geo.geometry_files.contents import MAX_POSITIONS, Contents, NamedGeometry

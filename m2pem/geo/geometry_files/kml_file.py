@@ -14,7 +14,6 @@ from urllib.parse import unquote
 from lxml import etree
 from lxml.builder import ElementMaker
 
-from m2pem.geo.file_text import parsed_json
 from m2pem.geo.geojson import (
     FRAMES,
     KML_CLAMPED,
@@ -24,6 +23,8 @@ from m2pem.geo.geojson import (
     as_geojson,
     checked,
     checked_frame,
+    closed_ring,
+    parsed_json,
     with_frames,
     with_speeds,
 )
@@ -182,8 +183,7 @@ def _geometry(
         ]
         if not rings:
             raise GeometryError("a polygon has an outerBoundaryIs")
-        closed = tuple(_closed(ring) for ring in rings)
-        return Area(checked(closed), frame)
+        return Area(checked(tuple(map(closed_ring, rings))), frame)
     if local == "Track":
         positions = _track(element, keeps, where, contents)
     else:
@@ -198,12 +198,6 @@ def _geometry(
     if not own_frame and 0 < len(missing) < len(positions):
         contents.warn(where, f"has no altitude at position {', '.join(missing)[:200]}")
     return Route(tuple(positions), frame)
-
-
-def _closed(ring: Sequence[Coordinate]) -> tuple[Coordinate, ...]:
-    if len({corner[:2] for corner in ring}) < 3:
-        raise GeometryError("a ring has at least three different corners")
-    return tuple(ring) if ring[0][:2] == ring[-1][:2] else (*ring, ring[0])
 
 
 def _mode(element: Element) -> str:

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from m2pem.findings import Severity
-from m2pem.geo.geojson import GeometryError, checked, coordinate
+from m2pem.geo.geojson import GeometryError, checked, closed_ring, coordinate
 from m2pem.geo.geometry_files.contents import Contents, FileProblem
 from m2pem.geo.geometry_files.mission_commands import (
     ENDINGS,
@@ -282,10 +282,7 @@ def polygon(corners: Sequence[LatLon]) -> Area:
     Raises:
         GeometryError: there are less than three, or they bound no area.
     """
-    ring: list[Coordinate] = [(*corner, None) for corner in corners]
-    if len({corner[:2] for corner in ring}) < 3:
-        raise GeometryError("at least three different corners are expected")
-    return Area(checked(((*ring, ring[0]),)))
+    return Area(checked((closed_ring([(*corner, None) for corner in corners]),)))
 
 
 def circle(center: LatLon, radius_m: float | None, is_inside: bool) -> Area:

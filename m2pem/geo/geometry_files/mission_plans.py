@@ -9,8 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import count, zip_longest
 from typing import Any
 
-from m2pem.geo.file_text import decoded, parsed_json
-from m2pem.geo.geojson import GeometryError, coordinate
+from m2pem.geo.geojson import GeometryError, coordinate, decoded, parsed_json
 from m2pem.geo.geometry_files.contents import Contents, NamedGeometry
 from m2pem.geo.geometry_files.mission_commands import KEEP_OUT
 from m2pem.geo.geometry_files.mission_items import (

@@ -286,6 +286,12 @@ def test_a_fence_file_is_areas_to_stay_in_and_out_of() -> None:
     assert [each[:2] for each in fence.rings[0][:2]] == [(38.10, -77.32), (38.12, -77.32)]
 
 
+def test_a_fence_that_ends_where_it_begins_has_that_corner_twice() -> None:
+    corners = ("38.10 -77.32", "38.12 -77.32", "38.12 -77.30")
+    open_, closed = (read(*polygon(5001, *each)) for each in (corners, (*corners, corners[0])))
+    assert closed == open_
+
+
 @pytest.mark.parametrize(("command", "least_m", "most_m"), [(5003, 49.9, 50.0), (5004, 50.0, 50.1)])
 def test_a_circle_is_an_area_that_errs_to_the_safe_side(
     command: int, least_m: float, most_m: float
