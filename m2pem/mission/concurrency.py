@@ -50,7 +50,7 @@ from m2pem.mission.events import (
 )
 from m2pem.mission.loops import MultiInstance
 from m2pem.mission.mission import Mission
-from m2pem.mission.reachability import following
+from m2pem.mission.reachability import following, reach
 
 MOST_INSTANCES = 10_000
 """Instances of an activity that are counted; there are no such fleets."""
@@ -161,7 +161,7 @@ class ConcurrentTasks:
     # --- forks ------------------------------------------------------------------------------------
 
     def _fork(self, branches: Sequence[_Branch], barrier: FlowNode | None) -> _Fork:
-        reached = [_reach(branch.entry, barrier) for branch in branches]
+        reached = [reach([branch.entry], barrier) for branch in branches]
         shared = Counter(node for nodes in reached for node in nodes) if len(branches) > 1 else {}
         for branch in branches:
             branch.only.extend(
@@ -291,7 +291,7 @@ class ConcurrentTasks:
             following_at_once = _leads_at_once_to(node)
             if following_at_once is None:
                 for each in following(node):
-                    later |= _reach(each, fork.node) if each not in later else set()
+                    later |= reach([each], fork.node) if each not in later else set()
                 following_at_once = self._entries_of(node)
             for each in following_at_once:
                 if each not in entered:
@@ -421,19 +421,6 @@ class _Heaviest:
 
 
 # --- the graph ------------------------------------------------------------------------------------
-
-
-def _reach(entry: FlowNode, barrier: FlowNode | None) -> set[FlowNode]:
-    waiting, found = [entry], {entry}
-    while waiting:
-        node = waiting.pop()
-        if node is barrier:
-            continue
-        for each in following(node):
-            if each not in found:
-                found.add(each)
-                waiting.append(each)
-    return found
 
 
 def _next(node: FlowNode) -> Iterator[tuple[FlowNode, frozenset[str]]]:

@@ -55,15 +55,24 @@ def begins_by_itself(node: FlowNode) -> bool:
 
 def unreached(container: Container, also: Iterable[FlowNode] = ()) -> list[FlowNode]:
     """The nodes directly in a container that no path leads to from its entries, or from `also`."""
-    waiting: list[FlowNode] = [*container.entries, *also]
-    waiting += [node for node in container.nodes if begins_by_itself(node)]
-    reached = set(waiting)
-    while waiting:
-        for each in following(waiting.pop()):
-            if each not in reached:
-                reached.add(each)
-                waiting.append(each)
+    begun = (node for node in container.nodes if begins_by_itself(node))
+    reached = reach((*container.entries, *also, *begun))
     return [node for node in container.nodes if node not in reached]
+
+
+def reach(entries: Iterable[FlowNode], barrier: FlowNode | None = None) -> set[FlowNode]:
+    """Return where tokens on `entries` can be, then or later. None goes on from `barrier`."""
+    waiting = list(entries)
+    found = set(waiting)
+    while waiting:
+        node = waiting.pop()
+        if node is barrier:
+            continue
+        for each in following(node):
+            if each not in found:
+                found.add(each)
+                waiting.append(each)
+    return found
 
 
 def upstream(join: FlowNode) -> dict[FlowNode, int]:
