@@ -4,8 +4,6 @@ from collections import OrderedDict
 from collections.abc import Collection, Hashable, Iterable, Mapping
 from typing import TypeVar
 
-import rustworkx
-
 from m2pem.mission.elements import (
     Activity,
     BoundaryEvent,
@@ -104,6 +102,9 @@ def components(successors: Mapping[N, Collection[N]]) -> dict[N, int]:
 
     Successors that are no keys are not in the graph.
     """
+    # Loaded when needed: it loads NumPy, and what runs a mission asks for other things alone.
+    import rustworkx  # noqa: PLC0415
+
     graph: rustworkx.PyDiGraph = rustworkx.PyDiGraph()
     index = dict(zip(successors, graph.add_nodes_from(tuple(successors)), strict=True))
     graph.add_edges_from_no_data(
