@@ -10,13 +10,13 @@ the grid for it; without the grid, those of `NEAR` are taken as they are.
 import re
 from collections.abc import Callable, Collection
 from functools import cache
-from typing import TYPE_CHECKING
+
+from pyproj import CRS, Transformer
+from pyproj.crs import CompoundCRS
+from pyproj.exceptions import ProjError
 
 from m2pem.geo.geoid import mean_sea_level_m
 from m2pem.geo.local_frame import SEMI_MAJOR_M
-
-if TYPE_CHECKING:
-    from pyproj import CRS, Transformer
 
 ToSeaLevel = Callable[[float, float, float], float]
 """Makes latitude, longitude and a height in metres an altitude above mean sea level; NaN or
@@ -43,16 +43,13 @@ class DatumError(ValueError):
     """Heights cannot be converted; the text says which, and what would be right."""
 
 
-def to_wgs84(crs: "CRS") -> "Transformer":
+def to_wgs84(crs: CRS) -> Transformer:
     """Return the conversion of a system's x (east), y (north), and height if it is
     three-dimensional, to WGS-84 longitude, latitude and height.
 
     Raises:
         DatumError: it is not known how the system lies on the Earth.
     """
-    from pyproj import Transformer  # noqa: PLC0415
-    from pyproj.exceptions import ProjError  # noqa: PLC0415
-
     own = unbound(crs)
     target = "EPSG:4979" if len(own.axis_info) > 2 else "EPSG:4326"
     datum = own.datum.name if own.datum else ""
@@ -67,7 +64,7 @@ def to_wgs84(crs: "CRS") -> "Transformer":
     raise DatumError(f"of its datum {datum[:80]!r} no transformation to WGS 84 is known")
 
 
-def heights_of(crs: "CRS") -> tuple[float, ToSeaLevel]:
+def heights_of(crs: CRS) -> tuple[float, ToSeaLevel]:
     """Return the unit of a system's heights, in metres (1 if it has none, negative: they count
     downwards), and what makes heights in metres altitudes above mean sea level.
 
@@ -94,20 +91,18 @@ def heights_of(crs: "CRS") -> tuple[float, ToSeaLevel]:
     return unit_m, convert
 
 
-def unbound(crs: "CRS") -> "CRS":
+def unbound(crs: CRS) -> CRS:
     """Return a system without the transformation that its text names."""
     return crs.source_crs if crs.is_bound and crs.source_crs is not None else crs
 
 
-def _datum(vertical: "CRS") -> str:
+def _datum(vertical: CRS) -> str:
     """Return the name of its datum without what differs between Esri's and EPSG's."""
     return re.sub(r"[\W_]+", "", vertical.datum.name).lower() if vertical.datum else ""
 
 
 @cache
 def _datums(codes: Collection[int]) -> frozenset[str]:
-    from pyproj import CRS  # noqa: PLC0415
-
     return frozenset(_datum(CRS.from_epsg(code)) for code in codes)
 
 
@@ -115,12 +110,8 @@ def _as_it_is(_latitude_deg: float, _longitude_deg: float, height_m: float) -> f
     return height_m
 
 
-def _by_grid(vertical: "CRS", unit_m: float) -> ToSeaLevel | None:
+def _by_grid(vertical: CRS, unit_m: float) -> ToSeaLevel | None:
     """Return the conversion by PROJ; None: it has no grid for it here."""
-    from pyproj import CRS, Transformer  # noqa: PLC0415
-    from pyproj.crs import CompoundCRS  # noqa: PLC0415
-    from pyproj.exceptions import ProjError  # noqa: PLC0415
-
     system = CompoundCRS(vertical.name, [CRS("EPSG:4326"), vertical])
     try:
         # Without `allow_ballpark`, PROJ gives heights back as they were where a grid is missing.

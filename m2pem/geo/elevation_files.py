@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from m2pem.errors import M2pemError
-from m2pem.geo.datums import DatumError, heights_of, to_wgs84
 from m2pem.units import LENGTHS_IN_FILES
 
 if TYPE_CHECKING:
@@ -101,6 +100,8 @@ class Raster:
             ) from None
         from pyproj import CRS  # noqa: PLC0415
         from pyproj.exceptions import ProjError  # noqa: PLC0415
+
+        from m2pem.geo.datums import DatumError, heights_of, to_wgs84  # noqa: PLC0415
 
         try:
             self._data: DatasetReader = rasterio.open(path)
