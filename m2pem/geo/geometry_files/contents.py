@@ -2,9 +2,10 @@
 
 import re
 import unicodedata
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import islice
 
 from m2pem.findings import Severity
 from m2pem.geo.geojson import GeometryError, above_sea_level, kind_of
@@ -93,23 +94,24 @@ class Contents:
         if len(self._geometries) >= MAX_FEATURES:
             self.is_full = True
             raise GeometryError(f"is beyond the first {MAX_FEATURES} features", "split the file")
-        count = sum(1 for _ in positions(geometry))
-        self.expect(count)
-        self._positions += count
+        self._positions += self.expect(positions(geometry))
         self._geometries.append(
             NamedGeometry(self._unique(name, geometry), above_sea_level(geometry))
         )
 
-    def expect(self, positions: int) -> None:
-        """Refuse that many positions more before the work of reading them.
+    def expect(self, positions: Iterable[object]) -> int:
+        """Count positions that are to come, or what stands for each, before the work of reading
+        them.
 
         Raises:
-            GeometryError: the file has too many.
+            GeometryError: the file has too many; no more of them are looked at.
         """
-        if self._positions + positions > MAX_POSITIONS:
+        count = sum(1 for _ in islice(positions, MAX_POSITIONS + 1))
+        if self._positions + count > MAX_POSITIONS:
             raise GeometryError(
                 f"the file has more than {MAX_POSITIONS:,} positions", "simplify its lines"
             )
+        return count
 
     def warn(self, feature: str, message: str, remedy: str = "", kind: str = "") -> None:
         """Add a warning: the feature was read, and something of it was not kept."""

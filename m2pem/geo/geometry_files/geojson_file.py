@@ -3,7 +3,6 @@
 import json
 import re
 from collections.abc import Mapping, Sequence
-from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 from m2pem.geo.geojson import (
@@ -17,7 +16,7 @@ from m2pem.geo.geojson import (
     parsed_json,
     stated_frame,
 )
-from m2pem.geo.geometry_files.contents import MAX_POSITIONS, Contents, NamedGeometry
+from m2pem.geo.geometry_files.contents import Contents, NamedGeometry
 from m2pem.geo.geometry_files.csv_file import warn_of_fields
 
 if TYPE_CHECKING:
@@ -40,7 +39,7 @@ def read_geojson(content: bytes, contents: Contents) -> None:
     """
     text = decoded(content)
     # Before they are parsed: half a million positions are 150 MB of lists.
-    contents.expect(sum(1 for _ in islice(_POSITION.finditer(text), MAX_POSITIONS + 1)))
+    contents.expect(_POSITION.finditer(text))
     value = parsed_json(text)
     if not isinstance(value, Mapping) or not isinstance(value.get("type"), str):
         raise GeometryError("is not GeoJSON: an object with 'type' is expected")

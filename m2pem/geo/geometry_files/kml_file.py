@@ -7,7 +7,7 @@ a route's waypoints.
 
 import json
 from collections.abc import Callable, Iterator, Sequence
-from itertools import islice
+from itertools import chain
 from posixpath import dirname, join, normpath
 from urllib.parse import unquote
 
@@ -29,7 +29,7 @@ from m2pem.geo.geojson import (
     with_speeds,
 )
 from m2pem.geo.geometry_files.archive import archive_of, member
-from m2pem.geo.geometry_files.contents import MAX_POSITIONS, Contents, NamedGeometry
+from m2pem.geo.geometry_files.contents import Contents, NamedGeometry
 from m2pem.geo.geometry_files.csv_file import warn_of_fields
 from m2pem.geo.geometry_files.kml_elements import (
     POSITION,
@@ -95,7 +95,9 @@ def read_kml(content: bytes, contents: Contents) -> None:
 def _read(content: bytes, contents: Contents, members: Sequence[str], base: str) -> list[str]:
     """Return which of the archive's members it links, once each."""
     root = kml_root(content)
-    contents.expect(_position_count(root))
+    texts = (element.text or "" for element in root.iter("{*}coordinates"))
+    places = (each for text in texts for each in POSITION.finditer(text))
+    contents.expect(chain(root.iter("{*}coord"), places))
     linked: dict[str, None] = {}
     if has_waylines(root):
         read_waylines(root, contents)
@@ -120,17 +122,6 @@ def _read(content: bytes, contents: Contents, members: Sequence[str], base: str)
             name = child_text(element, "name")
             contents.warn(f"{local} {name!r}" if name else local, *_NOT_READ[local])
     return list(linked)
-
-
-def _position_count(root: Element) -> int:
-    """Return how many positions a document has, at most one beyond the limit for each element."""
-    count = sum(1 for _ in islice(root.iter("{*}coord"), MAX_POSITIONS + 1))
-    for element in root.iter("{*}coordinates"):
-        if count > MAX_POSITIONS:
-            break
-        found = POSITION.finditer(element.text or "")
-        count += sum(1 for _ in islice(found, MAX_POSITIONS + 1))
-    return count
 
 
 def _read_placemark(placemark: Element, contents: Contents) -> None:

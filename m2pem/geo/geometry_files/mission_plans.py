@@ -243,7 +243,7 @@ def read_waypoints(content: bytes, contents: Contents) -> None:
             f"is not a waypoint file: line {rows[0][0] if rows else 1} is not '{WPL_HEADER}'",
             "save the mission, fence or rally points again by the ground station",
         )
-    contents.expect(len(rows) - 1)
+    contents.expect(rows[1:])
     items = [_row_item(columns, line) for line, columns in rows[1:]]
     first, after = (items[0] if items else None), items[1:2]
     is_absolute = first is not None and first.frame == _FRAME_NUMBERS["amsl"]

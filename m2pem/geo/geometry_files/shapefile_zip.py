@@ -48,7 +48,7 @@ def _read_layer(archive: Archive, name: str, contents: Contents) -> None:
     if not projection:
         contents.warn(name, "has no .prj: taken as WGS 84 longitude and latitude")
     system = system_of_wkt(projection) if projection else system_named("EPSG:4326")
-    contents.expect(_position_count(parts[".shp"] or b""))
+    contents.expect(range(_position_count(parts[".shp"] or b"")))
     streams: dict[str, Any] = {
         suffix[1:]: BytesIO(content)
         for suffix, content in parts.items()
