@@ -5,13 +5,14 @@ make a cell, each cell is covered as a whole, and the way between two passes lea
 kept out. Several vehicles get passes in a row, by their speeds.
 """
 
-import heapq
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise, product
 from typing import Any, TypeAlias
 
+import rustworkx
 import shapely
 from shapely.geometry.base import BaseGeometry
 
@@ -140,7 +141,6 @@ class _Ground:
     closed: BaseGeometry
     inner: BaseGeometry
     corners: list[EastNorth]
-    _visible: dict[tuple[int, int], bool] = field(default_factory=dict)
 
     @classmethod
     def of(cls, pattern: SurveyPattern, frame: LocalFrame) -> "_Ground":
@@ -188,39 +188,34 @@ class _Ground:
         """
         if a == b or self.free(a, b):
             return []
-        places = [a, b, *self.corners]
-        best = {0: 0.0}
-        before: dict[int, int] = {}
-        queue = [(0.0, 0)]
-        while queue:
-            length, at = heapq.heappop(queue)
-            if at == 1:
-                break
-            if length > best[at]:
-                continue
-            for to in range(1, len(places)):
-                further = length + math.dist(places[at], places[to])
-                if further < best.get(to, math.inf) and self._sees(places, at, to):
-                    best[to], before[to] = further, at
-                    heapq.heappush(queue, (further, to))
-        if 1 not in before:
+        graph = self._corner_graph.copy()
+        start, end = self._add(graph, a), self._add(graph, b)
+        paths = rustworkx.dijkstra_shortest_paths(graph, start, target=end, weight_fn=float)
+        if end not in paths:
             raise GeometryError(
                 "a part of the area cannot be reached without entering what is kept out: "
                 "survey the parts on their own"
             )
-        way, at = [], before[1]
-        while at:
-            way.append(places[at])
-            at = before[at]
-        return way[::-1]
+        return [graph[at] for at in paths[end][1:-1]]
 
-    def _sees(self, places: Sequence[EastNorth], at: int, to: int) -> bool:
-        if min(at, to) < 2:
-            return self.free(places[at], places[to])
-        key = (min(at, to), max(at, to))
-        if key not in self._visible:
-            self._visible[key] = self.free(places[at], places[to])
-        return self._visible[key]
+    @cached_property
+    def _corner_graph(self) -> rustworkx.PyGraph:
+        """The corners, and the lengths of the free straight ways between them."""
+        graph: rustworkx.PyGraph = rustworkx.PyGraph()
+        for corner in self.corners:
+            self._add(graph, corner)
+        return graph
+
+    def _add(self, graph: rustworkx.PyGraph, place: EastNorth) -> int:
+        """Add a place and the free straight ways from it; return its index."""
+        ways = [
+            (at, math.dist(place, graph[at]))
+            for at in graph.node_indices()
+            if self.free(place, graph[at])
+        ]
+        index: int = graph.add_node(place)
+        graph.add_edges_from([(index, at, length_m) for at, length_m in ways])
+        return index
 
 
 def _polygon(ring: Sequence[Coordinate], frame: LocalFrame) -> shapely.Polygon:
