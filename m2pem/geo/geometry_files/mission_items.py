@@ -148,10 +148,10 @@ class MissionReader:
                 message = f"{command.title} cannot be flown as part of a route"
                 self._note(Severity.ERROR, label, message, command.remedy)
 
-    def add_pattern(self, number: int, name: str, remedy: str) -> None:
+    def add_pattern(self, number: int, name: str) -> None:
         """Add an item that is flown by waypoints of its own, which are not read."""
         if self._places:
-            self._endings.append(_Ending(str(number), name, remedy))
+            self._endings.append(_Ending(str(number), name, "do that by a task"))
 
     def finish(self) -> None:
         """Add the route, if there is one, and say what was left out of it."""

@@ -128,7 +128,7 @@ def _read_complex(
 ) -> None:
     kind = str(item.get("complexItemType") or item.get("type") or "no 'type'")[:40]
     where = f"item {number} ({kind})"
-    reader.add_pattern(number, f"a {kind}", "do that by a task")
+    reader.add_pattern(number, f"a {kind}")
     with contents.feature(where):
         if kind in _PATTERNS:
             is_corridor = kind == "CorridorScan"

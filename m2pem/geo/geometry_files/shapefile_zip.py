@@ -74,7 +74,6 @@ def _read_shapes(
     contents: Contents,
     has_records: bool,
 ) -> None:
-    warned = False
     for index in range(len(layer)):
         if index > MAX_FEATURES:
             raise GeometryError(f"has more than {MAX_FEATURES} shapes", "split the layer")
@@ -90,8 +89,7 @@ def _read_shapes(
             contents.warn(where, "has no geometry")
             continue
         frame = stated_frame(values)
-        if not frame and shape.shapeType in _WITH_Z and not warned:
-            warned = True
+        if not frame and shape.shapeType in _WITH_Z:
             of = f" of {system.name!r} are converted to" if system.has_heights else " are taken as"
             contents.warn(
                 name,
@@ -102,7 +100,7 @@ def _read_shapes(
             geometry = _geometry(shape, where, contents)
             if shape.shapeType in _WITH_Z and not system.has_heights:
                 frame = frame or "amsl"
-            properties = {"name": title, **({"altitude_frame": frame} if frame else {})}
+            properties = {"name": title, "altitude_frame": frame}
             feature = {"type": "Feature", "properties": properties, "geometry": geometry}
             read_feature(feature, where, contents, system)
 
