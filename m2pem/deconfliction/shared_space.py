@@ -12,8 +12,7 @@ from m2pem.deconfliction.conflicts import Occupant, Refusal, does_what, way_out
 from m2pem.deconfliction.operational_volume import Volume
 from m2pem.fleet.fleet import Fleet, SharedSpace
 from m2pem.geo.local_frame import EastNorth, LocalFrame
-from m2pem.geo.polygon import Hull
-from m2pem.geo.region import Region, region_of
+from m2pem.geo.polygon import Hull, Region, region_of
 from m2pem.mission.catalogue import ResourceId
 
 

@@ -9,8 +9,7 @@ from m2pem.fleet.fleet import Fleet, SharedSpace
 from m2pem.fleet.space import ONE_BY_ONE
 from m2pem.fleet.task_findings import TaskFindings
 from m2pem.geo.local_frame import LocalFrame
-from m2pem.geo.polygon import convex_hull
-from m2pem.geo.region import region_of
+from m2pem.geo.polygon import convex_hull, region_of
 from m2pem.mission.behavior import Behavior, BehaviorType
 from m2pem.mission.geometry import Area, Geometry, Route
 
