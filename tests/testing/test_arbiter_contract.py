@@ -2,6 +2,7 @@
 
 import asyncio
 import dataclasses
+import inspect
 import os
 import threading
 import time
@@ -373,7 +374,7 @@ def test_the_contract_finds_what_is_wrong(
         "effects": count_starts,
     }
     check = getattr(ArbiterContract, f"test_{test}")
-    wanted = check.__code__.co_varnames[1 : check.__code__.co_argcount]
+    _, *wanted = inspect.signature(check).parameters
     with pytest.raises((AssertionError, KeyError, RuntimeError)):
         check(ArbiterContract(), **{name: offered[name] for name in wanted})
 

@@ -3,7 +3,6 @@
 The tests of queries, epochs, holds and links are in `m2pem.testing.contracts.arbiter_links`.
 """
 
-from collections.abc import Callable
 from itertools import pairwise
 
 from m2pem.api.arbiter import ResolvedValue
@@ -18,11 +17,10 @@ from m2pem.testing.contracts.arbiter_harness import (
     ArbiterHarness,
     CutLink,
     Effects,
-    Main,
     MakeArbiter,
+    connected,
     start,
     terminal,
-    with_harness,
 )
 from m2pem.testing.contracts.arbiter_links import ArbiterLinks
 from m2pem.testing.contracts.contract import needs, skip_unsupported
@@ -52,247 +50,198 @@ class ArbiterContract(ArbiterLinks):
     Those tests are skipped, and the summary at the end lists them. All others must pass.
     """
 
-    def test_the_arbiter_declares_what_it_can_do_beyond_its_protocol(
-        self, make_arbiter: MakeArbiter, run: Callable[[Main], None]
+    @connected
+    async def test_the_arbiter_declares_what_it_can_do_beyond_its_protocol(
+        self, harness: ArbiterHarness
     ) -> None:
         """`capabilities` names what is there, and nothing else: the executive asks for no more."""
+        problem = arbiter_problem(harness.arbiter)
+        assert not problem, problem
 
-        async def main(harness: ArbiterHarness) -> None:
-            problem = arbiter_problem(harness.arbiter)
-            assert not problem, problem
-
-        with_harness(make_arbiter, run, main)
-
-    def test_accepted_comes_before_running_and_one_terminal_report_last(
-        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    @connected
+    async def test_accepted_comes_before_running_and_one_terminal_report_last(
+        self, harness: ArbiterHarness, case: ArbiterCase
     ) -> None:
         """ACCEPTED, RUNNING, then exactly one terminal report, and none after it."""
+        await start(harness, "r1.b1", case.short, case.vehicle)
+        end = await harness.ended("r1.b1", case.short_s)
+        assert end.state is BehaviorState.SUCCEEDED, end
+        await harness.clock.sleep(case.watch_s)
+        assert harness.states_of("r1.b1") == [
+            BehaviorState.ACCEPTED,
+            BehaviorState.RUNNING,
+            BehaviorState.SUCCEEDED,
+        ]
 
-        async def main(harness: ArbiterHarness) -> None:
-            await start(harness, "r1.b1", case.short, case.vehicle)
-            end = await harness.ended("r1.b1", case.short_s)
-            assert end.state is BehaviorState.SUCCEEDED, end
-            await harness.clock.sleep(case.watch_s)
-            assert harness.states_of("r1.b1") == [
-                BehaviorState.ACCEPTED,
-                BehaviorState.RUNNING,
-                BehaviorState.SUCCEEDED,
-            ]
-
-        with_harness(make_arbiter, run, main)
-
-    def test_report_numbers_rise_from_one(
-        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    @connected
+    async def test_report_numbers_rise_from_one(
+        self, harness: ArbiterHarness, case: ArbiterCase
     ) -> None:
         """The executive distinguishes old reports from new ones by their numbers."""
+        await start(harness, "r1.b1", case.short, case.vehicle)
+        await harness.ended("r1.b1", case.short_s)
+        numbers = [report.number for report in harness.of("r1.b1")]
+        assert numbers[0] == 1, numbers
+        assert all(a < b for a, b in pairwise(numbers)), numbers
 
-        async def main(harness: ArbiterHarness) -> None:
-            await start(harness, "r1.b1", case.short, case.vehicle)
-            await harness.ended("r1.b1", case.short_s)
-            numbers = [report.number for report in harness.of("r1.b1")]
-            assert numbers[0] == 1, numbers
-            assert all(a < b for a, b in pairwise(numbers)), numbers
-
-        with_harness(make_arbiter, run, main)
-
-    def test_a_second_start_of_the_same_behavior_has_no_effect(
-        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    @connected
+    async def test_a_second_start_of_the_same_behavior_has_no_effect(
+        self, harness: ArbiterHarness, case: ArbiterCase
     ) -> None:
         """The executive sends a start again when it does not know whether it arrived."""
-
-        async def main(harness: ArbiterHarness) -> None:
-            await start(harness, "r1.b1", case.short, case.vehicle)
-            await start(harness, "r1.b1", case.short, case.vehicle)
-            await harness.ended("r1.b1", case.short_s)
-            before = harness.of("r1.b1")
-            await start(harness, "r1.b1", case.short, case.vehicle)
-            await harness.clock.sleep(case.short_s)
-            assert harness.of("r1.b1") == before
-            states = [BehaviorState.ACCEPTED, BehaviorState.RUNNING, BehaviorState.SUCCEEDED]
-            assert harness.states_of("r1.b1") == states
-
-        with_harness(make_arbiter, run, main)
+        await start(harness, "r1.b1", case.short, case.vehicle)
+        await start(harness, "r1.b1", case.short, case.vehicle)
+        await harness.ended("r1.b1", case.short_s)
+        before = harness.of("r1.b1")
+        await start(harness, "r1.b1", case.short, case.vehicle)
+        await harness.clock.sleep(case.short_s)
+        assert harness.of("r1.b1") == before
+        states = [BehaviorState.ACCEPTED, BehaviorState.RUNNING, BehaviorState.SUCCEEDED]
+        assert harness.states_of("r1.b1") == states
 
     @needs("effects")
-    def test_a_second_start_has_one_physical_effect(
-        self,
-        make_arbiter: MakeArbiter,
-        case: ArbiterCase,
-        effects: Effects | None,
-        run: Callable[[Main], None],
+    @connected
+    async def test_a_second_start_has_one_physical_effect(
+        self, harness: ArbiterHarness, case: ArbiterCase, effects: Effects | None
     ) -> None:
         """Whether it comes at once, meanwhile or afterwards, the vehicle begins once."""
         if effects is None:
             skip_unsupported("effects", "the fixture `effects` is not overridden")
+        before = effects(harness.arbiter, case.vehicle)
+        await start(harness, "r1.b1", case.short, case.vehicle)
+        await start(harness, "r1.b1", case.short, case.vehicle)
+        await harness.running("r1.b1")
+        await start(harness, "r1.b1", case.short, case.vehicle)
+        await harness.ended("r1.b1", case.short_s)
+        await start(harness, "r1.b1", case.short, case.vehicle)
+        await harness.clock.sleep(case.watch_s)
+        assert effects(harness.arbiter, case.vehicle) - before == 1
 
-        async def main(harness: ArbiterHarness) -> None:
-            before = effects(harness.arbiter, case.vehicle)
-            await start(harness, "r1.b1", case.short, case.vehicle)
-            await start(harness, "r1.b1", case.short, case.vehicle)
-            await harness.running("r1.b1")
-            await start(harness, "r1.b1", case.short, case.vehicle)
-            await harness.ended("r1.b1", case.short_s)
-            await start(harness, "r1.b1", case.short, case.vehicle)
-            await harness.clock.sleep(case.watch_s)
-            assert effects(harness.arbiter, case.vehicle) - before == 1
-
-        with_harness(make_arbiter, run, main)
-
-    def test_an_unknown_behavior_is_rejected_by_name(
-        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    @connected
+    async def test_an_unknown_behavior_is_rejected_by_name(
+        self, harness: ArbiterHarness, case: ArbiterCase
     ) -> None:
         """REJECTED, with a code, and a reason that names the behavior."""
+        await harness.start("r1.b1", "no_such_behavior", case.vehicle)
+        end = await harness.ended("r1.b1", 10)
+        assert end.state is BehaviorState.REJECTED, end
+        assert end.code, "a rejection has a code"
+        assert "no_such_behavior" in end.reason, end.reason
 
-        async def main(harness: ArbiterHarness) -> None:
-            await harness.start("r1.b1", "no_such_behavior", case.vehicle)
-            end = await harness.ended("r1.b1", 10)
-            assert end.state is BehaviorState.REJECTED, end
-            assert end.code, "a rejection has a code"
-            assert "no_such_behavior" in end.reason, end.reason
-
-        with_harness(make_arbiter, run, main)
-
-    def test_a_bad_parameter_is_rejected_by_name(
-        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    @connected
+    async def test_a_bad_parameter_is_rejected_by_name(
+        self, harness: ArbiterHarness, case: ArbiterCase
     ) -> None:
         """REJECTED, with a reason that names the parameter; nothing has moved."""
+        name, value = case.bad
+        behavior, parameters = case.long
+        await start(harness, "r1.b1", (behavior, {**parameters, name: value}), case.vehicle)
+        end = await harness.ended("r1.b1", 10)
+        assert end.state is BehaviorState.REJECTED, end
+        assert name in end.reason, end.reason
+        assert harness.states_of("r1.b1") == [BehaviorState.REJECTED]
 
-        async def main(harness: ArbiterHarness) -> None:
-            name, value = case.bad
-            behavior, parameters = case.long
-            await start(harness, "r1.b1", (behavior, {**parameters, name: value}), case.vehicle)
-            end = await harness.ended("r1.b1", 10)
-            assert end.state is BehaviorState.REJECTED, end
-            assert name in end.reason, end.reason
-            assert harness.states_of("r1.b1") == [BehaviorState.REJECTED]
-
-        with_harness(make_arbiter, run, main)
-
-    def test_an_unknown_parameter_is_rejected_by_name(
-        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    @connected
+    async def test_an_unknown_parameter_is_rejected_by_name(
+        self, harness: ArbiterHarness, case: ArbiterCase
     ) -> None:
         """A parameter that is not in the catalogue is not silently left out."""
+        behavior, parameters = case.long
+        await start(harness, "r1.b1", (behavior, {**parameters, "colour": 1.0}), case.vehicle)
+        end = await harness.ended("r1.b1", 10)
+        assert end.state is BehaviorState.REJECTED, end
+        assert "colour" in end.reason, end.reason
 
-        async def main(harness: ArbiterHarness) -> None:
-            behavior, parameters = case.long
-            await start(harness, "r1.b1", (behavior, {**parameters, "colour": 1.0}), case.vehicle)
-            end = await harness.ended("r1.b1", 10)
-            assert end.state is BehaviorState.REJECTED, end
-            assert "colour" in end.reason, end.reason
-
-        with_harness(make_arbiter, run, main)
-
-    def test_a_busy_vehicle_refuses_another_behavior(
-        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    @connected
+    async def test_a_busy_vehicle_refuses_another_behavior(
+        self, harness: ArbiterHarness, case: ArbiterCase
     ) -> None:
         """Code RESOURCE_UNAVAILABLE; what runs is not disturbed."""
-
-        async def main(harness: ArbiterHarness) -> None:
-            await start(harness, "r1.b1", case.long, case.vehicle)
-            await harness.running("r1.b1")
-            await start(harness, "r1.b2", case.short, case.vehicle)
-            end = await harness.ended("r1.b2", 10)
-            assert (end.state, end.code) == (BehaviorState.REJECTED, "RESOURCE_UNAVAILABLE"), end
-            assert not terminal(harness, "r1.b1"), "the first goes on"
-
-        with_harness(make_arbiter, run, main)
+        await start(harness, "r1.b1", case.long, case.vehicle)
+        await harness.running("r1.b1")
+        await start(harness, "r1.b2", case.short, case.vehicle)
+        end = await harness.ended("r1.b2", 10)
+        assert (end.state, end.code) == (BehaviorState.REJECTED, "RESOURCE_UNAVAILABLE"), end
+        assert not terminal(harness, "r1.b1"), "the first goes on"
 
     @needs("preempt")
-    def test_a_behavior_that_preempts_takes_the_vehicle_over(
-        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    @connected
+    async def test_a_behavior_that_preempts_takes_the_vehicle_over(
+        self, harness: ArbiterHarness, case: ArbiterCase
     ) -> None:
         """`preempts` names what is being cancelled: it ends CANCELLED at once."""
-
-        async def main(harness: ArbiterHarness) -> None:
-            await start(harness, "r1.b1", case.long, case.vehicle)
-            await harness.running("r1.b1")
-            await start(harness, "r1.b2", case.long, case.vehicle, preempts=("r1.b1",))
-            assert (await harness.ended("r1.b1", 10)).state is BehaviorState.CANCELLED
-            await harness.running("r1.b2", 10)
-
-        with_harness(make_arbiter, run, main)
+        await start(harness, "r1.b1", case.long, case.vehicle)
+        await harness.running("r1.b1")
+        await start(harness, "r1.b2", case.long, case.vehicle, preempts=("r1.b1",))
+        assert (await harness.ended("r1.b1", 10)).state is BehaviorState.CANCELLED
+        await harness.running("r1.b2", 10)
 
     @needs("remaining")
-    def test_less_and_less_is_left_of_a_route(
-        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    @connected
+    async def test_less_and_less_is_left_of_a_route(
+        self, harness: ArbiterHarness, case: ArbiterCase
     ) -> None:
         """`remaining`: parameters of the same behavior, with the rest of its route."""
+        if case.route is None:
+            skip_unsupported("remaining", "the case has no `route`")
+        name, parameters = case.route
+        specs = {each.name: each for each in harness.arbiter.catalogue(case.vehicle)}
+        spec = specs[name]
+        await start(harness, "r1.b1", (name, parameters), case.vehicle)
+        await harness.ended("r1.b1", case.route_s)
+        said = [report.remaining for report in harness.of("r1.b1") if report.remaining]
+        assert len(said) > 1, harness.of("r1.b1")
+        assert len(said) <= MOST_REPORTS, f"each is a record of the journal: {len(said)}"
+        routes = [resolve(spec, each, lambda _: None, ())["route"] for each in said]
+        lengths = [length_m(route) for route in (parameters["route"], *routes)]
+        assert all(a > b for a, b in pairwise(lengths)), lengths
+        assert lengths[-1] < lengths[0] / 2, lengths
+        problem = refusal(spec, resolve(spec, said[-1], lambda _: None, ()))
+        assert not problem, problem
 
-        async def main(harness: ArbiterHarness) -> None:
-            if case.route is None:
-                skip_unsupported("remaining", "the case has no `route`")
-            name, parameters = case.route
-            specs = {each.name: each for each in harness.arbiter.catalogue(case.vehicle)}
-            spec = specs[name]
-            await start(harness, "r1.b1", (name, parameters), case.vehicle)
-            await harness.ended("r1.b1", case.route_s)
-            said = [report.remaining for report in harness.of("r1.b1") if report.remaining]
-            assert len(said) > 1, harness.of("r1.b1")
-            assert len(said) <= MOST_REPORTS, f"each is a record of the journal: {len(said)}"
-            routes = [resolve(spec, each, lambda _: None, ())["route"] for each in said]
-            lengths = [length_m(route) for route in (parameters["route"], *routes)]
-            assert all(a > b for a, b in pairwise(lengths)), lengths
-            assert lengths[-1] < lengths[0] / 2, lengths
-            problem = refusal(spec, resolve(spec, said[-1], lambda _: None, ()))
-            assert not problem, problem
-
-        with_harness(make_arbiter, run, main)
-
-    def test_cancel_ends_a_behavior_within_the_declared_bound(
-        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    @connected
+    async def test_cancel_ends_a_behavior_within_the_declared_bound(
+        self, harness: ArbiterHarness, case: ArbiterCase
     ) -> None:
         """A cancel ends a behavior within `limits().cancel_timeout_s`."""
+        await start(harness, "r1.b1", case.long, case.vehicle)
+        await harness.running("r1.b1")
+        await harness.clock.sleep(case.watch_s / 2)
+        await harness.arbiter.cancel("r1.b1", 1)
+        bound_s = harness.arbiter.limits(case.vehicle).cancel_timeout_s
+        assert (await harness.ended("r1.b1", bound_s)).state is BehaviorState.CANCELLED
 
-        async def main(harness: ArbiterHarness) -> None:
-            await start(harness, "r1.b1", case.long, case.vehicle)
-            await harness.running("r1.b1")
-            await harness.clock.sleep(case.watch_s / 2)
-            await harness.arbiter.cancel("r1.b1", 1)
-            bound_s = harness.arbiter.limits(case.vehicle).cancel_timeout_s
-            assert (await harness.ended("r1.b1", bound_s)).state is BehaviorState.CANCELLED
-
-        with_harness(make_arbiter, run, main)
-
-    def test_a_second_cancel_changes_nothing(
-        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    @connected
+    async def test_a_second_cancel_changes_nothing(
+        self, harness: ArbiterHarness, case: ArbiterCase
     ) -> None:
         """A behavior has one terminal report, however often it is cancelled."""
+        await start(harness, "r1.b1", case.long, case.vehicle)
+        await harness.running("r1.b1")
+        await harness.arbiter.cancel("r1.b1", 1)
+        await harness.arbiter.cancel("r1.b1", 1)
+        await harness.ended("r1.b1", 60)
+        await harness.arbiter.cancel("r1.b1", 1)
+        await harness.clock.sleep(case.watch_s)
+        assert len(terminal(harness, "r1.b1")) == 1, harness.of("r1.b1")
 
-        async def main(harness: ArbiterHarness) -> None:
-            await start(harness, "r1.b1", case.long, case.vehicle)
-            await harness.running("r1.b1")
-            await harness.arbiter.cancel("r1.b1", 1)
-            await harness.arbiter.cancel("r1.b1", 1)
-            await harness.ended("r1.b1", 60)
-            await harness.arbiter.cancel("r1.b1", 1)
-            await harness.clock.sleep(case.watch_s)
-            assert len(terminal(harness, "r1.b1")) == 1, harness.of("r1.b1")
-
-        with_harness(make_arbiter, run, main)
-
-    def test_cancel_of_an_unknown_behavior_is_quiet(
-        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    @connected
+    async def test_cancel_of_an_unknown_behavior_is_quiet(
+        self, harness: ArbiterHarness, case: ArbiterCase
     ) -> None:
         """No report and no exception."""
+        await harness.arbiter.cancel("r9.b9", 1)
+        await harness.clock.sleep(case.watch_s)
+        assert harness.reports == []
 
-        async def main(harness: ArbiterHarness) -> None:
-            await harness.arbiter.cancel("r9.b9", 1)
-            await harness.clock.sleep(case.watch_s)
-            assert harness.reports == []
-
-        with_harness(make_arbiter, run, main)
-
-    def test_a_cancelled_vehicle_can_be_commanded_again(
-        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    @connected
+    async def test_a_cancelled_vehicle_can_be_commanded_again(
+        self, harness: ArbiterHarness, case: ArbiterCase
     ) -> None:
         """The terminal report says that the vehicle is free."""
-
-        async def main(harness: ArbiterHarness) -> None:
-            await start(harness, "r1.b1", case.long, case.vehicle)
-            await harness.running("r1.b1")
-            await harness.arbiter.cancel("r1.b1", 1)
-            await harness.ended("r1.b1", 60)
-            await start(harness, "r1.b2", case.long, case.vehicle)
-            await harness.running("r1.b2", 10)
-
-        with_harness(make_arbiter, run, main)
+        await start(harness, "r1.b1", case.long, case.vehicle)
+        await harness.running("r1.b1")
+        await harness.arbiter.cancel("r1.b1", 1)
+        await harness.ended("r1.b1", 60)
+        await start(harness, "r1.b2", case.long, case.vehicle)
+        await harness.running("r1.b2", 10)

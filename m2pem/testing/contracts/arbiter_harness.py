@@ -4,6 +4,8 @@
 """
 
 import asyncio
+import functools
+import inspect
 import logging
 import math
 from collections.abc import Awaitable, Callable, Mapping
@@ -258,18 +260,28 @@ async def _real(main: Main, speed: float) -> None:
     await main(SystemClock(speed))
 
 
-def with_harness(
-    make_arbiter: MakeArbiter,
-    run: Callable[[Main], None],
-    main: Callable[[ArbiterHarness], Awaitable[None]],
-) -> None:
-    """Run `main` with a connected arbiter."""
+def connected(test: Callable[..., Awaitable[None]]) -> Callable[..., None]:
+    """Make a test of a coroutine method, which gets a connected arbiter as `harness`, and other
+    fixtures by their names."""
+    given = inspect.signature(test)
 
-    async def connected(clock: Clock) -> None:
-        async with ArbiterHarness(make_arbiter(context(clock)), clock) as harness:
-            await main(harness)
+    @functools.wraps(test)
+    def run_test(
+        self: object, make_arbiter: MakeArbiter, run: Callable[[Main], None], **fixtures: Any
+    ) -> None:
+        async def main(clock: Clock) -> None:
+            async with ArbiterHarness(make_arbiter(context(clock)), clock) as harness:
+                await test(self, harness=harness, **fixtures)
 
-    run(connected)
+        run(main)
+
+    # What pytest reads to know the fixtures.
+    names = [*(name for name in given.parameters if name != "harness"), "make_arbiter", "run"]
+    parameters = [
+        inspect.Parameter(name, inspect.Parameter.POSITIONAL_OR_KEYWORD) for name in names
+    ]
+    run_test.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    return run_test
 
 
 async def start(

@@ -17,6 +17,7 @@ from m2pem.testing.contracts.arbiter_harness import (
     IsArbiters,
     Main,
     MakeArbiter,
+    connected,
     context,
     is_at_rest,
     is_moving,
@@ -25,7 +26,6 @@ from m2pem.testing.contracts.arbiter_harness import (
     speed,
     start,
     terminal,
-    with_harness,
 )
 from m2pem.testing.contracts.contract import needs, skip_unsupported
 
@@ -36,34 +36,26 @@ SETTLING_STEPS = 10
 class ArbiterLinks(ArbiterFixtures):
     """Tests of queries, epochs, holds, links, telemetry, and of what is left after the end."""
 
-    def test_query_tells_what_runs_and_what_has_ended(
-        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    @connected
+    async def test_query_tells_what_runs_and_what_has_ended(
+        self, harness: ArbiterHarness, case: ArbiterCase
     ) -> None:
         """RUNNING while it runs, then what it ended with."""
+        await start(harness, "r1.b1", case.short, case.vehicle)
+        await harness.running("r1.b1")
+        reference = harness.of("r1.b1")[-1].native_ref
+        found = await harness.arbiter.query("r1.b1", reference)
+        assert found.state is BehaviorState.RUNNING, found
+        end = await harness.ended("r1.b1", case.short_s)
+        found = await harness.arbiter.query("r1.b1", reference)
+        assert found.state is end.state, found
 
-        async def main(harness: ArbiterHarness) -> None:
-            await start(harness, "r1.b1", case.short, case.vehicle)
-            await harness.running("r1.b1")
-            reference = harness.of("r1.b1")[-1].native_ref
-            found = await harness.arbiter.query("r1.b1", reference)
-            assert found.state is BehaviorState.RUNNING, found
-            end = await harness.ended("r1.b1", case.short_s)
-            found = await harness.arbiter.query("r1.b1", reference)
-            assert found.state is end.state, found
-
-        with_harness(make_arbiter, run, main)
-
-    def test_query_of_an_unknown_behavior_is_unknown(
-        self, make_arbiter: MakeArbiter, run: Callable[[Main], None]
-    ) -> None:
+    @connected
+    async def test_query_of_an_unknown_behavior_is_unknown(self, harness: ArbiterHarness) -> None:
         """State UNKNOWN, and no report."""
-
-        async def main(harness: ArbiterHarness) -> None:
-            found = await harness.arbiter.query("r9.b9", None)
-            assert (found.id, found.state) == ("r9.b9", BehaviorState.UNKNOWN), found
-            assert harness.reports == [], "a query answers; it does not report"
-
-        with_harness(make_arbiter, run, main)
+        found = await harness.arbiter.query("r9.b9", None)
+        assert (found.id, found.state) == ("r9.b9", BehaviorState.UNKNOWN), found
+        assert harness.reports == [], "a query answers; it does not report"
 
     @needs("reconnect")
     def test_another_arbiter_finds_the_behavior_again(
@@ -110,57 +102,48 @@ class ArbiterLinks(ArbiterFixtures):
         run(main)
 
     @needs("second vehicle")
-    def test_a_start_of_a_past_epoch_is_refused(
-        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    @connected
+    async def test_a_start_of_a_past_epoch_is_refused(
+        self, harness: ArbiterHarness, case: ArbiterCase
     ) -> None:
         """Another executive has taken the run over: `StaleCommandError` names its epoch. Other runs
         are not concerned."""
-
-        async def main(harness: ArbiterHarness) -> None:
-            await start(harness, "r1.b1", case.long, case.vehicle, epoch=2)
-            await harness.running("r1.b1")
-            late = start(harness, "r1.b2", case.long, case.other, epoch=1)
-            assert "epoch 2" in await refusal(late)
-            await harness.clock.sleep(case.watch_s)
-            assert harness.of("r1.b2") == []
-            await start(harness, "r2.b1", case.long, case.other, epoch=1)
-            await harness.running("r2.b1", 10)
-
-        with_harness(make_arbiter, run, main)
+        await start(harness, "r1.b1", case.long, case.vehicle, epoch=2)
+        await harness.running("r1.b1")
+        late = start(harness, "r1.b2", case.long, case.other, epoch=1)
+        assert "epoch 2" in await refusal(late)
+        await harness.clock.sleep(case.watch_s)
+        assert harness.of("r1.b2") == []
+        await start(harness, "r2.b1", case.long, case.other, epoch=1)
+        await harness.running("r2.b1", 10)
 
     @needs("second vehicle")
-    def test_a_start_of_the_same_or_a_newer_epoch_is_accepted(
-        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    @connected
+    async def test_a_start_of_the_same_or_a_newer_epoch_is_accepted(
+        self, harness: ArbiterHarness, case: ArbiterCase
     ) -> None:
         """A takeover leaves the other vehicles of the run as they are."""
+        await start(harness, "r1.b1", case.long, case.vehicle, epoch=2)
+        await harness.running("r1.b1")
+        await start(harness, "r1.b2", case.long, case.other, epoch=2)
+        await harness.running("r1.b2", 10)
+        await harness.arbiter.cancel("r1.b2", 3)
+        await harness.ended("r1.b2", 60)
+        assert not terminal(harness, "r1.b1"), "only r1.b2 was cancelled"
 
-        async def main(harness: ArbiterHarness) -> None:
-            await start(harness, "r1.b1", case.long, case.vehicle, epoch=2)
-            await harness.running("r1.b1")
-            await start(harness, "r1.b2", case.long, case.other, epoch=2)
-            await harness.running("r1.b2", 10)
-            await harness.arbiter.cancel("r1.b2", 3)
-            await harness.ended("r1.b2", 60)
-            assert not terminal(harness, "r1.b1"), "only r1.b2 was cancelled"
-
-        with_harness(make_arbiter, run, main)
-
-    def test_a_cancel_of_a_past_epoch_is_refused(
-        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    @connected
+    async def test_a_cancel_of_a_past_epoch_is_refused(
+        self, harness: ArbiterHarness, case: ArbiterCase
     ) -> None:
         """Another executive has taken the run over; `adjust` is refused in the same way."""
-
-        async def main(harness: ArbiterHarness) -> None:
-            arbiter = harness.arbiter
-            await start(harness, "r1.b1", case.long, case.vehicle, epoch=2)
-            await harness.running("r1.b1")
-            assert "epoch 2" in await refusal(arbiter.cancel("r1.b1", 1))
-            if adjusts(arbiter):
-                assert "epoch 2" in await refusal(arbiter.adjust("r1.b1", 1, {"speed": 1.0}))
-            await harness.clock.sleep(case.watch_s)
-            assert not terminal(harness, "r1.b1"), harness.of("r1.b1")
-
-        with_harness(make_arbiter, run, main)
+        arbiter = harness.arbiter
+        await start(harness, "r1.b1", case.long, case.vehicle, epoch=2)
+        await harness.running("r1.b1")
+        assert "epoch 2" in await refusal(arbiter.cancel("r1.b1", 1))
+        if adjusts(arbiter):
+            assert "epoch 2" in await refusal(arbiter.adjust("r1.b1", 1, {"speed": 1.0}))
+        await harness.clock.sleep(case.watch_s)
+        assert not terminal(harness, "r1.b1"), harness.of("r1.b1")
 
     def test_a_query_names_the_epoch_that_was_seen(
         self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
@@ -200,231 +183,193 @@ class ArbiterLinks(ArbiterFixtures):
         run(main)
 
     @needs("telemetry")
-    def test_a_vehicle_goes_on_with_what_is_disowned(
-        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    @connected
+    async def test_a_vehicle_goes_on_with_what_is_disowned(
+        self, harness: ArbiterHarness, case: ArbiterCase
     ) -> None:
         """`disown`: another executive drives the run, so that nothing is cancelled here."""
-
-        async def main(harness: ArbiterHarness) -> None:
-            arbiter = harness.arbiter
-            if not fences(arbiter):
-                return
-            await start(harness, "r1.b1", case.long, case.vehicle)
-            moving = await harness.until(lambda: is_moving(harness, case), 30)
-            assert moving, "the long behavior must move the vehicle"
-            await harness.running("r1.b1", 30)  # what begins it in steps has no more to send
-            await arbiter.disown("r1")
-            assert not terminal(harness, "r1.b1"), harness.of("r1.b1")
-            await harness.clock.sleep(case.watch_s / 2)
-            assert speed(harness, case.vehicle) > case.standing_m_s, "it was stopped"
-
-        with_harness(make_arbiter, run, main)
+        arbiter = harness.arbiter
+        if not fences(arbiter):
+            return
+        await start(harness, "r1.b1", case.long, case.vehicle)
+        moving = await harness.until(lambda: is_moving(harness, case), 30)
+        assert moving, "the long behavior must move the vehicle"
+        await harness.running("r1.b1", 30)  # what begins it in steps has no more to send
+        await arbiter.disown("r1")
+        assert not terminal(harness, "r1.b1"), harness.of("r1.b1")
+        await harness.clock.sleep(case.watch_s / 2)
+        assert speed(harness, case.vehicle) > case.standing_m_s, "it was stopped"
 
     @needs("hold", "telemetry")
-    def test_hold_stops_the_vehicle_within_the_declared_bound(
-        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    @connected
+    async def test_hold_stops_the_vehicle_within_the_declared_bound(
+        self, harness: ArbiterHarness, case: ArbiterCase
     ) -> None:
         """Within `limits().hold_within_s`, and it stays until resumed."""
-
-        async def main(harness: ArbiterHarness) -> None:
-            await start(harness, "r1.b1", case.long, case.vehicle)
-            moving = await harness.until(lambda: is_moving(harness, case), 30)
-            assert moving, "the long behavior must move the vehicle"
-            await harness.arbiter.hold(case.vehicle)
-            bound_s = harness.arbiter.limits(case.vehicle).hold_within_s
-            at_rest = await harness.until(lambda: is_at_rest(harness, case), bound_s)
-            assert at_rest, f"still at {speed(harness, case.vehicle):.1f} m/s after {bound_s:g} s"
-            await harness.clock.sleep(case.watch_s)
-            assert is_at_rest(harness, case), "it does not move by itself"
-            assert not terminal(harness, "r1.b1"), "it keeps its behavior"
-
-        with_harness(make_arbiter, run, main)
+        await start(harness, "r1.b1", case.long, case.vehicle)
+        moving = await harness.until(lambda: is_moving(harness, case), 30)
+        assert moving, "the long behavior must move the vehicle"
+        await harness.arbiter.hold(case.vehicle)
+        bound_s = harness.arbiter.limits(case.vehicle).hold_within_s
+        at_rest = await harness.until(lambda: is_at_rest(harness, case), bound_s)
+        assert at_rest, f"still at {speed(harness, case.vehicle):.1f} m/s after {bound_s:g} s"
+        await harness.clock.sleep(case.watch_s)
+        assert is_at_rest(harness, case), "it does not move by itself"
+        assert not terminal(harness, "r1.b1"), "it keeps its behavior"
 
     @needs("hold")
-    def test_resume_goes_on_with_the_behavior(
-        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    @connected
+    async def test_resume_goes_on_with_the_behavior(
+        self, harness: ArbiterHarness, case: ArbiterCase
     ) -> None:
         """A held behavior does not end; a resumed one ends as it would have."""
-
-        async def main(harness: ArbiterHarness) -> None:
-            await start(harness, "r1.b1", case.short, case.vehicle)
-            await harness.running("r1.b1")
-            await harness.arbiter.hold(case.vehicle)
-            await harness.clock.sleep(2 * case.short_s)
-            assert not terminal(harness, "r1.b1"), "a held behavior does not end"
-            await harness.arbiter.resume(case.vehicle)
-            end = await harness.ended("r1.b1", 2 * case.short_s)
-            assert end.state is BehaviorState.SUCCEEDED, end
-
-        with_harness(make_arbiter, run, main)
+        await start(harness, "r1.b1", case.short, case.vehicle)
+        await harness.running("r1.b1")
+        await harness.arbiter.hold(case.vehicle)
+        await harness.clock.sleep(2 * case.short_s)
+        assert not terminal(harness, "r1.b1"), "a held behavior does not end"
+        await harness.arbiter.resume(case.vehicle)
+        end = await harness.ended("r1.b1", 2 * case.short_s)
+        assert end.state is BehaviorState.SUCCEEDED, end
 
     @needs("hold")
-    def test_hold_and_resume_of_an_idle_vehicle_are_quiet(
-        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    @connected
+    async def test_hold_and_resume_of_an_idle_vehicle_are_quiet(
+        self, harness: ArbiterHarness, case: ArbiterCase
     ) -> None:
         """There is nothing to report about."""
-
-        async def main(harness: ArbiterHarness) -> None:
-            await harness.arbiter.hold(case.vehicle)
-            await harness.arbiter.hold(case.vehicle)
-            await harness.arbiter.resume(case.vehicle)
-            await harness.arbiter.resume(case.vehicle)
-            await harness.clock.sleep(case.watch_s)
-            assert harness.reports == []
-
-        with_harness(make_arbiter, run, main)
+        await harness.arbiter.hold(case.vehicle)
+        await harness.arbiter.hold(case.vehicle)
+        await harness.arbiter.resume(case.vehicle)
+        await harness.arbiter.resume(case.vehicle)
+        await harness.clock.sleep(case.watch_s)
+        assert harness.reports == []
 
     @needs("link", "second vehicle")
-    def test_a_cut_link_is_lost_within_the_declared_bound(
-        self,
-        make_arbiter: MakeArbiter,
-        case: ArbiterCase,
-        cut_link: CutLink | None,
-        run: Callable[[Main], None],
+    @connected
+    async def test_a_cut_link_is_lost_within_the_declared_bound(
+        self, harness: ArbiterHarness, case: ArbiterCase, cut_link: CutLink | None
     ) -> None:
         """LOST within `limits().lost_after_s`, and only what that link carries."""
         if cut_link is None:
             skip_unsupported("link", "the fixture `cut_link` is not overridden")
-
-        async def main(harness: ArbiterHarness) -> None:
-            await start(harness, "r1.b1", case.long, case.vehicle)
-            await start(harness, "r1.b2", case.long, case.other)
-            await harness.running("r1.b1")
-            await harness.running("r1.b2")
-            cut_link(harness.arbiter, case.vehicle)
-            bound_s = harness.arbiter.limits(case.vehicle).lost_after_s
-            end = await harness.ended("r1.b1", bound_s + 1 + harness.late_s)
-            assert end.state is BehaviorState.LOST, end
-            assert not terminal(harness, "r1.b2"), "the other vehicle's link is up"
-
-        with_harness(make_arbiter, run, main)
+        await start(harness, "r1.b1", case.long, case.vehicle)
+        await start(harness, "r1.b2", case.long, case.other)
+        await harness.running("r1.b1")
+        await harness.running("r1.b2")
+        cut_link(harness.arbiter, case.vehicle)
+        bound_s = harness.arbiter.limits(case.vehicle).lost_after_s
+        end = await harness.ended("r1.b1", bound_s + 1 + harness.late_s)
+        assert end.state is BehaviorState.LOST, end
+        assert not terminal(harness, "r1.b2"), "the other vehicle's link is up"
 
     @needs("link", "return", "telemetry")
-    def test_a_lost_vehicle_whose_link_returns_stops_before_it_is_free(
+    @connected
+    async def test_a_lost_vehicle_whose_link_returns_stops_before_it_is_free(
         self,
-        make_arbiter: MakeArbiter,
+        harness: ArbiterHarness,
         case: ArbiterCase,
         cut_link: CutLink | None,
         mend_link: CutLink | None,
-        run: Callable[[Main], None],
     ) -> None:
         """The executive calls `reclaim` or `hold`. Then the vehicle is at rest, and executes a new
         behavior."""
         if cut_link is None or mend_link is None:
             skip_unsupported("return", "the fixture `mend_link` is not overridden")
-
-        async def main(harness: ArbiterHarness) -> None:
-            await start(harness, "r1.b1", case.long, case.vehicle)
-            moving = await harness.until(lambda: is_moving(harness, case), 30)
-            assert moving, "the long behavior must move the vehicle"
-            cut_link(harness.arbiter, case.vehicle)
-            limits = harness.arbiter.limits(case.vehicle)
-            end = await harness.ended("r1.b1", limits.lost_after_s + 1 + harness.late_s)
-            assert end.state is BehaviorState.LOST, end
-            mend_link(harness.arbiter, case.vehicle)
-            assert await harness.until(lambda: link_is_up(harness, case.vehicle), 30), (
-                "its link is up again"
-            )
-            arbiter = harness.arbiter
-            if reclaims(arbiter):
-                limit = harness.clock.now_us() + round(1e6 * limits.cancel_timeout_s)
-                while why := await arbiter.reclaim(case.vehicle):
-                    assert harness.clock.now_us() < limit, why
-                    await harness.clock.sleep(1)
-            else:
-                await arbiter.hold(case.vehicle)
-            at_rest = await harness.until(lambda: is_at_rest(harness, case), limits.hold_within_s)
-            assert at_rest, f"still at {speed(harness, case.vehicle):.1f} m/s, though it is free"
-            await harness.clock.sleep(case.watch_s)
-            assert is_at_rest(harness, case), "it does not move by itself"
-            await start(harness, "r1.b2", case.long, case.vehicle)
-            moving = await harness.until(lambda: is_moving(harness, case), 30)
-            assert moving, f"it must execute a new behavior: {harness.of('r1.b2')}"
-
-        with_harness(make_arbiter, run, main)
+        await start(harness, "r1.b1", case.long, case.vehicle)
+        moving = await harness.until(lambda: is_moving(harness, case), 30)
+        assert moving, "the long behavior must move the vehicle"
+        cut_link(harness.arbiter, case.vehicle)
+        limits = harness.arbiter.limits(case.vehicle)
+        end = await harness.ended("r1.b1", limits.lost_after_s + 1 + harness.late_s)
+        assert end.state is BehaviorState.LOST, end
+        mend_link(harness.arbiter, case.vehicle)
+        assert await harness.until(lambda: link_is_up(harness, case.vehicle), 30), (
+            "its link is up again"
+        )
+        arbiter = harness.arbiter
+        if reclaims(arbiter):
+            limit = harness.clock.now_us() + round(1e6 * limits.cancel_timeout_s)
+            while why := await arbiter.reclaim(case.vehicle):
+                assert harness.clock.now_us() < limit, why
+                await harness.clock.sleep(1)
+        else:
+            await arbiter.hold(case.vehicle)
+        at_rest = await harness.until(lambda: is_at_rest(harness, case), limits.hold_within_s)
+        assert at_rest, f"still at {speed(harness, case.vehicle):.1f} m/s, though it is free"
+        await harness.clock.sleep(case.watch_s)
+        assert is_at_rest(harness, case), "it does not move by itself"
+        await start(harness, "r1.b2", case.long, case.vehicle)
+        moving = await harness.until(lambda: is_moving(harness, case), 30)
+        assert moving, f"it must execute a new behavior: {harness.of('r1.b2')}"
 
     @needs("second vehicle")
-    def test_two_vehicles_do_not_mix(
-        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    @connected
+    async def test_two_vehicles_do_not_mix(
+        self, harness: ArbiterHarness, case: ArbiterCase
     ) -> None:
         """A command to one vehicle leaves the other alone."""
-
-        async def main(harness: ArbiterHarness) -> None:
-            await start(harness, "r1.b1", case.long, case.vehicle)
-            await start(harness, "r1.b2", case.long, case.other)
-            await harness.running("r1.b1")
-            await harness.running("r1.b2")
-            await harness.arbiter.cancel("r1.b1", 1)
-            await harness.ended("r1.b1", 60)
-            assert harness.states_of("r1.b2") == [BehaviorState.ACCEPTED, BehaviorState.RUNNING]
-
-        with_harness(make_arbiter, run, main)
+        await start(harness, "r1.b1", case.long, case.vehicle)
+        await start(harness, "r1.b2", case.long, case.other)
+        await harness.running("r1.b1")
+        await harness.running("r1.b2")
+        await harness.arbiter.cancel("r1.b1", 1)
+        await harness.ended("r1.b1", 60)
+        assert harness.states_of("r1.b2") == [BehaviorState.ACCEPTED, BehaviorState.RUNNING]
 
     @needs("hold", "second vehicle", "telemetry")
-    def test_a_held_vehicle_does_not_hold_up_the_other(
-        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    @connected
+    async def test_a_held_vehicle_does_not_hold_up_the_other(
+        self, harness: ArbiterHarness, case: ArbiterCase
     ) -> None:
         """One vehicle is at rest, the other one continues."""
-
-        async def main(harness: ArbiterHarness) -> None:
-            await start(harness, "r1.b1", case.long, case.vehicle)
-            await start(harness, "r1.b2", case.long, case.other)
-            await harness.running("r1.b1")
-            await harness.running("r1.b2")
-            await harness.arbiter.hold(case.vehicle)
-            await harness.clock.sleep(case.watch_s)
-            assert is_at_rest(harness, case)
-            assert speed(harness, case.other) > case.standing_m_s, "the other was not held"
-
-        with_harness(make_arbiter, run, main)
+        await start(harness, "r1.b1", case.long, case.vehicle)
+        await start(harness, "r1.b2", case.long, case.other)
+        await harness.running("r1.b1")
+        await harness.running("r1.b2")
+        await harness.arbiter.hold(case.vehicle)
+        await harness.clock.sleep(case.watch_s)
+        assert is_at_rest(harness, case)
+        assert speed(harness, case.other) > case.standing_m_s, "the other was not held"
 
     @needs("telemetry")
-    def test_telemetry_names_the_resource_and_rises_in_time(
-        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    @connected
+    async def test_telemetry_names_the_resource_and_rises_in_time(
+        self, harness: ArbiterHarness, case: ArbiterCase
     ) -> None:
         """States have the resource id of the fleet, and their times do not decrease."""
-
-        async def main(harness: ArbiterHarness) -> None:
-            await start(harness, "r1.b1", case.long, case.vehicle)
-            await harness.clock.sleep(case.watch_s)
-            states = [state for state in harness.states if state.resource == case.vehicle]
-            assert states, "a vehicle that moves reports its position"
-            times = [state.time_us for state in states]
-            assert times == sorted(times)
-
-        with_harness(make_arbiter, run, main)
+        await start(harness, "r1.b1", case.long, case.vehicle)
+        await harness.clock.sleep(case.watch_s)
+        states = [state for state in harness.states if state.resource == case.vehicle]
+        assert states, "a vehicle that moves reports its position"
+        times = [state.time_us for state in states]
+        assert times == sorted(times)
 
     @needs("telemetry")
-    def test_states_are_stamped_by_the_clock_of_the_context(
-        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    @connected
+    async def test_states_are_stamped_by_the_clock_of_the_context(
+        self, harness: ArbiterHarness, case: ArbiterCase
     ) -> None:
         """Mission time may run faster than the wall clock, or be virtual."""
-
-        async def main(harness: ArbiterHarness) -> None:
-            began_us = harness.clock.now_us()
-            await start(harness, "r1.b1", case.long, case.vehicle)
-            await harness.clock.sleep(case.watch_s)
-            state = harness.latest(case.vehicle)
-            assert state is not None, "a vehicle that moves reports its position"
-            assert began_us < state.time_us <= harness.clock.now_us() + 1_000_000
-
-        with_harness(make_arbiter, run, main)
+        began_us = harness.clock.now_us()
+        await start(harness, "r1.b1", case.long, case.vehicle)
+        await harness.clock.sleep(case.watch_s)
+        state = harness.latest(case.vehicle)
+        assert state is not None, "a vehicle that moves reports its position"
+        assert began_us < state.time_us <= harness.clock.now_us() + 1_000_000
 
     @needs("virtual clock")
-    def test_a_behavior_takes_its_time_of_the_clock_that_was_lent(
-        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    @connected
+    async def test_a_behavior_takes_its_time_of_the_clock_that_was_lent(
+        self, harness: ArbiterHarness, case: ArbiterCase
     ) -> None:
         """In virtual time a rehearsal of hours takes seconds, and nothing real is waited for."""
-
-        async def main(harness: ArbiterHarness) -> None:
-            await start(harness, "r1.b1", case.long, case.vehicle)
-            await harness.running("r1.b1")
-            running_us = harness.clock.now_us()
-            await harness.until(lambda: bool(terminal(harness, "r1.b1")), 5 * case.watch_s)
-            took_s = (harness.clock.now_us() - running_us) / 1_000_000
-            assert took_s >= 5 * case.watch_s, f"the long behavior took {took_s:g} s of the clock"
-
-        with_harness(make_arbiter, run, main)
+        await start(harness, "r1.b1", case.long, case.vehicle)
+        await harness.running("r1.b1")
+        running_us = harness.clock.now_us()
+        await harness.until(lambda: bool(terminal(harness, "r1.b1")), 5 * case.watch_s)
+        took_s = (harness.clock.now_us() - running_us) / 1_000_000
+        assert took_s >= 5 * case.watch_s, f"the long behavior took {took_s:g} s of the clock"
 
     def test_nothing_leaks_after_close(
         self,
