@@ -1,6 +1,7 @@
 """The contract must find what is wrong with a unit, or it proves nothing of a good one."""
 
 import asyncio
+import inspect
 import types
 from collections.abc import Callable
 
@@ -11,7 +12,6 @@ from m2pem.api.runs import OpenPrompt, PromptClosed
 from m2pem.errors import M2pemError
 from m2pem.testing.contracts import ocu_harness
 from m2pem.testing.contracts.ocu import OcuContract
-from m2pem.testing.contracts.ocu_harness import run_with_ocu
 
 
 class Panel:
@@ -209,10 +209,9 @@ def apply(unit: type[Panel], test: str) -> None:
     offered = {
         "make_ocu": unit,
         "operate": operate,
-        "with_ocu": lambda main: asyncio.run(run_with_ocu(unit, operate, main)),
     }
     check: types.FunctionType = getattr(OcuContract, f"test_{test}")
-    wanted = check.__code__.co_varnames[1 : check.__code__.co_argcount]
+    _, *wanted = inspect.signature(check).parameters
     check(OcuContract(), **{name: offered[name] for name in wanted})
 
 

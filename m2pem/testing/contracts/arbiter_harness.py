@@ -28,7 +28,7 @@ from m2pem.api.telemetry import LinkState, PayloadState, TeamState, VehicleState
 from m2pem.errors import StaleCommandError
 from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.telemetry.bus import Bus
-from m2pem.testing.contracts.contract import Contract
+from m2pem.testing.contracts.contract import Contract, takes
 
 ORIGIN = (38.1075, -77.3192, 60.0)
 JOURNAL = UUID("3f0e7d0a-6a51-4f5c-9a2c-0c1a7b1f2d11")
@@ -263,7 +263,6 @@ async def _real(main: Main, speed: float) -> None:
 def connected(test: Callable[..., Awaitable[None]]) -> Callable[..., None]:
     """Make a test of a coroutine method, which gets a connected arbiter as `harness`, and other
     fixtures by their names."""
-    given = inspect.signature(test)
 
     @functools.wraps(test)
     def run_test(
@@ -275,13 +274,8 @@ def connected(test: Callable[..., Awaitable[None]]) -> Callable[..., None]:
 
         run(main)
 
-    # What pytest reads to know the fixtures.
-    names = [*(name for name in given.parameters if name != "harness"), "make_arbiter", "run"]
-    parameters = [
-        inspect.Parameter(name, inspect.Parameter.POSITIONAL_OR_KEYWORD) for name in names
-    ]
-    run_test.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-    return run_test
+    own = (name for name in inspect.signature(test).parameters if name not in ("self", "harness"))
+    return takes(run_test, *own, "make_arbiter", "run")
 
 
 async def start(

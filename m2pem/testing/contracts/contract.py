@@ -1,5 +1,6 @@
 """The base of all contracts: subjects that authors may declare unsupported, with a reason."""
 
+import inspect
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, NoReturn, TypeVar
 
@@ -21,6 +22,14 @@ def needs(*subjects: str) -> Callable[[Test], Test]:
         return test
 
     return mark
+
+
+def takes(test: Callable[..., None], *fixtures: str) -> Callable[..., None]:
+    """Say to pytest which fixtures a test takes that was made of a coroutine method."""
+    kind = inspect.Parameter.POSITIONAL_OR_KEYWORD
+    parameters = [inspect.Parameter(name, kind) for name in ("self", *fixtures)]
+    test.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    return test
 
 
 def skip_unsupported(subject: str, why: str) -> NoReturn:

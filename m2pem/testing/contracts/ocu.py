@@ -1,6 +1,7 @@
 """The contract of operator control units (OCUs), as tests to inherit."""
 
 import asyncio
+import functools
 from collections.abc import Awaitable, Callable, Mapping
 from typing import ClassVar
 
@@ -9,14 +10,22 @@ import pytest
 from m2pem.api.runs import RunStatus
 from m2pem.errors import OperatorError
 from m2pem.testing import scenarios
-from m2pem.testing.contracts.contract import Contract, needs
+from m2pem.testing.contracts.contract import Contract, needs, takes
 from m2pem.testing.contracts.ocu_harness import MakeOcu, OcuHarness, Operate, Operator, run_with_ocu
 
 __all__ = ["MakeOcu", "OcuContract", "Operate", "Operator"]
 
-Main = Callable[[OcuHarness], Awaitable[None]]
-
 OTHER = "the other operator"
+
+
+def served(test: Callable[..., Awaitable[None]]) -> Callable[..., None]:
+    """Make a test of a coroutine method, which gets a serving unit and its operator."""
+
+    @functools.wraps(test)
+    def run_test(self: object, make_ocu: MakeOcu, operate: Operate) -> None:
+        asyncio.run(run_with_ocu(make_ocu, operate, functools.partial(test, self)))
+
+    return takes(run_test, "make_ocu", "operate")
 
 
 class OcuContract(Contract):
@@ -46,26 +55,14 @@ class OcuContract(Contract):
         keys."""
         raise NotImplementedError("override the fixture `operate`")
 
-    @pytest.fixture
-    def with_ocu(self, make_ocu: MakeOcu, operate: Operate) -> Callable[[Main], None]:
-        """A function that runs a test with a serving unit and its operator."""
-
-        def run(main: Main) -> None:
-            asyncio.run(run_with_ocu(make_ocu, operate, main))
-
-        return run
-
     # --- showing --------------------------------------------------------------------------------
 
-    def test_shows_a_question_with_its_decisions(self, with_ocu: Callable[[Main], None]) -> None:
+    @served
+    async def test_shows_a_question_with_its_decisions(self, harness: OcuHarness) -> None:
         """Its text, and every label."""
-
-        async def main(harness: OcuHarness) -> None:
-            await harness.asked(scenarios.question("Is the road clear?", ("proceed", "retreat")))
-            for text in ("Is the road clear?", "proceed", "retreat"):
-                await harness.shows(text)
-
-        with_ocu(main)
+        await harness.asked(scenarios.question("Is the road clear?", ("proceed", "retreat")))
+        for text in ("Is the road clear?", "proceed", "retreat"):
+            await harness.shows(text)
 
     def test_shows_a_question_that_was_open_before_it_began(
         self, make_ocu: MakeOcu, operate: Operate
@@ -80,229 +77,170 @@ class OcuContract(Contract):
 
         asyncio.run(run_with_ocu(make_ocu, operate, main, before))
 
-    def test_shows_several_questions_at_once(self, with_ocu: Callable[[Main], None]) -> None:
+    @served
+    async def test_shows_several_questions_at_once(self, harness: OcuHarness) -> None:
         """Prompts of two runs are shown at once."""
-
-        async def main(harness: OcuHarness) -> None:
-            await harness.asked(scenarios.two_questions("Road?", "Bridge?"))
-            await harness.asked(scenarios.question("Tunnel?"))
-            for text in ("Road?", "Bridge?", "Tunnel?"):
-                await harness.shows(text)
-            assert len(harness.control.prompts()) == 3, "no question was answered"
-
-        with_ocu(main)
+        await harness.asked(scenarios.two_questions("Road?", "Bridge?"))
+        await harness.asked(scenarios.question("Tunnel?"))
+        for text in ("Road?", "Bridge?", "Tunnel?"):
+            await harness.shows(text)
+        assert len(harness.control.prompts()) == 3, "no question was answered"
 
     # --- answering ------------------------------------------------------------------------------
 
     @needs("answers")
-    def test_an_answer_reaches_the_mission(self, with_ocu: Callable[[Main], None]) -> None:
+    @served
+    async def test_an_answer_reaches_the_mission(self, harness: OcuHarness) -> None:
         """The run goes on with it, and the journal says who gave it."""
-
-        async def main(harness: OcuHarness) -> None:
-            (prompt,) = await harness.asked(scenarios.question(decisions=("continue", "abort")))
-            await harness.operator.answer(prompt, "abort")
-            answered = await harness.answered(prompt)
-            assert answered.decision == "abort"
-            assert answered.by, "an answer says who gave it: answer(..., by=...)"
-            assert await harness.ended(prompt.run) is RunStatus.COMPLETED
-
-        with_ocu(main)
+        (prompt,) = await harness.asked(scenarios.question(decisions=("continue", "abort")))
+        await harness.operator.answer(prompt, "abort")
+        answered = await harness.answered(prompt)
+        assert answered.decision == "abort"
+        assert answered.by, "an answer says who gave it: answer(..., by=...)"
+        assert await harness.ended(prompt.run) is RunStatus.COMPLETED
 
     @needs("answers")
-    def test_several_questions_are_answered_in_any_order(
-        self, with_ocu: Callable[[Main], None]
-    ) -> None:
+    @served
+    async def test_several_questions_are_answered_in_any_order(self, harness: OcuHarness) -> None:
         """Each answer belongs to its question."""
+        first, second = await harness.asked(
+            scenarios.two_questions("Road?", "Bridge?", ("yes", "no"))
+        )
+        await harness.operator.answer(second, "no")
+        assert (await harness.answered(second)).decision == "no"
+        assert [prompt.prompt for prompt in harness.control.prompts()] == [first.prompt]
+        await harness.operator.answer(first, "yes")
+        assert (await harness.answered(first)).decision == "yes"
 
-        async def main(harness: OcuHarness) -> None:
-            first, second = await harness.asked(
-                scenarios.two_questions("Road?", "Bridge?", ("yes", "no"))
-            )
-            await harness.operator.answer(second, "no")
-            assert (await harness.answered(second)).decision == "no"
-            assert [prompt.prompt for prompt in harness.control.prompts()] == [first.prompt]
-            await harness.operator.answer(first, "yes")
-            assert (await harness.answered(first)).decision == "yes"
-
-        with_ocu(main)
-
-    def test_shows_that_another_operator_answered_first(
-        self, with_ocu: Callable[[Main], None]
-    ) -> None:
+    @served
+    async def test_shows_that_another_operator_answered_first(self, harness: OcuHarness) -> None:
         """The unit shows the name of the other operator."""
-
-        async def main(harness: OcuHarness) -> None:
-            (prompt,) = await harness.asked(scenarios.question("Is the road clear?"))
-            await harness.shows("Is the road clear?")
-            await harness.control.answer(prompt.run, prompt.prompt, "continue", by=OTHER)
-            await harness.shows(OTHER)
-
-        with_ocu(main)
+        (prompt,) = await harness.asked(scenarios.question("Is the road clear?"))
+        await harness.shows("Is the road clear?")
+        await harness.control.answer(prompt.run, prompt.prompt, "continue", by=OTHER)
+        await harness.shows(OTHER)
 
     @needs("answers")
-    def test_a_late_answer_does_no_harm(self, with_ocu: Callable[[Main], None]) -> None:
+    @served
+    async def test_a_late_answer_does_no_harm(self, harness: OcuHarness) -> None:
         """The first one holds, and the next question can be answered here."""
-
-        async def main(harness: OcuHarness) -> None:
-            (prompt,) = await harness.asked(scenarios.question("First?"))
-            await harness.shows("First?")
-            await harness.control.answer(prompt.run, prompt.prompt, "continue", by=OTHER)
-            await harness.shows(OTHER)
-            await harness.operator.answer(prompt, "abort")
-            await harness.answers()
-            assert (await harness.answered(prompt)).by == OTHER
-
-        with_ocu(main)
+        (prompt,) = await harness.asked(scenarios.question("First?"))
+        await harness.shows("First?")
+        await harness.control.answer(prompt.run, prompt.prompt, "continue", by=OTHER)
+        await harness.shows(OTHER)
+        await harness.operator.answer(prompt, "abort")
+        await harness.answers()
+        assert (await harness.answered(prompt)).by == OTHER
 
     @needs("answers", "unknown decision")
-    def test_an_unknown_decision_is_not_an_answer(self, with_ocu: Callable[[Main], None]) -> None:
+    @served
+    async def test_an_unknown_decision_is_not_an_answer(self, harness: OcuHarness) -> None:
         """The question is still open, and can be answered."""
-
-        async def main(harness: OcuHarness) -> None:
-            (prompt,) = await harness.asked(scenarios.question(decisions=("continue", "abort")))
-            await harness.operator.answer(prompt, "no-such-decision")
-            await harness.goes_on()
-            assert [each.prompt for each in harness.control.prompts()] == [prompt.prompt]
-            await harness.operator.answer(prompt, "abort")
-            assert (await harness.answered(prompt)).decision == "abort"
-
-        with_ocu(main)
+        (prompt,) = await harness.asked(scenarios.question(decisions=("continue", "abort")))
+        await harness.operator.answer(prompt, "no-such-decision")
+        await harness.goes_on()
+        assert [each.prompt for each in harness.control.prompts()] == [prompt.prompt]
+        await harness.operator.answer(prompt, "abort")
+        assert (await harness.answered(prompt)).decision == "abort"
 
     @needs("answers", "another unit")
-    def test_of_two_units_the_first_answer_wins(self, with_ocu: Callable[[Main], None]) -> None:
+    @served
+    async def test_of_two_units_the_first_answer_wins(self, harness: OcuHarness) -> None:
         """Both ask, one answers, and the other goes on."""
-
-        async def main(harness: OcuHarness) -> None:
-            async with harness.another() as other:
-                (prompt,) = await harness.asked(scenarios.question("Road?", ("yes", "no")))
-                await harness.shows("Road?")
-                await other.shows("Road?")
-                await other.operator.answer(prompt, "no")
-                assert (await harness.answered(prompt)).decision == "no"
-                await harness.operator.answer(prompt, "yes")
-                await harness.answers()
-                await other.answers()
-
-        with_ocu(main)
+        async with harness.another() as other:
+            (prompt,) = await harness.asked(scenarios.question("Road?", ("yes", "no")))
+            await harness.shows("Road?")
+            await other.shows("Road?")
+            await other.operator.answer(prompt, "no")
+            assert (await harness.answered(prompt)).decision == "no"
+            await harness.operator.answer(prompt, "yes")
+            await harness.answers()
+            await other.answers()
 
     # --- steering -------------------------------------------------------------------------------
 
     @needs("stop")
-    def test_an_operator_stops_a_run_that_moves_a_vehicle(
-        self, with_ocu: Callable[[Main], None]
-    ) -> None:
+    @served
+    async def test_an_operator_stops_a_run_that_moves_a_vehicle(self, harness: OcuHarness) -> None:
         """Everything of it ends, and its vehicle is released."""
-
-        async def main(harness: OcuHarness) -> None:
-            run = await harness.moving()
-            await harness.operator.stop(run)
-            assert await harness.ended(run) is RunStatus.STOPPED
-
-        with_ocu(main)
+        run = await harness.moving()
+        await harness.operator.stop(run)
+        assert await harness.ended(run) is RunStatus.STOPPED
 
     @needs("stop")
-    def test_an_operator_stops_a_run_that_asks(self, with_ocu: Callable[[Main], None]) -> None:
+    @served
+    async def test_an_operator_stops_a_run_that_asks(self, harness: OcuHarness) -> None:
         """Over an open question, which is then withdrawn."""
-
-        async def main(harness: OcuHarness) -> None:
-            (prompt,) = await harness.asked(scenarios.question("Road?"))
-            await harness.shows("Road?")
-            await harness.operator.stop(prompt.run)
-            assert await harness.ended(prompt.run) is RunStatus.STOPPED
-            assert harness.control.prompts() == []
-            await harness.goes_on()
-
-        with_ocu(main)
+        (prompt,) = await harness.asked(scenarios.question("Road?"))
+        await harness.shows("Road?")
+        await harness.operator.stop(prompt.run)
+        assert await harness.ended(prompt.run) is RunStatus.STOPPED
+        assert harness.control.prompts() == []
+        await harness.goes_on()
 
     # --- what goes wrong ------------------------------------------------------------------------
 
-    def test_goes_on_when_a_question_is_withdrawn(self, with_ocu: Callable[[Main], None]) -> None:
+    @served
+    async def test_goes_on_when_a_question_is_withdrawn(self, harness: OcuHarness) -> None:
         """Its run was stopped by someone else."""
-
-        async def main(harness: OcuHarness) -> None:
-            (prompt,) = await harness.asked(scenarios.question("Road?"))
-            await harness.shows("Road?")
-            await harness.control.stop(prompt.run, by=OTHER)
-            await harness.ended(prompt.run)
-            await harness.goes_on()
-
-        with_ocu(main)
+        (prompt,) = await harness.asked(scenarios.question("Road?"))
+        await harness.shows("Road?")
+        await harness.control.stop(prompt.run, by=OTHER)
+        await harness.ended(prompt.run)
+        await harness.goes_on()
 
     @needs("answers")
-    def test_goes_on_when_a_call_is_refused(self, with_ocu: Callable[[Main], None]) -> None:
+    @served
+    async def test_goes_on_when_a_call_is_refused(self, harness: OcuHarness) -> None:
         """`OperatorError` is for the operator to read."""
-
-        async def main(harness: OcuHarness) -> None:
-            (prompt,) = await harness.asked(scenarios.question("Road?"))
-            harness.faults.refuse("answer", OperatorError("refused, says the test"))
-            await harness.operator.answer(prompt, "continue")
-            await harness.shows("refused, says the test")
-            harness.faults.mend()
-            await harness.operator.answer(prompt, "continue")
-            await harness.answered(prompt)
-
-        with_ocu(main)
+        (prompt,) = await harness.asked(scenarios.question("Road?"))
+        harness.faults.refuse("answer", OperatorError("refused, says the test"))
+        await harness.operator.answer(prompt, "continue")
+        await harness.shows("refused, says the test")
+        harness.faults.mend()
+        await harness.operator.answer(prompt, "continue")
+        await harness.answered(prompt)
 
     @needs("answers")
-    def test_goes_on_showing_while_a_call_takes_long(
-        self, with_ocu: Callable[[Main], None]
-    ) -> None:
+    @served
+    async def test_goes_on_showing_while_a_call_takes_long(self, harness: OcuHarness) -> None:
         """A commit may wait for a disk, and a link for a radio."""
-
-        async def main(harness: OcuHarness) -> None:
-            (prompt,) = await harness.asked(scenarios.question("Road?"))
-            harness.faults.hang("answer")
-            await harness.operator.answer(prompt, "continue")
-            await harness.faults.called("answer")
-            await harness.asked(scenarios.question("Shown meanwhile?"))
-            await harness.shows("Shown meanwhile?")
-            harness.faults.mend()
-            await harness.answered(prompt)
-
-        with_ocu(main)
+        (prompt,) = await harness.asked(scenarios.question("Road?"))
+        harness.faults.hang("answer")
+        await harness.operator.answer(prompt, "continue")
+        await harness.faults.called("answer")
+        await harness.asked(scenarios.question("Shown meanwhile?"))
+        await harness.shows("Shown meanwhile?")
+        harness.faults.mend()
+        await harness.answered(prompt)
 
     @needs("answers", "stop")
-    def test_stop_works_while_another_call_takes_long(
-        self, with_ocu: Callable[[Main], None]
-    ) -> None:
+    @served
+    async def test_stop_works_while_another_call_takes_long(self, harness: OcuHarness) -> None:
         """STOP does not wait for another call."""
-
-        async def main(harness: OcuHarness) -> None:
-            run = await harness.moving()
-            (prompt,) = await harness.asked(scenarios.question("Road?"))
-            harness.faults.hang("answer")
-            await harness.operator.answer(prompt, "continue")
-            await harness.faults.called("answer")
-            await harness.operator.stop(run)
-            assert await harness.ended(run) is RunStatus.STOPPED
-
-        with_ocu(main)
+        run = await harness.moving()
+        (prompt,) = await harness.asked(scenarios.question("Road?"))
+        harness.faults.hang("answer")
+        await harness.operator.answer(prompt, "continue")
+        await harness.faults.called("answer")
+        await harness.operator.stop(run)
+        assert await harness.ended(run) is RunStatus.STOPPED
 
     # --- its end --------------------------------------------------------------------------------
 
-    def test_ends_when_it_is_cancelled_and_leaves_no_task(
-        self, with_ocu: Callable[[Main], None]
-    ) -> None:
+    @served
+    async def test_ends_when_it_is_cancelled_and_leaves_no_task(self, harness: OcuHarness) -> None:
         """The unit ends while a prompt is open."""
+        await harness.asked(scenarios.question("Road?"))
+        await harness.shows("Road?")
+        await harness.leave()
+        assert not harness.unfinished, f"tasks go on after it was cancelled: {harness.unfinished}"
 
-        async def main(harness: OcuHarness) -> None:
-            await harness.asked(scenarios.question("Road?"))
-            await harness.shows("Road?")
-            await harness.leave()
-            assert not harness.unfinished, (
-                f"tasks go on after it was cancelled: {harness.unfinished}"
-            )
-
-        with_ocu(main)
-
-    def test_bears_the_end_of_the_executive(self, with_ocu: Callable[[Main], None]) -> None:
+    @served
+    async def test_bears_the_end_of_the_executive(self, harness: OcuHarness) -> None:
         """The unit ends, or waits to be cancelled; it raises nothing."""
-
-        async def main(harness: OcuHarness) -> None:
-            await harness.asked(scenarios.question("Road?"))
-            await harness.shows("Road?")
-            await harness.end_executive()
-            await harness.takes_notice()
-            await harness.leave()
-
-        with_ocu(main)
+        await harness.asked(scenarios.question("Road?"))
+        await harness.shows("Road?")
+        await harness.end_executive()
+        await harness.takes_notice()
+        await harness.leave()
