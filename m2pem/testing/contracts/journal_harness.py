@@ -9,6 +9,7 @@ from contextlib import asynccontextmanager
 from typing import ClassVar, TypeAlias
 
 import pytest
+import pytest_asyncio
 
 from m2pem.engine.inputs import Input, Tick
 from m2pem.engine.records import InputIgnored, Record, RunEnded, RunOutcome, RunStarted
@@ -99,3 +100,9 @@ class JournalFixtures(Contract):
     def open_journal(self) -> OpenJournal:
         """Opens a journal; each call on the same storage, which is empty at first."""
         raise NotImplementedError("override this fixture")
+
+    @pytest_asyncio.fixture
+    async def journal(self, open_journal: OpenJournal) -> AsyncIterator[Journal]:
+        """A journal that is closed after the test."""
+        async with opened(open_journal) as journal:
+            yield journal
