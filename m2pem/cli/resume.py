@@ -86,7 +86,7 @@ async def _resume(
         clock = SystemClock(header.speed, start_us)
         executive = make_executive(fleet, opened, plugins, clock, answers=script)
         faces.make(executive.control)
-        executive.expect_interrupted([run_id])
+        executive.supervisor.interrupted.expect([run_id])
         with output_of(output) as out:
 
             async def take_up() -> str:

@@ -109,7 +109,7 @@ async def _run(
             fleet, opened, plugins, clock, answers=script, search_path=search_path
         )
         faces.make(executive.control)
-        process_id, warnings = executive.admit(loaded, process, data)
+        process_id, warnings = executive.starter.admit(loaded, process, data)
         for line in lines(warnings):
             note(line)
         required = monitored_requirements(loaded, fleet, plugins, known_data(data), spec)
@@ -121,7 +121,9 @@ async def _run(
                 script,
                 file_of(url),
                 interruption,
-                lambda: executive.begin(loaded, process_id, data, "", requirements=required),
+                lambda: executive.starter.begin(
+                    loaded, process_id, data, "", requirements=required
+                ),
                 faces,
             )
         tidy_up(executive, file_of(url))

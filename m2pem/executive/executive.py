@@ -18,20 +18,16 @@ from typing import Self
 from m2pem.api.arbiter import ArbiterContext, BehaviorId, BehaviorReport
 from m2pem.api.clock import Clock, SystemClock
 from m2pem.api.runs import RunId
-from m2pem.engine.inputs import MonitoredRequirement
 from m2pem.errors import FleetServedError, JournalError, M2pemError
 from m2pem.executive.alert_conditions import AlertConditions
 from m2pem.executive.alert_list import AlertList
 from m2pem.executive.alert_watch import keep_alerts, watch_alerts, write_alerts
-from m2pem.executive.approvals import Approvals
-from m2pem.executive.behavior_lifecycle import ExecutiveViews
 from m2pem.executive.control import Control
 from m2pem.executive.control_events import ControlEvents, LoggedAlerts, RecordObservers
 from m2pem.executive.fleet_connections import FleetArbiters, FleetConnections
 from m2pem.executive.health import ExecutiveHealth
 from m2pem.executive.incidents import Foresee
 from m2pem.executive.mission_control.parts import Estimate, Rehearse
-from m2pem.executive.outages import Outages
 from m2pem.executive.process_monitors import watch_space
 from m2pem.executive.run_starter import RunStarter
 from m2pem.executive.run_takeover import RunTakeover
@@ -44,14 +40,11 @@ from m2pem.executive.statistics import StatisticsReader
 from m2pem.executive.supervisor import RunSettings, Supervisor
 from m2pem.executive.switchover import Switchover
 from m2pem.executive.vehicle_locks import VehicleInUseError, VehicleLocks, addresses_of, refusal
-from m2pem.findings import Finding
-from m2pem.fleet.allocation import Availability, spelled_out
+from m2pem.fleet.allocation import spelled_out
 from m2pem.fleet.fleet import Fleet
 from m2pem.journal.base import Journal
 from m2pem.journal.fleet_server import FleetServer
-from m2pem.mission.catalogue import BehaviorState, ResourceId
-from m2pem.mission.mission import Mission
-from m2pem.mission.values import Value
+from m2pem.mission.catalogue import BehaviorState
 from m2pem.plugins import Plugins
 from m2pem.telemetry.bus import Bus
 from m2pem.telemetry.link_monitor import LinkMonitor, monitor_links
@@ -115,7 +108,7 @@ class Executive:
         self._observers = (
             RecordObservers(plugins.records_committed, self.events) if observed else None
         )
-        self._supervisor = Supervisor(
+        self.supervisor = Supervisor(
             journal,
             plugins,
             clock,
@@ -125,31 +118,31 @@ class Executive:
             RunSettings(speed, tuple(search_path), limit, on_records, has_others),
             observers=self._observers,
         )
-        self._supervisor.on_alert = self.alerts.add
-        self._conditions = AlertConditions(self._supervisor, self.bus, lambda: self._links)
+        self.supervisor.on_alert = self.alerts.add
+        self._conditions = AlertConditions(self.supervisor, self.bus, lambda: self._links)
         self._connections = FleetConnections(
-            self.arbiters, self._on_report, self._supervisor.on_telemetry
+            self.arbiters, self._on_report, self.supervisor.on_telemetry
         )
-        self.stalls = self._supervisor.stalls
-        self.ownership = self._supervisor.ownership
+        self.stalls = self.supervisor.stalls
+        self.ownership = self.supervisor.ownership
         self.health = ExecutiveHealth(journal)
-        self._starter = RunStarter(self._supervisor)
-        self._takeover = RunTakeover(self._supervisor)
-        scheduled = ScheduledRuns(self._supervisor, self._starter, self.bus)
+        self.starter = RunStarter(self.supervisor)
+        self._takeover = RunTakeover(self.supervisor)
+        scheduled = ScheduledRuns(self.supervisor, self.starter, self.bus)
         self._schedule = ScheduleEntries(
             scheduled,
             self.events.publish,
-            self._supervisor.marks,
+            self.supervisor.marks,
             real=not self.arbiters.nothing_is_real,
         )
         self._scheduler = Scheduler(scheduled, self._schedule)
-        self._supervisor.on_change = self._schedule.changed.set
+        self.supervisor.on_change = self._schedule.changed.set
         self.superseded = asyncio.Event()
         """Set when another executive serves the fleet, or is to: this one must end."""
-        self.switchover = Switchover(self._supervisor, self.superseded)
+        self.switchover = Switchover(self.supervisor, self.superseded)
         self.control = Control(
-            self._supervisor,
-            self._starter,
+            self.supervisor,
+            self.starter,
             self.bus,
             self.health,
             self._schedule,
@@ -157,7 +150,7 @@ class Executive:
             self.switchover,
             self.alerts,
             StatisticsReader(
-                self._supervisor, self.bus, self._observers, clock, lambda: self._links
+                self.supervisor, self.bus, self._observers, clock, lambda: self._links
             ),
             rehearse,
             foresee,
@@ -166,7 +159,7 @@ class Executive:
         self._scheduling: asyncio.Task[None] | None = None
         self._locks = VehicleLocks(addresses_of(self.arbiters), journal.file, page)
         if journal.lease_s is not None and self._locks.resources:
-            self._supervisor.served_by_another = self._served_by_another
+            self.supervisor.served_by_another = self._served_by_another
         self._speed = speed
         self._watch_links = watch_links
         self._links: LinkMonitor | None = None
@@ -196,7 +189,7 @@ class Executive:
         if self._observers is not None and isinstance(self.clock, SystemClock):
             self._observers.start()
         group = await self._stack.enter_async_context(asyncio.TaskGroup())
-        self._supervisor.begin_tasks_in(group)
+        self.supervisor.begin_tasks_in(group)
         for what, listening in self._connections.listeners():
             self._listen(group, what, listening)
         if isinstance(self.clock, SystemClock):
@@ -215,8 +208,8 @@ class Executive:
         if self.journal.file is not None:
             watching = partial(watch_space, self.journal.file, self.events)
             self._listen(group, "watch of free space", watching)
-        if self._supervisor.fleet.shared_space and isinstance(self.clock, SystemClock):
-            spaces, publish = self._supervisor.shared_space, self.events.publish
+        if self.supervisor.fleet.shared_space and isinstance(self.clock, SystemClock):
+            spaces, publish = self.supervisor.shared_space, self.events.publish
             watching = partial(watch_shared_space, self.clock, spaces, publish)
             self._listen(group, "watch of shared space", watching)
         if self._watch_links:
@@ -227,7 +220,7 @@ class Executive:
                 monitor_links,
                 self.bus,
                 self.clock,
-                self._supervisor.fault,
+                self.supervisor.fault,
                 rules,
                 self._left_to_another,
             )
@@ -241,7 +234,7 @@ class Executive:
                 self._scheduling.cancel()
                 await asyncio.wait([self._scheduling])
             await self.stop_all("the executive is shutting down")
-            await self._supervisor.end_calls()
+            await self.supervisor.end_calls()
         finally:
             for listener in self._listeners:
                 listener.cancel()
@@ -254,7 +247,7 @@ class Executive:
             self._locks.release()
             if self._observers is not None:
                 await self._observers.close()
-            await self._supervisor.close()
+            await self.supervisor.close()
             self.bus.close()
             self.events.end()
             await self._stack.aclose()
@@ -272,7 +265,7 @@ class Executive:
 
     async def _load_drawings(self) -> None:
         try:
-            await self._supervisor.drawings.load()
+            await self.supervisor.drawings.load()
         except JournalError as error:  # what matters more needs the journal, too, and says so
             log.warning("which geometries operators have handed over is not known: %s", error)
 
@@ -324,7 +317,7 @@ class Executive:
     async def _on_report(self, report: BehaviorReport) -> None:
         if report.state is BehaviorState.LOST and await self._left_to_another():
             return
-        self._supervisor.on_report(report)
+        self.supervisor.on_report(report)
 
     async def _left_to_another(self) -> bool:
         """A link is being lost. Returns whether the runs are left to another executive, as nothing
@@ -369,73 +362,21 @@ class Executive:
         self._listeners.append(group.create_task(listen(), name=what))
 
     def _epoch_of(self, behavior: BehaviorId) -> int:
-        return self._supervisor.epoch_of(behavior)
+        return self.supervisor.epoch_of(behavior)
 
     def _may_send(self) -> bool:
         return self.ownership.may_send()
 
-    # --- runs: see `Supervisor` -----------------------------------------------------------------
+    # --- runs -----------------------------------------------------------------------------------
 
     @property
     def runners(self) -> Mapping[RunId, Runner]:
         """The runs that this executive drives, and the last that ended."""
-        return self._supervisor.runners
-
-    @property
-    def availability(self) -> Availability:
-        """Which behavior has which resource."""
-        return self._supervisor.availability
-
-    @property
-    def outages(self) -> Outages:
-        """When this executive was away: suspended, stopped or blocked."""
-        return self._supervisor.outages
+        return self.supervisor.runners
 
     def runner(self, run: RunId) -> Runner:
         """The runner of a run; raises NotDrivenError when it is not driven here."""
-        return self._supervisor.runner(run)
-
-    def views(self, behavior: BehaviorId, resources: Sequence[ResourceId]) -> ExecutiveViews:
-        """What the owners of a behavior's state say of it now; see `behavior_lifecycle`."""
-        return self._supervisor.views(behavior, resources)
-
-    def admit(
-        self, loaded: Mission, process: str | None, data: Mapping[str, Value] | None
-    ) -> tuple[str, list[Finding]]:
-        """Check a mission; returns the id of the process to begin with, and the warnings.
-
-        Raises:
-            MissionError: with every finding.
-        """
-        return self._starter.admit(loaded, process, data)
-
-    @property
-    def approvals(self) -> Approvals:
-        """Who has approved which mission."""
-        return self._starter.approvals
-
-    async def begin(
-        self,
-        loaded: Mission,
-        process_id: str,
-        data: Mapping[str, Value] | None,
-        by: str,
-        *,
-        step: bool = False,
-        requirements: tuple[MonitoredRequirement, ...] | None = None,
-    ) -> RunId:
-        """Begin a run of a mission that was admitted. Returns when its beginning is durable.
-
-        `step`: it is paused before its first step. `requirements`: what it is monitored for; None:
-        the requirements of the mission's file.
-        """
-        return await self._starter.begin(
-            loaded, process_id, data, by, step=step, requirements=requirements
-        )
-
-    def expect_interrupted(self, runs: Sequence[RunId]) -> None:
-        """Say, before it connects, which runs are taken up first: none begins before that."""
-        self._supervisor.interrupted.expect(runs)
+        return self.supervisor.runner(run)
 
     async def resume_all(self, runs: Sequence[RunId]) -> Mapping[RunId, M2pemError]:
         """Take up runs that their executive left without ending them; returns why some are not."""
@@ -453,4 +394,4 @@ class Executive:
 
     async def stop_all(self, reason: str) -> None:
         """Stop what still runs and wait for it."""
-        await self._supervisor.stop_all(reason)
+        await self.supervisor.stop_all(reason)

@@ -321,7 +321,7 @@ class Rehearser:
         """
         names = frozenset(data or ())
         if names not in self._admitted:
-            process, _ = executive.admit(self.mission, self._process, data)
+            process, _ = executive.starter.admit(self.mission, self._process, data)
             required = monitored_requirements(
                 self.mission, self.fleet, self.plugins, known_data(data), self._spec
             )
@@ -404,7 +404,7 @@ class Rehearsal:
                     for vehicle in arbiter.broadcast.all_at(clock.now_us()):
                         executive.bus.publish(vehicle)
             step = self._debugger is not None
-            run = await executive.begin(
+            run = await executive.starter.begin(
                 mission, process_id, data, "", step=step, requirements=required
             )
             runner = executive.runner(run)

@@ -153,7 +153,7 @@ class Life:
     async def _begin(self) -> None:
         runs = await self.journal.runs()
         left = [each.run for each in runs if each.outcome is None and each.last_seq]
-        self.executive.expect_interrupted(left)
+        self.executive.supervisor.interrupted.expect(left)
         await self.executive.__aenter__()
         refused = await self.executive.resume_all(left)
         assert not refused, refused

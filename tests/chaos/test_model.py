@@ -171,7 +171,7 @@ class Faults(RuleBasedStateMachine):
                     assert name not in held, f"{name}: {held[name]} and {behavior.id}"
                     held[name] = behavior.id
         for name, behavior in held.items():
-            holder = self._life.executive.availability.holder(ResourceId(name))
+            holder = self._life.executive.supervisor.availability.holder(ResourceId(name))
             assert holder == behavior, f"{name} does {behavior}, and {holder} has it"
 
     def give_up(self) -> None:

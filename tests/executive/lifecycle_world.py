@@ -156,7 +156,7 @@ class World:
 
     def views(self, name: str, resources: tuple[ResourceId, ...]) -> BehaviorViews:
         """What all owners say of a behavior."""
-        own = self.executive.views(name, resources)
+        own = self.executive.supervisor.views(name, resources)
         report = _at_once(self.arbiter.query(name, None))
         if report.state is BehaviorState.UNKNOWN:
             arbiter = ArbiterView.UNKNOWN

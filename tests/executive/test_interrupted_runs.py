@@ -66,7 +66,7 @@ def after_a_crash(play: Any, story: Any, *left: tuple[bytes, ...]) -> Any:
     journal, runs = asyncio.run(leave_all())
 
     async def all_of_it(world: World) -> Any:
-        world.executive.expect_interrupted(runs)
+        world.executive.supervisor.interrupted.expect(runs)
         for run in runs:
             known = BehaviorReport(f"{run}.b1", 2, BehaviorState.RUNNING)
             if any(item is running for item in left[runs.index(run)]):

@@ -159,7 +159,7 @@ def test_a_stop_ends_the_run_and_lets_nothing_go_on(play):
 def test_no_other_run_gets_what_is_held(play):
     async def story(world: World):
         await until_paused(world)
-        availability = world.executive.availability
+        availability = world.executive.supervisor.availability
         assert "an operator is asked of r1" in availability.reason(ResourceId("ugv2"))
         await world.executive.control.resume("r1")
         assert availability.reason(ResourceId("ugv2")) == ""

@@ -47,7 +47,7 @@ async def asked(world: World):
 def test_a_run_looks_at_its_vehicles_before_it_sends_anything(play):
     async def story(world: World):
         await driving(world)
-        world.executive.outages.noticed(BOUND - 1)
+        world.executive.supervisor.outages.noticed(BOUND - 1)
         world.fake.report("r1.b1", BehaviorState.SUCCEEDED)
         await world.fake.until_called("start", "r1.b2")
         calls = [(call.what, call.subject) for call in world.fake.calls]
@@ -61,7 +61,7 @@ def test_a_run_that_another_executive_took_over_meanwhile_sends_nothing(play):
         await driving(world)
         seen = BehaviorReport("r1.b1", 1, BehaviorState.RUNNING, epoch=2)
         world.fake.known["r1.b1"] = seen
-        world.executive.outages.noticed(BOUND - 1)
+        world.executive.supervisor.outages.noticed(BOUND - 1)
         world.fake.report("r1.b1", BehaviorState.SUCCEEDED)
         with suppress(StaleEpochError):
             await world.executive.control.wait("r1")
@@ -75,7 +75,7 @@ def test_an_end_that_nobody_saw_is_found(play):
     async def story(world: World):
         await driving(world)
         world.fake.known["r1.b1"] = BehaviorReport("r1.b1", 2, BehaviorState.FAILED, "STUCK", "mud")
-        world.executive.outages.noticed(BOUND - 1)
+        world.executive.supervisor.outages.noticed(BOUND - 1)
         summary = await world.executive.control.wait("r1")
         assert (summary.status, world.fake.count("start")) == (RunStatus.FAILED, 1)
 
@@ -86,7 +86,7 @@ def test_after_an_outage_beyond_the_fleets_bound_vehicles_are_held_and_an_operat
     async def story(world: World):
         control = world.executive.control
         await driving(world)
-        world.executive.outages.noticed(BOUND + 1)
+        world.executive.supervisor.outages.noticed(BOUND + 1)
         await world.fake.until_called("hold", "ugv1")
         (prompt,) = await asked(world)
         assert "the executive did nothing for 31 s" in prompt.text
@@ -119,7 +119,7 @@ def test_what_was_decided_before_a_long_outage_is_not_sent_after_it_unasked(play
 
         def suspend():
             journal.suspended = lambda: None
-            world.executive.outages.noticed(BOUND + 1)
+            world.executive.supervisor.outages.noticed(BOUND + 1)
 
         journal.suspended = suspend
         await control.start(TWO)
@@ -136,7 +136,7 @@ def test_what_was_decided_before_a_short_outage_is_sent_after_it(play):
     journal = SuspendedJournal()
 
     async def story(world: World):
-        journal.suspended = lambda: world.executive.outages.noticed(BOUND - 1)
+        journal.suspended = lambda: world.executive.supervisor.outages.noticed(BOUND - 1)
         await world.executive.control.start(TWO)
         await world.fake.until_called("start", "r1.b1")
         assert world.fake.calls[0].what == "query"
@@ -149,7 +149,7 @@ def test_stop_reaches_a_vehicle_whose_arbiter_does_not_say_how_it_is(play):
         control = world.executive.control
         await driving(world)
         world.fake.hangs.add("query")
-        world.executive.outages.noticed(BOUND + 1)
+        world.executive.supervisor.outages.noticed(BOUND + 1)
         await world.fake.until_called("query", "r1.b1")
         began_us = world.clock.now_us()
         stopping = world.executive.control.stop("r1", by="anna")

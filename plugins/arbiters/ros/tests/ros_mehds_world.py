@@ -319,5 +319,5 @@ class Play:
             if not isinstance(state, VehicleState)
             or state.link is not LinkState.CONNECTED
             or (name == "uav1" and state.position is None)
-            or self._executive.availability.reason(ResourceId(name)) not in ("", MANNED)
+            or self._executive.supervisor.availability.reason(ResourceId(name)) not in ("", MANNED)
         ]
