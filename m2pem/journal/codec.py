@@ -5,6 +5,7 @@ equal objects. It is JSON because a journal outlives the program that wrote it.
 """
 
 import re
+from enum import StrEnum
 from typing import TypeAlias, TypeVar
 
 import msgspec
@@ -139,27 +140,31 @@ def unknown_entry(entry: str) -> JournalError:
     )
 
 
-def refuse_stale_drawings(fleet: str, found: int, last: int) -> None:
-    """Refuse a writer of drawings that has read another `last` version than there is.
+class Numbered(StrEnum):
+    """What a journal keeps of a fleet by numbers that rise; the value is the name of its table."""
 
-    Raises:
-        StaleDrawingsError: the numbers differ.
-    """
-    if found != last:
+    ALERTS = "alerts"
+    DRAWINGS = "drawings"
+
+    @property
+    def column(self) -> str:
+        """The column of the table that has the text."""
+        return self.value.removesuffix("s")
+
+    def refuse_stale(self, fleet: str, found: int, last: int) -> None:
+        """Refuse a writer that has read another `last` number than there is.
+
+        Raises:
+            StaleAlertsError, StaleDrawingsError: the numbers differ.
+        """
+        if found == last:
+            return
+        if self is Numbered.ALERTS:
+            raise StaleAlertsError(
+                f"the last alert of {fleet} is a{found}, not a{last}: read them again"
+            )
         raise StaleDrawingsError(
             f"the last version of the drawings of {fleet} is {found}, not {last}: read them again"
-        )
-
-
-def refuse_stale_alerts(fleet: str, found: int, last: int) -> None:
-    """Refuse a writer of alerts that has read another `last` one than there is.
-
-    Raises:
-        StaleAlertsError: the numbers differ.
-    """
-    if found != last:
-        raise StaleAlertsError(
-            f"the last alert of {fleet} is a{found}, not a{last}: read them again"
         )
 
 

@@ -17,6 +17,7 @@ from m2pem.fleet.approval import Approval, Edit
 from m2pem.journal.base import Deletion, Entry, Loss, RunHeader, RunInfo
 from m2pem.journal.codec import (
     BEGIN_OF_REVISION,
+    Numbered,
     decode_body,
     decode_library,
     decode_part,
@@ -139,15 +140,13 @@ class DatabaseJournal(ABC):
         self, fleet: str, resources: Collection[str], digest: str = "", page: str = ""
     ) -> None:
         """See `Journal.serve_fleet`."""
-        self._check_open()
-        await self._writer.submit(
+        await self._write(
             lambda transaction: transaction.serve_fleet(fleet, resources, digest, page)
         )
 
     async def leave_fleet(self, fleet: str) -> None:
         """See `Journal.leave_fleet`."""
-        self._check_open()
-        await self._writer.submit(lambda transaction: transaction.leave_fleet(fleet))
+        await self._write(lambda transaction: transaction.leave_fleet(fleet))
 
     async def fleet_server(self, fleet: str, resources: Collection[str]) -> FleetServer | None:
         """See `Journal.fleet_server`."""
@@ -187,10 +186,13 @@ class DatabaseJournal(ABC):
         (await self._read(lambda: self._position(number))).check_claim(run, epoch)
 
     def _position(self, number: int) -> RunPosition:
-        row = self._reading.execute("SELECT * FROM standings WHERE run = ?", (number,)).fetchone()
+        return position_from(self._row("SELECT * FROM standings WHERE run = ?", number))
+
+    def _row(self, query: str, number: int) -> Any:
+        row = self._reading.execute(query, (number,)).fetchone()
         if row is None:
             raise no_run(self._reading, number)
-        return position_from(row)
+        return row
 
     async def release(self, run: str) -> None:
         """See `Journal.release`; what was submitted before is written first."""
@@ -217,8 +219,7 @@ class DatabaseJournal(ABC):
 
     async def check(self) -> None:
         """See `Journal.check`; it waits for its turn, as what is written does."""
-        self._check_open()
-        await self._writer.submit(WriteTransaction.check)
+        await self._write(WriteTransaction.check)
 
     async def read(self, run: str, after_seq: int = 0) -> AsyncIterator[Entry]:
         """See `Journal.read`; entries that are appended meanwhile are included."""
@@ -289,9 +290,7 @@ class DatabaseJournal(ABC):
         )
         begin = BEGIN_OF_REVISION
         with self._snapshot():
-            run = self._reading.execute("SELECT 1 FROM runs WHERE run = ?", (number,)).fetchone()
-            if run is None:
-                raise no_run(self._reading, number)
+            self._row("SELECT 1 FROM runs WHERE run = ?", number)  # it is there
             rows = self._reading.execute(query, (number, len(begin), begin)).fetchall()
         entries: list[Entry] = []
         for seq, epoch, at_us, t_us, body in rows:
@@ -310,16 +309,10 @@ class DatabaseJournal(ABC):
         return None if row is None else row[0]
 
     def _header_hash(self, number: int) -> bytes:
-        row = self._reading.execute("SELECT * FROM runs WHERE run = ?", (number,)).fetchone()
-        if row is None:
-            raise no_run(self._reading, number)
-        return header_hash(row)
+        return header_hash(self._row("SELECT * FROM runs WHERE run = ?", number))
 
     def _check_end(self, number: int, before: bytes | None) -> None:
-        query = "SELECT * FROM standings JOIN runs USING (run) WHERE run = ?"
-        row = self._reading.execute(query, (number,)).fetchone()
-        if row is None:
-            raise no_run(self._reading, number)
+        row = self._row("SELECT * FROM standings JOIN runs USING (run) WHERE run = ?", number)
         position = position_from(row[:_POSITION_COLUMNS])
         if position.hash is not None and position.hash != (before or self._header_hash(number)):
             raise self._damaged(
@@ -354,8 +347,7 @@ class DatabaseJournal(ABC):
         Raises:
             JournalError: the run has lost nothing, or can be resumed, which asks the operator.
         """
-        self._check_open()
-        await self._writer.submit(partial(WriteTransaction.accept_loss, number=run_number(run)))
+        await self._write(lambda transaction: transaction.accept_loss(run_number(run)))
 
     async def delete(self, runs: Sequence[str], *, by: str, unended: bool = False) -> None:
         """See `Journal.delete`. A file keeps its size: `compact` makes it smaller."""
@@ -385,11 +377,8 @@ class DatabaseJournal(ABC):
 
     async def change_entry(self, change: EntryChange, *, deletes: str = "") -> None:
         """See `Journal.change_entry`."""
-        self._check_open()
         now_us = time.time_ns() // 1000
-        await self._writer.submit(
-            lambda transaction: transaction.change_entry(change, deletes, now_us)
-        )
+        await self._write(lambda transaction: transaction.change_entry(change, deletes, now_us))
 
     async def entries(self) -> Sequence[ScheduleEntry]:
         """See `Journal.entries`."""
@@ -419,13 +408,11 @@ class DatabaseJournal(ABC):
 
     async def remove_entries(self, entries: Sequence[str]) -> None:
         """See `Journal.remove_entries`."""
-        self._check_open()
-        await self._writer.submit(lambda transaction: transaction.remove_entries(entries))
+        await self._write(lambda transaction: transaction.remove_entries(entries))
 
     async def hold_schedule(self, fleet: str, hold: Hold | None) -> None:
         """See `Journal.hold_schedule`."""
-        self._check_open()
-        await self._writer.submit(lambda transaction: transaction.hold_schedule(fleet, hold))
+        await self._write(lambda transaction: transaction.hold_schedule(fleet, hold))
 
     async def schedule_hold(self, fleet: str) -> Hold | None:
         """See `Journal.schedule_hold`."""
@@ -441,13 +428,11 @@ class DatabaseJournal(ABC):
 
     async def approve(self, approval: Approval) -> None:
         """See `Journal.approve`."""
-        self._check_open()
-        await self._writer.submit(lambda transaction: transaction.approve(approval))
+        await self._write(lambda transaction: transaction.approve(approval))
 
     async def withdraw_approval(self, approval: Approval) -> None:
         """See `Journal.withdraw_approval`."""
-        self._check_open()
-        await self._writer.submit(lambda transaction: transaction.withdraw_approval(approval))
+        await self._write(lambda transaction: transaction.withdraw_approval(approval))
 
     async def approvals(self, fleet: str) -> Sequence[Approval]:
         """See `Journal.approvals`."""
@@ -460,8 +445,7 @@ class DatabaseJournal(ABC):
 
     async def note_edit(self, edit: Edit) -> None:
         """See `Journal.note_edit`."""
-        self._check_open()
-        await self._writer.submit(lambda transaction: transaction.note_edit(edit))
+        await self._write(lambda transaction: transaction.note_edit(edit))
 
     async def edits(self, digests: Collection[str]) -> Mapping[str, Edit]:
         """See `Journal.edits`."""
@@ -481,37 +465,37 @@ class DatabaseJournal(ABC):
         self, fleet: str, alerts: Mapping[int, str | None], *, last: int | None = None
     ) -> None:
         """See `Journal.write_alerts`."""
-        self._check_open()
-        await self._writer.submit(lambda transaction: transaction.write_alerts(fleet, alerts, last))
+        await self._write_numbered(Numbered.ALERTS, fleet, alerts, last)
 
     async def alerts(self, fleet: str) -> Mapping[int, str]:
         """See `Journal.alerts`."""
-        return await self._read(lambda: self._alerts(fleet))
-
-    def _alerts(self, fleet: str) -> Mapping[int, str]:
-        rows = self._reading.execute(
-            "SELECT number, alert FROM alerts WHERE fleet = ? ORDER BY number", (fleet,)
-        )
-        return dict(rows)
+        return await self._read(lambda: self._numbered(Numbered.ALERTS, fleet))
 
     async def write_drawings(
         self, fleet: str, drawings: Mapping[int, str | None], *, last: int | None = None
     ) -> None:
         """See `Journal.write_drawings`."""
-        self._check_open()
-        await self._writer.submit(
-            lambda transaction: transaction.write_drawings(fleet, drawings, last)
-        )
+        await self._write_numbered(Numbered.DRAWINGS, fleet, drawings, last)
 
     async def drawings(self, fleet: str) -> Mapping[int, str]:
         """See `Journal.drawings`."""
-        return await self._read(lambda: self._drawings(fleet))
+        return await self._read(lambda: self._numbered(Numbered.DRAWINGS, fleet))
 
-    def _drawings(self, fleet: str) -> Mapping[int, str]:
+    async def _write_numbered(
+        self, kind: Numbered, fleet: str, texts: Mapping[int, str | None], last: int | None
+    ) -> None:
+        await self._write(lambda transaction: transaction.write_numbered(kind, fleet, texts, last))
+
+    def _numbered(self, kind: Numbered, fleet: str) -> Mapping[int, str]:
         rows = self._reading.execute(
-            "SELECT number, drawing FROM drawings WHERE fleet = ? ORDER BY number", (fleet,)
+            f"SELECT number, {kind.column} FROM {kind.value} WHERE fleet = ? ORDER BY number",
+            (fleet,),
         )
         return dict(rows)
+
+    async def _write(self, work: Callable[[WriteTransaction], T]) -> T:
+        self._check_open()
+        return await self._writer.submit(work)
 
     async def _read(self, work: Callable[[], T]) -> T:
         self._check_open()

@@ -4,6 +4,7 @@ import asyncio
 import os
 import time
 from bisect import bisect_right
+from collections import defaultdict
 from collections.abc import AsyncIterator, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from operator import attrgetter
@@ -15,9 +16,8 @@ from m2pem.errors import InternalError, JournalError, StaleEntryError
 from m2pem.fleet.approval import Approval, Edit
 from m2pem.journal.base import Deletion, Entry, RunHeader, RunInfo
 from m2pem.journal.codec import (
+    Numbered,
     encode_part,
-    refuse_stale_alerts,
-    refuse_stale_drawings,
     run_id,
     run_number,
     unknown_entry,
@@ -61,8 +61,7 @@ class MemoryJournal:
         self._last = 0
         self._entries: dict[str, ScheduleEntry] = {}
         self._holds: dict[str, Hold | None] = {}
-        self._alerts: dict[str, dict[int, str]] = {}
-        self._drawings: dict[str, dict[int, str]] = {}
+        self._numbered: dict[tuple[Numbered, str], dict[int, str]] = defaultdict(dict)
         self._last_entry = 0
         self._approvals: dict[tuple[str, str, str], Approval] = {}
         self._edits: dict[str, Edit] = {}
@@ -330,31 +329,37 @@ class MemoryJournal:
         self, fleet: str, alerts: Mapping[int, str | None], *, last: int | None = None
     ) -> None:
         """See `Journal.write_alerts`."""
-        self._check_open()
-        kept = self._alerts.setdefault(fleet, {})
-        if last is not None:
-            refuse_stale_alerts(fleet, max(kept, default=0), last)
-        _write(kept, alerts)
+        self._write(Numbered.ALERTS, fleet, alerts, last)
 
     async def alerts(self, fleet: str) -> Mapping[int, str]:
         """See `Journal.alerts`."""
         self._check_open()
-        return dict(sorted(self._alerts.get(fleet, {}).items()))
+        return dict(sorted(self._numbered[Numbered.ALERTS, fleet].items()))
 
     async def write_drawings(
         self, fleet: str, drawings: Mapping[int, str | None], *, last: int | None = None
     ) -> None:
         """See `Journal.write_drawings`."""
-        self._check_open()
-        kept = self._drawings.setdefault(fleet, {})
-        if last is not None:
-            refuse_stale_drawings(fleet, max(kept, default=0), last)
-        _write(kept, drawings)
+        self._write(Numbered.DRAWINGS, fleet, drawings, last)
 
     async def drawings(self, fleet: str) -> Mapping[int, str]:
         """See `Journal.drawings`."""
         self._check_open()
-        return dict(sorted(self._drawings.get(fleet, {}).items()))
+        return dict(sorted(self._numbered[Numbered.DRAWINGS, fleet].items()))
+
+    def _write(
+        self, kind: Numbered, fleet: str, texts: Mapping[int, str | None], last: int | None
+    ) -> None:
+        """Write texts by their numbers; None: remove it."""
+        self._check_open()
+        kept = self._numbered[kind, fleet]
+        if last is not None:
+            kind.refuse_stale(fleet, max(kept, default=0), last)
+        for number, text in texts.items():
+            if text is None:
+                kept.pop(number, None)
+            else:
+                kept[number] = text
 
     async def close(self) -> None:
         """See `Journal.close`."""
@@ -374,12 +379,3 @@ class MemoryJournal:
     def _check_open(self) -> None:
         if self._closed:
             raise JournalError("the journal has been closed")
-
-
-def _write(kept: dict[int, str], texts: Mapping[int, str | None]) -> None:
-    """Write texts by their numbers; None: remove it."""
-    for number, text in texts.items():
-        if text is None:
-            kept.pop(number, None)
-        else:
-            kept[number] = text

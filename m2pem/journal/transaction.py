@@ -16,12 +16,11 @@ from m2pem.errors import InternalError, JournalError, StaleEntryError
 from m2pem.fleet.approval import Approval, Edit
 from m2pem.journal.base import Deletion, Entry, RunHeader
 from m2pem.journal.codec import (
+    Numbered,
     decode_part,
     encode_library,
     encode_part,
     known_entry,
-    refuse_stale_alerts,
-    refuse_stale_drawings,
     run_id,
     run_number,
     unknown_entry,
@@ -357,50 +356,27 @@ class WriteTransaction:
         )
         self._wrote = True
 
-    def write_alerts(
-        self, fleet: str, alerts: Mapping[int, str | None], last: int | None = None
+    def write_numbered(
+        self, kind: Numbered, fleet: str, texts: Mapping[int, str | None], last: int | None = None
     ) -> None:
-        """Write or remove alerts of a fleet, if its last one is as expected."""
+        """Write or remove alerts or drawings of a fleet, if its last one is as expected."""
         self._refuse_while_short()
+        table, column = kind.value, kind.column
         if last is not None:
             self._storage.exclude_others()
             found = self._connection.execute(
-                "SELECT max(number) FROM alerts WHERE fleet = ?", (fleet,)
+                f"SELECT max(number) FROM {table} WHERE fleet = ?", (fleet,)
             ).fetchone()[0]
-            refuse_stale_alerts(fleet, found or 0, last)
-        for number, text in alerts.items():
+            kind.refuse_stale(fleet, found or 0, last)
+        for number, text in texts.items():
             if text is None:
                 self._connection.execute(
-                    "DELETE FROM alerts WHERE fleet = ? AND number = ?", (fleet, number)
+                    f"DELETE FROM {table} WHERE fleet = ? AND number = ?", (fleet, number)
                 )
             else:
                 self._connection.execute(
-                    "INSERT INTO alerts VALUES (?, ?, ?)"
-                    " ON CONFLICT (fleet, number) DO UPDATE SET alert = excluded.alert",
-                    (fleet, number, text),
-                )
-        self._wrote = True
-
-    def write_drawings(
-        self, fleet: str, drawings: Mapping[int, str | None], last: int | None = None
-    ) -> None:
-        """Write or remove versions of drawings of a fleet, if its last one is as expected."""
-        self._refuse_while_short()
-        if last is not None:
-            self._storage.exclude_others()
-            found = self._connection.execute(
-                "SELECT max(number) FROM drawings WHERE fleet = ?", (fleet,)
-            ).fetchone()[0]
-            refuse_stale_drawings(fleet, found or 0, last)
-        for number, text in drawings.items():
-            if text is None:
-                self._connection.execute(
-                    "DELETE FROM drawings WHERE fleet = ? AND number = ?", (fleet, number)
-                )
-            else:
-                self._connection.execute(
-                    "INSERT INTO drawings VALUES (?, ?, ?)"
-                    " ON CONFLICT (fleet, number) DO UPDATE SET drawing = excluded.drawing",
+                    f"INSERT INTO {table} VALUES (?, ?, ?)"
+                    f" ON CONFLICT (fleet, number) DO UPDATE SET {column} = excluded.{column}",
                     (fleet, number, text),
                 )
         self._wrote = True
