@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 
 from m2pem.api.arbiter import ArbiterContext
-from m2pem.api.authoring import MissionSource, SearchLimits, SearchProgress
+from m2pem.api.authoring import DEFAULT_LIMITS, MissionSource, SearchLimits, SearchProgress
 from m2pem.api.clock import SystemClock
 from m2pem.executive.fleet_connections import FleetArbiters
 from m2pem.executive.loading import load_source
@@ -52,15 +52,15 @@ async def verify_in_subprocess(
     fleet: Fleet,
     *,
     search_path: Iterable[Path],
-    process: str | None,
-    data: Mapping[str, Value],
-    spec: str | None,
-    strict: bool,
-    timers_in_order: bool,
-    assume: Sequence[str],
-    all_pools: bool,
-    limits: SearchLimits,
-    on_progress: Callable[[SearchProgress], None] | None,
+    process: str | None = None,
+    data: Mapping[str, Value] | None = None,
+    spec: str | None = None,
+    strict: bool = False,
+    timers_in_order: bool = False,
+    assume: Sequence[str] = (),
+    all_pools: bool = False,
+    limits: SearchLimits = DEFAULT_LIMITS,
+    on_progress: Callable[[SearchProgress], None] | None = None,
 ) -> dict[str, Any]:
     """Return the answers of `m2pem verify --format json`, computed in a subprocess."""
     order = Order(
@@ -68,7 +68,7 @@ async def verify_in_subprocess(
         dump(fleet),
         [str(each) for each in search_path],
         process,
-        dict(data),
+        dict(data or {}),
         None if spec is None else spec.encode(),
         strict,
         timers_in_order,

@@ -1,18 +1,15 @@
 """Operations on missions that are written: check, verify, rehearse, estimate and approve them."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from m2pem.api.approval import MissionApproval
 from m2pem.api.authoring import (
-    DEFAULT_LIMITS,
     Draft,
     Editable,
     MissionSource,
     Outline,
-    SearchLimits,
-    SearchProgress,
 )
 from m2pem.api.estimates import MissionEstimate
 from m2pem.api.runs import SimulationResult
@@ -23,7 +20,6 @@ from m2pem.executive.loading import library_of, load_source
 from m2pem.executive.mission_control.parts import ControlParts
 from m2pem.executive.verification_worker import verify_in_subprocess
 from m2pem.findings import Finding
-from m2pem.mission.values import Value
 
 
 class AuthoringOperations(ControlParts):
@@ -54,36 +50,11 @@ class AuthoringOperations(ControlParts):
         settings = {"search_path": supervisor.settings.search_path, **options}
         return await self._rehearse(mission, supervisor.fleet_now, **settings)
 
-    async def verify(
-        self,
-        mission: MissionSource,
-        *,
-        process: str | None = None,
-        data: Mapping[str, Value] | None = None,
-        spec: str | None = None,
-        strict: bool = False,
-        timers_in_order: bool = False,
-        assume: Sequence[str] = (),
-        all_pools: bool = False,
-        limits: SearchLimits = DEFAULT_LIMITS,
-        on_progress: Callable[[SearchProgress], None] | None = None,
-    ) -> Mapping[str, Any]:
+    async def verify(self, mission: MissionSource, **options: Any) -> Mapping[str, Any]:
         """Verify a mission with this fleet, in a process of its own."""
         supervisor = self._supervisor
-        return await verify_in_subprocess(
-            mission,
-            supervisor.fleet_now,
-            search_path=supervisor.settings.search_path,
-            process=process,
-            data=data or {},
-            spec=spec,
-            strict=strict,
-            timers_in_order=timers_in_order,
-            assume=assume,
-            all_pools=all_pools,
-            limits=limits,
-            on_progress=on_progress,
-        )
+        settings = {"search_path": supervisor.settings.search_path, **options}
+        return await verify_in_subprocess(mission, supervisor.fleet_now, **settings)
 
     def editable(self, mission: bytes, *, anew: bool = False) -> Editable:
         """The same mission as an editor takes it."""
