@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import TypeAlias, Union
+from typing import ClassVar, TypeAlias, Union
 
 import msgspec
 
@@ -188,16 +188,13 @@ class Travel(msgspec.Struct, frozen=True, tag=True):
     direction: Vector
     yaw: float
     profile: Profile
+    load: ClassVar[float] = 1.0
+    """Battery load; 1.0 is that of moving."""
 
     @property
     def duration_s(self) -> float:
         """How long it lasts, in s."""
         return self.profile.duration_s
-
-    @property
-    def load(self) -> float:
-        """Battery load; 1.0 is that of moving."""
-        return 1.0
 
     def at(self, t: float) -> Pose:
         """Where the vehicle is, so many seconds after the start."""
@@ -216,16 +213,13 @@ class Curve(msgspec.Struct, frozen=True, tag=True):
     up: float
     climb: float
     profile: Profile
+    load: ClassVar[float] = 1.0
+    """Battery load; 1.0 is that of moving."""
 
     @property
     def duration_s(self) -> float:
         """How long it lasts, in s."""
         return self.profile.duration_s
-
-    @property
-    def load(self) -> float:
-        """Battery load; 1.0 is that of moving."""
-        return 1.0
 
     def at(self, t: float) -> Pose:
         """Where the vehicle is, so many seconds after the start."""
@@ -253,11 +247,8 @@ class Pivot(msgspec.Struct, frozen=True, tag=True):
     yaw: float
     sweep: float
     duration_s: float
-
-    @property
-    def load(self) -> float:
-        """Battery load; 1.0 is that of moving."""
-        return 1.0
+    load: ClassVar[float] = 1.0
+    """Battery load; 1.0 is that of moving."""
 
     def at(self, t: float) -> Pose:
         """Where the vehicle is, so many seconds after the start."""
@@ -306,11 +297,8 @@ class Slew(msgspec.Struct, frozen=True, tag=True):
     start: Look
     end: Look
     duration_s: float
-
-    @property
-    def load(self) -> float:
-        """Battery load; 1.0 is that of moving."""
-        return 0.0
+    load: ClassVar[float] = 0.0
+    """Battery load; 1.0 is that of moving."""
 
     def at(self, t: float) -> Look:
         """Where the payload looks, so many seconds after the start."""

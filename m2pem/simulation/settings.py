@@ -2,10 +2,11 @@
 
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import chain
-from typing import Any
+from typing import Any, TypeVar
 
 from m2pem.api.arbiter import Connection
 from m2pem.api.simulator_settings import Coordinates, coordinates, fraction, number
@@ -79,6 +80,8 @@ class Settings:
     state: str = ""
 
 
+T = TypeVar("T")
+
 KINDS = ("ptz", "camera", "gpr")
 """Kinds of payload that `kind` may say; without it a payload can do all that payloads can."""
 
@@ -131,7 +134,7 @@ def read_settings(connection: Connection, origin: Origin) -> Settings:
         gimbal=Gimbal(**reader.numbers(_GIMBAL)),
         home=reader.position("home"),
         heading_rad=reader.number("heading", Dimension.ANGLE, 0.0),
-        battery=reader.fraction("battery", 1.0),
+        battery=reader.value("battery", fraction, 1.0),
         kind=reader.choice("kind", KINDS),
         detection_range_m=reader.number("range", Dimension.DISTANCE, 5.0),
         detections=reader.items("detections", _detection),
@@ -196,13 +199,18 @@ class _Reader:
         return found
 
     def number(self, key: str, dimension: Dimension | None, default: float) -> float:
+        if key == "endurance" and self._settings.get(key) == math.inf:
+            return math.inf
+        read = number if dimension is None else partial(quantity, dimension=dimension)
+        return self.value(key, read, default)
+
+    def value(self, key: str, read: Callable[[Any], T], default: T) -> T:
+        """What `read` makes of a value; it may raise ValueError."""
         value = self._settings.get(key)
         if value is None:
             return default
-        if key == "endurance" and value == math.inf:
-            return math.inf
         try:
-            return number(value) if dimension is None else quantity(value, dimension)
+            return read(value)
         except ValueError as error:
             self.wrong(key, error)
             return default
@@ -225,16 +233,6 @@ class _Reader:
             self.wrong(key, f"{rate:g} is below 0")
         return rate
 
-    def fraction(self, key: str, default: float) -> float:
-        value = self._settings.get(key)
-        if value is None:
-            return default
-        try:
-            return fraction(value)
-        except ValueError as error:
-            self.wrong(key, error)
-            return default
-
     def text(self, key: str) -> str:
         value = self._settings.get(key, "")
         if not isinstance(value, str):
@@ -256,14 +254,7 @@ class _Reader:
         return value
 
     def position(self, key: str) -> Coordinates | None:
-        value = self._settings.get(key)
-        if value is None:
-            return None
-        try:
-            place = coordinates(value)
-        except ValueError as error:
-            self.wrong(key, error)
-            return None
+        place: Coordinates | None = self.value(key, coordinates, None)
         self.near(key, place)
         return place
 
