@@ -4,7 +4,7 @@ import json
 from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from m2pem.api.arbiter import (
     Arbiter,
@@ -23,18 +23,11 @@ from m2pem.fleet.fleet import SIMULATED, Fleet
 from m2pem.fleet.graph import ResourceGraph
 from m2pem.mission.behavior import BehaviorType
 from m2pem.mission.catalogue import BehaviorSpec, ResourceId
+from m2pem.plugins import Plugins
 from m2pem.teams.capabilities import Capabilities
 
 if TYPE_CHECKING:
     from m2pem.teams.arbiter import Teams
-
-
-class ArbiterPlugins(Protocol):
-    """The part of the plugin manager that is needed here."""
-
-    def arbiter(self, name: str) -> Callable[..., Arbiter]:
-        """The factory registered under a name; raises PluginError when there is none."""
-        ...
 
 
 def _located(finding: Finding, fleet: Fleet) -> Finding:
@@ -63,7 +56,7 @@ def _connections(fleet: Fleet) -> dict[tuple[str, str], dict[ResourceId, Connect
     return connections
 
 
-def hosted_arbiters(fleet: Fleet, plugins: ArbiterPlugins, host: str) -> list[HostedArbiter]:
+def hosted_arbiters(fleet: Fleet, plugins: Plugins, host: str) -> list[HostedArbiter]:
     """Return the arbiters that run on a host of the fleet.
 
     Raises:
@@ -96,7 +89,7 @@ class FleetArbiters:
         FleetError: an arbiter cannot use the settings of a resource.
     """
 
-    def __init__(self, fleet: Fleet, plugins: ArbiterPlugins, context: ArbiterContext) -> None:
+    def __init__(self, fleet: Fleet, plugins: Plugins, context: ArbiterContext) -> None:
         self.fleet = fleet
         found = _connections(fleet)
         self.nothing_is_real = all(

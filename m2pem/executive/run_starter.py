@@ -24,7 +24,6 @@ from m2pem.executive.loading import (
     refuse_errors,
     requirement_findings,
 )
-from m2pem.executive.scheduled_start import NotBegunError
 from m2pem.executive.supervisor import Supervisor
 from m2pem.findings import Finding
 from m2pem.fleet.allocation import resources_of, roles_of_mission
@@ -37,6 +36,14 @@ from m2pem.mission.values import Value
 from m2pem.scheduling.entry import EntryChange
 
 CHANGED = "a geometry that it names was handed over anew as it was to begin; look at it again"
+
+
+class NotBegunError(M2pemError):
+    """A run was created, and nothing of it has begun."""
+
+    def __init__(self, run: RunId, reason: str) -> None:
+        self.run = run
+        super().__init__(reason)
 
 
 class RunStarter:

@@ -7,11 +7,11 @@ from m2pem.api.authoring import MissionSource
 from m2pem.api.schedule import EntryId, When, host_time_zone
 from m2pem.errors import ExpressionError, ScheduleError
 from m2pem.executive.run_starter import RunStarter
+from m2pem.executive.scheduled_runs import refuse_unattended
 from m2pem.executive.scheduled_start import vehicles_of
 from m2pem.executive.supervisor import Supervisor
 from m2pem.fleet.allocation import resources_of_mission
 from m2pem.fleet.facts import fleet_facts
-from m2pem.fleet.fleet import Fleet, real_resources
 from m2pem.mission.candidate_facts import FLEET_FACTS
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.expression import Expression
@@ -61,20 +61,6 @@ async def planned(
         by,
     )
     return plan, named
-
-
-def refuse_unattended(fleet: Fleet) -> None:
-    """Check that missions may start with no operator present.
-
-    Raises:
-        ScheduleError: the fleet has real vehicles, and its file does not say that they may.
-    """
-    real = real_resources(fleet)
-    if real and not fleet.unattended:
-        raise ScheduleError(
-            f"{', '.join(real)} of {fleet.file} would start with no operator present: say "
-            "`schedule: {unattended: true}` in the fleet file if they may"
-        )
 
 
 async def _refuse_unknown(

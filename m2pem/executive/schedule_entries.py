@@ -16,7 +16,8 @@ from m2pem.api.schedule import Schedule, ScheduleChanged, ScheduledMission
 from m2pem.errors import JournalError, OperatorError
 from m2pem.executive.emergency import WRITTEN_WITHIN_S, StopMark, StopMarks
 from m2pem.executive.schedule_view import scheduled_mission
-from m2pem.executive.scheduled_start import Look, Starter
+from m2pem.executive.scheduled_runs import ScheduledRuns
+from m2pem.executive.scheduled_start import Look
 from m2pem.mission.catalogue import ResourceId
 from m2pem.scheduling import times
 from m2pem.scheduling.entry import (
@@ -49,7 +50,7 @@ class ScheduleEntries:
 
     def __init__(
         self,
-        starter: Starter,
+        starter: ScheduledRuns,
         publish: Callable[[Alert | ScheduleChanged], None],
         marks: StopMarks,
         *,

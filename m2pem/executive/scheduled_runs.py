@@ -7,12 +7,12 @@ from m2pem.api.authoring import MissionFiles
 from m2pem.api.clock import Clock
 from m2pem.api.runs import RunId
 from m2pem.api.telemetry import LinkState
+from m2pem.errors import ScheduleError
 from m2pem.executive.loading import load_source
 from m2pem.executive.run_starter import RunStarter
-from m2pem.executive.schedule_admission import refuse_unattended
 from m2pem.executive.supervisor import Supervisor
 from m2pem.fleet.allocation import resources_of_mission
-from m2pem.fleet.fleet import Fleet
+from m2pem.fleet.fleet import Fleet, real_resources
 from m2pem.journal.base import Journal
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.mission import Mission
@@ -21,7 +21,7 @@ from m2pem.telemetry.bus import Bus
 
 
 class ScheduledRuns:
-    """Starts missions on an executive: `m2pem.executive.scheduled_start.Starter`."""
+    """Starts missions on an executive, and says what it knows of them."""
 
     def __init__(self, supervisor: Supervisor, starter: RunStarter, bus: Bus) -> None:
         self._supervisor = supervisor
@@ -44,7 +44,8 @@ class ScheduledRuns:
         return self._supervisor.clock
 
     def admitted(self, plan: SchedulePlan) -> tuple[Mission, str]:
-        """Read and check the mission of an entry of the schedule; it blocks.
+        """Read and check the mission of an entry of the schedule; returns it with its process. It
+        blocks.
 
         Raises:
             MissionError: with every finding.
@@ -57,7 +58,11 @@ class ScheduledRuns:
         return loaded, process
 
     async def unapproved(self, plan: SchedulePlan) -> str:
-        """Who must approve the mission of an entry before it may start; "": nobody."""
+        """Who must approve the mission of an entry before it may start; "": nobody.
+
+        Raises:
+            JournalError: the journal cannot be read.
+        """
         state = await self._starter.approvals.state(plan.mission_name, plan.mission, plan.library)
         return "" if state.may_start else str(state)
 
@@ -74,7 +79,14 @@ class ScheduledRuns:
         started: EntryChange,
         still: Callable[[], bool],
     ) -> RunId:
-        """Begin the run of an entry of the schedule; see `Starter`."""
+        """Begin a run together with the new state of the entry that starts it.
+
+        `still`: whether it may begin, asked when the journal has both.
+
+        Raises:
+            NotBegunError: it may not, or its beginning could not be written.
+            M2pemError: nothing was written.
+        """
         return await self._starter.begin_if_free(
             loaded, process, plan.data, by, started=started, still=still
         )
@@ -116,3 +128,17 @@ class ScheduledRuns:
         """The facts of a vehicle now, as conditions of the schedule read them."""
         graph = self._supervisor.arbiters.graph
         return Candidates(self.fleet, graph, self._bus.latest).facts(vehicle)
+
+
+def refuse_unattended(fleet: Fleet) -> None:
+    """Check that missions may start with no operator present.
+
+    Raises:
+        ScheduleError: the fleet has real vehicles, and its file does not say that they may.
+    """
+    real = real_resources(fleet)
+    if real and not fleet.unattended:
+        raise ScheduleError(
+            f"{', '.join(real)} of {fleet.file} would start with no operator present: say "
+            "`schedule: {unattended: true}` in the fleet file if they may"
+        )

@@ -4,27 +4,22 @@
 """
 
 import asyncio
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 from m2pem.allocation.candidates import Facts
-from m2pem.api.clock import Clock
 from m2pem.api.runs import RunId
-from m2pem.errors import ExpressionError, JournalError, M2pemError, OperatorError
+from m2pem.errors import ExpressionError, JournalError, M2pemError
+from m2pem.executive.scheduled_runs import ScheduledRuns
 from m2pem.fleet.allocation import resources_of_mission
-from m2pem.fleet.fleet import Fleet
-from m2pem.journal.base import Journal, RunHeader
+from m2pem.journal.base import RunHeader
 from m2pem.journal.mission import fleet_of, mission_of
 from m2pem.mission.catalogue import ResourceId
-from m2pem.mission.mission import Mission
 from m2pem.scheduling import times
 from m2pem.scheduling.entry import (
     Concurrency,
-    EntryChange,
     EntryId,
     ScheduleEntry,
-    SchedulePlan,
     entry_number,
 )
 from m2pem.units import US_PER_S
@@ -36,86 +31,6 @@ ASK_AGAIN_S = 5.0
 """Between two looks at what is not reported: runs of other executives, a journal that refused."""
 
 STARTING = "it starts in a moment"
-
-
-class NotBegunError(M2pemError):
-    """A run was created, and nothing of it has begun."""
-
-    def __init__(self, run: RunId, reason: str) -> None:
-        self.run = run
-        super().__init__(reason)
-
-
-class LeftToOthersError(OperatorError):
-    """This executive cannot start a mission, and another one on the journal may."""
-
-
-class Starter(Protocol):
-    """Starts missions: `m2pem.executive.scheduled_runs.ScheduledRuns`."""
-
-    @property
-    def fleet(self) -> Fleet: ...
-
-    @property
-    def journal(self) -> Journal: ...
-
-    @property
-    def clock(self) -> Clock: ...
-
-    def admitted(self, plan: SchedulePlan) -> tuple[Mission, str]:
-        """Read and check a mission; returns it with its process. Blocks.
-
-        Raises:
-            MissionError: with every finding.
-        """
-        ...
-
-    async def unapproved(self, plan: SchedulePlan) -> str:
-        """Who must approve the mission of an entry before it may start; "": nobody.
-
-        Raises:
-            JournalError: the journal cannot be read.
-        """
-        ...
-
-    async def begin_scheduled(
-        self,
-        loaded: Mission,
-        process: str,
-        plan: SchedulePlan,
-        by: str,
-        started: EntryChange,
-        still: Callable[[], bool],
-    ) -> RunId:
-        """Begin a run together with the new state of the entry that starts it.
-
-        `still`: whether it may begin, asked when the journal has both.
-
-        Raises:
-            NotBegunError: it may not, or its beginning could not be written.
-            M2pemError: nothing was written.
-        """
-        ...
-
-    def has_others(self) -> bool:
-        """Whether other executives are on the journal now. Blocks."""
-        ...
-
-    def outcome_of(self, run: RunId) -> str | None:
-        """How a run has ended; "": it goes on; None: it is not driven here."""
-        ...
-
-    def users(self) -> Mapping[ResourceId, str]:
-        """What runs and operators use, each with the words that say who."""
-        ...
-
-    def unusable(self, resource: ResourceId) -> str:
-        """Why no mission gets a resource now; "": nothing is known against it."""
-        ...
-
-    def facts(self, vehicle: ResourceId) -> Facts:
-        """The facts of a vehicle now."""
-        ...
 
 
 @dataclass(slots=True)
@@ -150,7 +65,7 @@ class Wait:
 class StartConditions:
     """Says what keeps entries of the schedule from their starts. `entries`: all, by their ids."""
 
-    def __init__(self, starter: Starter, entries: Mapping[EntryId, ScheduleEntry]) -> None:
+    def __init__(self, starter: ScheduledRuns, entries: Mapping[EntryId, ScheduleEntry]) -> None:
         self._starter = starter
         self._entries = entries
         self._outcomes: dict[RunId, str] = {}

@@ -32,18 +32,18 @@ from m2pem.errors import (
     OperatorError,
     StaleEntryError,
 )
+from m2pem.executive.run_starter import NotBegunError
 from m2pem.executive.schedule_entries import ScheduleEntries
+from m2pem.executive.scheduled_runs import ScheduledRuns
 from m2pem.executive.scheduled_start import (
     ASK_AGAIN_S,
     LOOK_AGAIN_S,
     STARTING,
-    LeftToOthersError,
     Look,
-    NotBegunError,
     StartConditions,
-    Starter,
     Wait,
 )
+from m2pem.executive.supervisor import LeftToOthersError
 from m2pem.fleet.allocation import resources_of_mission
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.mission import Mission
@@ -78,7 +78,7 @@ def _first(times_us: Iterable[int | None]) -> int | None:
 class Scheduler:
     """Starts the missions of a schedule when they are due, or when an operator says so."""
 
-    def __init__(self, starter: Starter, entries: ScheduleEntries) -> None:
+    def __init__(self, starter: ScheduledRuns, entries: ScheduleEntries) -> None:
         self._starter = starter
         self._entries = entries
         self._conditions = StartConditions(starter, entries.by_id)

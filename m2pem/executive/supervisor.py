@@ -69,7 +69,6 @@ from m2pem.executive.recovery import look_again, replaced_by
 from m2pem.executive.returns import Returns, still_lost
 from m2pem.executive.run_geometries import own_geometries
 from m2pem.executive.runner import OnRecords, RunContext, RunLimit, Runner
-from m2pem.executive.scheduled_start import LeftToOthersError
 from m2pem.executive.separation import separation_for
 from m2pem.executive.services import Services
 from m2pem.executive.space_allocation import SpaceAllocation
@@ -95,6 +94,10 @@ log = logging.getLogger("m2pem.executive")
 
 REMEMBERED_RUNS = 100
 """Ended runs whose last state is kept in memory; the journal has them all."""
+
+
+class LeftToOthersError(OperatorError):
+    """This executive cannot start a mission, and another one on the journal may."""
 
 
 @dataclass(frozen=True, slots=True)

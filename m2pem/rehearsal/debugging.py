@@ -321,7 +321,7 @@ class _Rehearsed:
             self._see,
             False,
             None,
-            self,
+            self.acts,
         )
         try:
             summary = run_virtual(

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
 from pathlib import Path
-from typing import Protocol, TypeAlias
+from typing import TypeAlias
 
 from m2pem.api.authoring import MissionSource
 from m2pem.api.clock import VirtualClock, run_virtual
@@ -345,15 +345,10 @@ def refuse_misfits(answers: Answers, mission: Mission, fleet: Fleet) -> None:
         raise AnswersError(f"{answers.source.file} does not fit {mission.file}", findings)
 
 
-class Debugger(Protocol):
-    """Steers a rehearsal from outside: `m2pem.rehearsal.debugging`."""
-
-    def acts(self, runner: Runner, simulated: Sequence[SimArbiter], now_us: int) -> bool:
-        """Is called when nothing is ready, before time advances. Whether it has posted an input.
-
-        `now_us`: microseconds since the Unix epoch, by the virtual clock.
-        """
-        ...
+Debugger: TypeAlias = Callable[[Runner, Sequence[SimArbiter], int], bool]
+"""Steers a rehearsal from outside (`m2pem.rehearsal.debugging`): is called when nothing is ready,
+before time advances, with microseconds since the Unix epoch by the virtual clock. It returns
+whether it has posted an input."""
 
 
 class Rehearsal:
@@ -367,7 +362,7 @@ class Rehearsal:
         on_record: OnRecord,
         observed: bool,
         telemetry_every_s: float | None,
-        debugger: "Debugger | None" = None,
+        debugger: Debugger | None = None,
     ) -> None:
         self.samples: Sequence[TelemetrySample] = ()
         self.vehicles: Mapping[ResourceId, VehicleAtEnd] = {}
@@ -470,7 +465,7 @@ class Rehearsal:
         if self._debugger is not None:
             if self._hold_for_incidents(runner):
                 return True
-            if self._debugger.acts(runner, self._scripted.simulated, executive.clock.now_us()):
+            if self._debugger(runner, self._scripted.simulated, executive.clock.now_us()):
                 return True
         if status is EngineStatus.PAUSED and ahead_s is None and not self._answers.to_send:
             runner.post(GiveUp("the run is paused, and nothing resumes it"))

@@ -1,10 +1,10 @@
 from collections.abc import Callable, Mapping
-from typing import cast
+from typing import Any, cast
 
 import pytest
 
 from m2pem.api import Arbiter, ArbiterContext, Area, Connection, Route
-from m2pem.executive.fleet_connections import ArbiterPlugins, FleetArbiters
+from m2pem.executive.fleet_connections import FleetArbiters
 from m2pem.fleet.fleet import Domain, Fleet, Payload, Vehicle, simulated_fleet
 from m2pem.mission.catalogue import ResourceId
 
@@ -45,7 +45,7 @@ def test_an_arbiter_is_told_the_failsafe_and_the_fence(fence: str, lent: Area | 
         fence=fence,
     )
     plugins = Plugins()
-    FleetArbiters(fleet, cast("ArbiterPlugins", plugins), cast("ArbiterContext", object()))
+    FleetArbiters(fleet, cast("Any", plugins), cast("ArbiterContext", object()))
     for resource in (UAV1, CAMERA):
         connection = plugins.connections[resource]
         assert (connection.failsafe, connection.fence) == ("return_to_launch", lent)
@@ -67,7 +67,7 @@ def test_a_fleet_says_whether_anything_real_moves(
     fleet = Fleet("fleet", "fleet.yaml", vehicles)
     arbiters = FleetArbiters(
         simulated_fleet(fleet) if simulated else fleet,
-        cast("ArbiterPlugins", Plugins()),
+        cast("Any", Plugins()),
         cast("ArbiterContext", object()),
     )
     assert arbiters.nothing_is_real is nothing_is_real

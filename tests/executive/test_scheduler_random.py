@@ -19,8 +19,8 @@ from m2pem.engine.inputs import Tick
 from m2pem.engine.records import RunEnded, RunOutcome, RunStarted
 from m2pem.errors import ScheduleError
 from m2pem.executive.emergency import StopMarks
+from m2pem.executive.run_starter import NotBegunError
 from m2pem.executive.schedule_entries import ScheduleEntries
-from m2pem.executive.scheduled_start import NotBegunError
 from m2pem.executive.scheduler import Scheduler
 from m2pem.fleet.fleet import Fleet
 from m2pem.journal import Entry, Journal, MemoryJournal, RunHeader

@@ -6,7 +6,7 @@ from typing import Any, cast
 import pytest
 
 from m2pem.api import ArbiterCapabilities, ArbiterContext
-from m2pem.executive.fleet_connections import ArbiterPlugins, FleetArbiters
+from m2pem.executive.fleet_connections import FleetArbiters
 from m2pem.executive.vehicle_locks import VehicleInUseError, VehicleLocks, addresses_of
 from m2pem.fleet.fleet import Domain, Fleet, Vehicle
 from m2pem.mission.catalogue import ResourceId
@@ -42,7 +42,7 @@ class Plugins:
 
 def locks(arbiter: str, **settings: Any) -> VehicleLocks:
     fleet = Fleet("fleet", "fleet.yaml", {UAV1: Vehicle(UAV1, Domain.AIR, arbiter, settings)})
-    plugins, context = cast("ArbiterPlugins", Plugins()), cast("ArbiterContext", object())
+    plugins, context = cast("Any", Plugins()), cast("ArbiterContext", object())
     return VehicleLocks(addresses_of(FleetArbiters(fleet, plugins, context)))
 
 

@@ -9,7 +9,7 @@ import pytest
 from m2pem.api.arbiter import ArbiterContext, Connection
 from m2pem.api.clock import SystemClock
 from m2pem.bpmn import parse_mission
-from m2pem.executive.fleet_connections import ArbiterPlugins, FleetArbiters
+from m2pem.executive.fleet_connections import FleetArbiters
 from m2pem.executive.loading import findings_for
 from m2pem.findings import Finding
 from m2pem.fleet.behaviors import SHARED
@@ -55,7 +55,7 @@ def arbiters(*names: str, behaviors: tuple[str, ...] | None = None) -> FleetArbi
     }
     team = Team("crew", tuple(ids), ids[0])
     fleet = Fleet("f", "fleet.yaml", vehicles, {}, {"crew": team}, {"road": route((0, 0), (9, 0))})
-    return FleetArbiters(fleet, cast("ArbiterPlugins", Plugins()), context(SystemClock()))
+    return FleetArbiters(fleet, cast("Any", Plugins()), context(SystemClock()))
 
 
 def findings(known: FleetArbiters, name: str, **parameters: str) -> list[Finding]:
@@ -70,7 +70,7 @@ def test_members_that_can_drive_a_route_can_march_together() -> None:
 def test_a_vehicle_in_no_team_cannot_fill_a_role_of_a_team_behavior() -> None:
     member = arbiters(ROUTING)
     alone = FleetArbiters(
-        replace(member.fleet, teams={}), cast("ArbiterPlugins", Plugins()), context(SystemClock())
+        replace(member.fleet, teams={}), cast("Any", Plugins()), context(SystemClock())
     )
     of = "road_sweep", TEAM, ResourceId("v0")
     assert unfit(member.fleet, member.graph, *of) == ""
@@ -137,5 +137,5 @@ def test_a_behavior_of_vehicles_goes_to_their_arbiter_where_that_takes_several()
 def test_who_is_in_no_team_is_offered_none() -> None:
     known = arbiters(ROUTING)
     alone = Fleet("f", "f.yaml", known.fleet.vehicles)
-    single = FleetArbiters(alone, cast("ArbiterPlugins", Plugins()), context(SystemClock()))
+    single = FleetArbiters(alone, cast("Any", Plugins()), context(SystemClock()))
     assert [spec.name for spec in single.offered(ResourceId("v0"))] == [ROUTING]
