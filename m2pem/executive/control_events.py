@@ -6,13 +6,13 @@ Subscribers get them in the order of commits. No run ever waits for a subscriber
 import asyncio
 import logging
 import threading
-import weakref
 from collections import deque
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import suppress
 from queue import Full, Queue
 from types import TracebackType
 from typing import Self
+from weakref import WeakValueDictionary
 
 from m2pem.api.alerts import AlertSeverity
 from m2pem.api.mission_control.watching import ControlEvent
@@ -86,7 +86,7 @@ class ControlEvents:
         self.cut_off = 0
         self.on_alert: Callable[[Alert], None] = lambda alert: None
         """Takes each alert, also when nobody subscribes."""
-        self._subscriptions: list[weakref.ref[Subscription]] = []
+        self._subscriptions: WeakValueDictionary[int, Subscription] = WeakValueDictionary()
         self._ended = False
 
     @property
@@ -97,8 +97,7 @@ class ControlEvents:
     @property
     def waiting(self) -> int:
         """How many events the reader has not taken that is furthest behind."""
-        alive = [subscription() for subscription in self._subscriptions]
-        return max((each.waiting for each in alive if each is not None), default=0)
+        return max((each.waiting for each in list(self._subscriptions.values())), default=0)
 
     def subscribe(self, run: RunId | None, size: int) -> Subscription:
         """Subscribe to every event from now on, or to those of one run."""
@@ -106,18 +105,14 @@ class ControlEvents:
         if self._ended:
             subscription.end()
         else:
-            # A new list: one may be let go while `publish` walks over the old.
-            self._subscriptions = [
-                *self._subscriptions,
-                weakref.ref(subscription, self._forget),
-            ]
+            self._subscriptions[id(subscription)] = subscription
         return subscription
 
     def publish(self, *events: ControlEvent) -> None:
         """Send events to all subscriptions. An alert is published alone."""
         if len(events) == 1 and isinstance(events[0], Alert):
             self.on_alert(events[0])
-        for reference in self._subscriptions:
+        for reference in self._subscriptions.valuerefs():
             subscription = reference()
             if subscription is not None and subscription.put(events):
                 self.cut_off += 1
@@ -125,14 +120,9 @@ class ControlEvents:
     def end(self) -> None:
         """Let every reader come to its end, after what waits for it."""
         self._ended = True
-        for reference in self._subscriptions:
-            subscription = reference()
-            if subscription is not None:
-                subscription.end()
-        self._subscriptions = []
-
-    def _forget(self, gone: "weakref.ref[Subscription]") -> None:
-        self._subscriptions = [kept for kept in self._subscriptions if kept is not gone]
+        for subscription in list(self._subscriptions.values()):
+            subscription.end()
+        self._subscriptions.clear()
 
 
 MAX_WAITING = 10_000

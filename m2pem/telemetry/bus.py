@@ -1,9 +1,9 @@
 """The fleet bus inside one process: the latest state of each resource, and subscriptions to all."""
 
 import asyncio
-import weakref
 from collections import deque
 from typing import TypeAlias, Union
+from weakref import WeakValueDictionary
 
 from m2pem.api.statistics import SubscriptionStatistics
 from m2pem.api.telemetry import PayloadState, TeamState, Telemetry, VehicleState
@@ -83,7 +83,7 @@ class Bus:
     def __init__(self) -> None:
         self.dropped = 0
         self._latest: dict[ResourceId, State] = {}
-        self._subscriptions: list[weakref.ref[Subscription]] = []
+        self._subscriptions: WeakValueDictionary[int, Subscription] = WeakValueDictionary()
         self._closed = False
 
     def latest(self, resource: ResourceId) -> State | None:
@@ -96,7 +96,7 @@ class Bus:
             return
         if not isinstance(state, TeamState):
             self._latest[state.resource] = state
-        for reference in self._subscriptions:
+        for reference in self._subscriptions.valuerefs():
             subscription = reference()
             if subscription is not None and subscription.put(state):
                 self.dropped += 1
@@ -107,26 +107,16 @@ class Bus:
         if self._closed:
             subscription.end()
         else:
-            # A new list: one may be let go while `publish` walks over the old.
-            self._subscriptions = [
-                *self._subscriptions,
-                weakref.ref(subscription, self._forget),
-            ]
+            self._subscriptions[id(subscription)] = subscription
         return subscription
 
     def readers(self) -> tuple[SubscriptionStatistics, ...]:
         """How far each reader is behind."""
-        alive = [subscription() for subscription in self._subscriptions]
-        return tuple(each.statistics() for each in alive if each is not None)
+        return tuple(each.statistics() for each in list(self._subscriptions.values()))
 
     def close(self) -> None:
         """End every subscription, after what waits in it; `latest` stays."""
         self._closed = True
-        for reference in self._subscriptions:
-            subscription = reference()
-            if subscription is not None:
-                subscription.end()
-        self._subscriptions = []
-
-    def _forget(self, gone: "weakref.ref[Subscription]") -> None:
-        self._subscriptions = [kept for kept in self._subscriptions if kept is not gone]
+        for subscription in list(self._subscriptions.values()):
+            subscription.end()
+        self._subscriptions.clear()
