@@ -209,43 +209,24 @@ class JournalSchedule(JournalFixtures):
             assert list(kept.items()) == [(2, "two"), (3, "three again")]
             assert await journal.drawings("south") == {1: "another"}
 
-    async def test_of_two_writers_that_have_read_the_same_drawings_one_is_refused(
-        self, journal: Journal
+    @pytest.mark.parametrize(
+        ("kind", "error"), [("alerts", StaleAlertsError), ("drawings", StaleDrawingsError)]
+    )
+    async def test_of_two_writers_that_have_read_the_same_one_is_refused(
+        self, journal: Journal, kind: str, error: type[JournalError]
     ) -> None:
-        """The last number is compared and the versions are written in one transaction."""
-        await journal.write_drawings("north", {1: "one"}, last=0)
+        """The last number is compared, and alerts or drawings are written, in one transaction."""
+        write, read = getattr(journal, f"write_{kind}"), getattr(journal, kind)
+        await write("north", {1: "one"}, last=0)
         written = await asyncio.gather(
-            journal.write_drawings("north", {2: "two"}, last=1),
-            journal.write_drawings("north", {1: None, 2: "other"}, last=1),
-            journal.write_drawings("south", {1: "another"}, last=0),
+            write("north", {2: "two"}, last=1),
+            write("north", {1: None, 2: "other"}, last=1),
+            write("south", {1: "another"}, last=0),
             return_exceptions=True,
         )
-        assert [type(each) for each in written] == [
-            type(None),
-            StaleDrawingsError,
-            type(None),
-        ]
-        assert await journal.drawings("north") == {1: "one", 2: "two"}
-        assert await journal.drawings("south") == {1: "another"}
-
-    async def test_of_two_writers_that_have_read_the_same_alerts_one_is_refused(
-        self, journal: Journal
-    ) -> None:
-        """The last number is compared and the alerts are written in one transaction."""
-        await journal.write_alerts("north", {1: "one"}, last=0)
-        written = await asyncio.gather(
-            journal.write_alerts("north", {2: "two"}, last=1),
-            journal.write_alerts("north", {1: None, 2: "other"}, last=1),
-            journal.write_alerts("south", {1: "another"}, last=0),
-            return_exceptions=True,
-        )
-        assert [type(each) for each in written] == [
-            type(None),
-            StaleAlertsError,
-            type(None),
-        ]
-        assert await journal.alerts("north") == {1: "one", 2: "two"}
-        assert await journal.alerts("south") == {1: "another"}
+        assert [type(each) for each in written] == [type(None), error, type(None)]
+        assert await read("north") == {1: "one", 2: "two"}
+        assert await read("south") == {1: "another"}
 
     @needs("durability")
     async def test_each_of_two_journals_sees_what_the_other_does_with_the_schedule(
