@@ -145,9 +145,8 @@ def campaign(
     seed gives the same runs on any number of processes or computers. An interrupt (Ctrl-C) keeps
     what is done.
     """
-    from m2pem.campaign.markdown import markdown_lines
     from m2pem.campaign.report import report_of
-    from m2pem.campaign.report_files import write_report
+    from m2pem.campaign.report_files import markdown_lines, write_report
     from m2pem.executive.loading import load_source
 
     if resume and out is None:

@@ -1,4 +1,5 @@
-"""Routes, areas and points that operators have handed over for all runs, with former versions.
+"""Routes, areas and points that operators have handed over for all runs, with former versions; and
+those that one run has alone.
 
 The journal keeps them, so that they outlive a restart. A run has its own copy of what it uses, in
 its records: nothing here changes a run that is under way.
@@ -7,16 +8,18 @@ its records: nothing here changes a run that is under way.
 import asyncio
 import logging
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 
 import msgspec
 
 from m2pem.api.runs import GeometryVersion, HandedOver
+from m2pem.engine.state import RunState
 from m2pem.errors import JournalError, OperatorError, StaleDrawingsError
 from m2pem.executive.emergency import WRITTEN_WITHIN_S
 from m2pem.fleet.fleet import Fleet
 from m2pem.geo.geojson import GeometryError, parse_geojson
 from m2pem.journal.base import Journal
-from m2pem.mission.geometry import Geometry
+from m2pem.mission.geometry import Area, Geometry, Point, Route
 from m2pem.mission.values import Value
 
 log = logging.getLogger("m2pem.drawings")
@@ -195,3 +198,23 @@ def _read(kept: Mapping[int, str]) -> Iterator[tuple[GeometryVersion, str]]:
             log.warning("version %d of a drawing in the journal is left out: %s", number, error)
             continue
         yield GeometryVersion(number, read.geometry, read.by, read.at_us), read.name
+
+
+def own_geometries(
+    state: RunState, handed_over: Mapping[str, HandedOver], of_all: Mapping[str, Geometry]
+) -> dict[str, Route | Area | Point]:
+    """Return what a run's tasks get by name and other runs do not.
+
+    `handed_over`: the latest of operators for all runs; `of_all`: those and the fleet file's.
+    """
+    used: dict[str, Geometry] = dict(state.mission.geometries)
+    for name, geometry in state.geometries.items():
+        latest = handed_over.get(name)
+        if name in used or latest is None or latest.geometry != geometry:
+            with suppress(GeometryError):  # one of an older release, which this one does not read
+                used[name] = parse_geojson(geometry)
+    return {
+        name: geometry
+        for name, geometry in used.items()
+        if isinstance(geometry, Route | Area | Point) and geometry != of_all.get(name)
+    }

@@ -54,7 +54,7 @@ from m2pem.executive.control_release import ControlRelease
 from m2pem.executive.control_requests import ControlRequests
 from m2pem.executive.counts import RunCounts
 from m2pem.executive.dispatcher import Dispatcher
-from m2pem.executive.drawings import Drawings
+from m2pem.executive.drawings import Drawings, own_geometries
 from m2pem.executive.emergency import WRITTEN_WITHIN_S, EmergencyCommands, StopMarks
 from m2pem.executive.fleet_connections import FleetArbiters
 from m2pem.executive.handover import Handover
@@ -67,7 +67,6 @@ from m2pem.executive.ownership import Ownership
 from m2pem.executive.presence import Presence
 from m2pem.executive.recovery import look_again, replaced_by
 from m2pem.executive.returns import Returns, still_lost
-from m2pem.executive.run_geometries import own_geometries
 from m2pem.executive.runner import OnRecords, RunContext, RunLimit, Runner
 from m2pem.executive.separation import separation_for
 from m2pem.executive.services import Services

@@ -9,9 +9,8 @@ from typing import Any
 from m2pem.api.authoring import MissionSource
 from m2pem.campaign.campaign import CampaignResult, run_campaign
 from m2pem.campaign.html import html_page
-from m2pem.campaign.markdown import markdown_lines
 from m2pem.campaign.report import report_of
-from m2pem.campaign.report_files import write_report
+from m2pem.campaign.report_files import markdown_lines, write_report
 from m2pem.campaign.runs import Row, order_of, read_text
 from m2pem.campaign.statistics import Effect, Estimate, effects, ends, failure, rehearsed
 from m2pem.mission.mission import Mission

@@ -4,8 +4,8 @@ import pytest
 from scipy import stats
 
 from m2pem.campaign.campaign import run_campaign
-from m2pem.campaign.markdown import markdown_lines
 from m2pem.campaign.report import report_of
+from m2pem.campaign.report_files import markdown_lines
 from m2pem.campaign.runs import Order, Row, order_of
 from m2pem.campaign.statistics import (
     SequentialTest,

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from m2pem.campaign.campaign import run_campaign
-from m2pem.campaign.markdown import markdown_lines
 from m2pem.campaign.report import report_of
+from m2pem.campaign.report_files import markdown_lines
 from m2pem.campaign.runs import Order
 from m2pem.campaign.statistics import SequentialTest, is_good, requirements
 from m2pem.errors import OperatorError
