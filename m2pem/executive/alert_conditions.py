@@ -4,6 +4,7 @@ It is looked at twice a second, so it costs nothing when records are committed.
 """
 
 from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass, field
 
 from m2pem.api.alerts import (
     BATTERY_LOW,
@@ -30,19 +31,17 @@ NOT_READY_AFTER_US = 10_000_000
 """A vehicle that has just started says for a while that it is not ready."""
 
 
+@dataclass(eq=False)
 class AlertConditions:
     """Reads the conditions off the parts of an executive.
 
     `links`: returns what watches the links; None: they are not watched.
     """
 
-    def __init__(
-        self, supervisor: Supervisor, bus: Bus, links: Callable[[], LinkMonitor | None]
-    ) -> None:
-        self._supervisor = supervisor
-        self._bus = bus
-        self._links = links
-        self._not_ready_us: dict[ResourceId, int] = {}
+    _supervisor: Supervisor
+    _bus: Bus
+    _links: Callable[[], LinkMonitor | None]
+    _not_ready_us: dict[ResourceId, int] = field(default_factory=dict)
 
     def now(self) -> list[Condition]:
         """What is so now."""

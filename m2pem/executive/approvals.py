@@ -4,6 +4,7 @@ They are in the journal, so that a restart and a standby know them.
 """
 
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import PurePath
 
 from m2pem.api.approval import EarlierApproval, GivenApproval, MissionApproval
@@ -19,6 +20,7 @@ SHOWN_EARLIER = 5
 """How many approvals of earlier contents are told."""
 
 
+@dataclass(eq=False)
 class Approvals:
     """The approvals of missions for one fleet.
 
@@ -26,21 +28,12 @@ class Approvals:
     them. `now_us`: the executive's clock. `say`: tells operators what was done.
     """
 
-    def __init__(
-        self,
-        fleet: Fleet,
-        journal: Journal,
-        geometries: Callable[[], Mapping[str, Geometry]],
-        drawn_by: Callable[[], Mapping[str, str]],
-        now_us: Callable[[], int],
-        say: Callable[[str], None] = lambda _: None,
-    ) -> None:
-        self._fleet = fleet
-        self._journal = journal
-        self._geometries = geometries
-        self._drawn_by = drawn_by
-        self._now_us = now_us
-        self._say = say
+    _fleet: Fleet
+    _journal: Journal
+    _geometries: Callable[[], Mapping[str, Geometry]]
+    _drawn_by: Callable[[], Mapping[str, str]]
+    _now_us: Callable[[], int]
+    _say: Callable[[str], None] = lambda _: None
 
     def _content(self, mission: bytes, library: Iterable[Source]) -> Content:
         return content_of(mission, library, self._geometries())

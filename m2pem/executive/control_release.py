@@ -8,6 +8,7 @@ must have left a request for it unanswered.
 
 import math
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 
 from m2pem.api.alerts import AlertSeverity
 from m2pem.api.runs import CONTROL_FORCED, Alert
@@ -21,22 +22,15 @@ from m2pem.fleet.fleet import Fleet
 from m2pem.fleet.operator_roles import why_not_allowed
 
 
+@dataclass(eq=False)
 class ControlRelease:
     """Implements `MissionControl.give_back`. `publish`: tells operators."""
 
-    def __init__(
-        self,
-        fleet: Fleet,
-        handover: Handover,
-        requests: ControlRequests,
-        presence: Presence,
-        publish: Callable[[Alert], None],
-    ) -> None:
-        self._fleet = fleet
-        self._handover = handover
-        self._requests = requests
-        self._presence = presence
-        self._publish = publish
+    _fleet: Fleet
+    _handover: Handover
+    _requests: ControlRequests
+    _presence: Presence
+    _publish: Callable[[Alert], None]
 
     async def give_back(self, name: str, by: str, reason: str, runners: Iterable[Runner]) -> None:
         """Give a resource back to the missions. `reason`: of an operator who does not have it.

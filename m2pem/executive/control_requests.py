@@ -7,7 +7,7 @@ open, and their time begins again: no operator loses a vehicle by a time-out tha
 import asyncio
 import logging
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from m2pem.api.alerts import AlertSeverity
 from m2pem.api.clock import Clock
@@ -35,6 +35,7 @@ class _Open:
     timer: asyncio.Task[None] | None = None
 
 
+@dataclass(eq=False)
 class ControlRequests:
     """The requests for control that are open, one of each resource at most.
 
@@ -42,25 +43,15 @@ class ControlRequests:
     `publish`: tells operators. `changed`: is called when there is one more or less.
     """
 
-    def __init__(
-        self,
-        fleet: Fleet,
-        handover: Handover,
-        clock: Clock,
-        runners: Callable[[], Iterable[Runner]],
-        is_gone: Callable[[str], bool],
-        publish: Callable[[Alert], None],
-        changed: Callable[[], None],
-    ) -> None:
-        self._fleet = fleet
-        self._handover = handover
-        self._clock = clock
-        self._runners = runners
-        self._is_gone = is_gone
-        self._publish = publish
-        self._changed = changed
-        self._open: dict[ResourceId, _Open] = {}
-        self._unanswered: dict[ResourceId, str] = {}
+    _fleet: Fleet
+    _handover: Handover
+    _clock: Clock
+    _runners: Callable[[], Iterable[Runner]]
+    _is_gone: Callable[[str], bool]
+    _publish: Callable[[Alert], None]
+    _changed: Callable[[], None]
+    _open: dict[ResourceId, _Open] = field(default_factory=dict)
+    _unanswered: dict[ResourceId, str] = field(default_factory=dict)
 
     def all(self) -> list[OpenControlRequest]:
         """Return the requests that are open."""

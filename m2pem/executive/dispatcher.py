@@ -7,7 +7,7 @@ vehicle: what comes of a command arrives as a report.
 import asyncio
 import logging
 from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Protocol
 
@@ -87,6 +87,7 @@ class Order:
     hosts: tuple[str, ...] = ()
 
 
+@dataclass(eq=False)
 class Dispatcher:
     """`post` takes every report, those of arbiters and those made here. `replaced` takes the
     refusal of a command whose run another executive drives. `claims` is asked before a vehicle is
@@ -94,32 +95,21 @@ class Dispatcher:
     it.
     """
 
-    def __init__(
-        self,
-        arbiters: FleetArbiters,
-        availability: Availability,
-        clock: Clock,
-        geometries: Geometries,
-        post: Callable[[BehaviorReport], None],
-        replaced: Callable[[StaleCommandError], None],
-        claims: Claims,
-        clearance: VehicleSeparation | None = None,
-    ) -> None:
-        self._arbiters = arbiters
-        self._availability = availability
-        self._clock = clock
-        self._geometries = geometries
-        self._post = post
-        self._replaced = replaced
-        self._claims = claims
-        self._clearance = clearance
-        self._active: dict[str, _Active] = {}
-        self._tails: dict[str, asyncio.Task[None]] = {}
-        self._starts: dict[str, asyncio.Task[None]] = {}
-        self._tasks: set[asyncio.Task[None]] = set()
-        self._barred: set[str] = set()
-        self._stopped: set[str] = set()
-        self._disowned: dict[str, tuple[ResourceId, ...]] = {}
+    _arbiters: FleetArbiters
+    _availability: Availability
+    _clock: Clock
+    _geometries: Geometries
+    _post: Callable[[BehaviorReport], None]
+    _replaced: Callable[[StaleCommandError], None]
+    _claims: Claims
+    _clearance: VehicleSeparation | None = None
+    _active: dict[str, _Active] = field(default_factory=dict)
+    _tails: dict[str, asyncio.Task[None]] = field(default_factory=dict)
+    _starts: dict[str, asyncio.Task[None]] = field(default_factory=dict)
+    _tasks: set[asyncio.Task[None]] = field(default_factory=set)
+    _barred: set[str] = field(default_factory=set)
+    _stopped: set[str] = field(default_factory=set)
+    _disowned: dict[str, tuple[ResourceId, ...]] = field(default_factory=dict)
 
     # --- commands -------------------------------------------------------------------------------
 

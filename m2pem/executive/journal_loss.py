@@ -9,6 +9,7 @@ is answered, so that a second crash asks again.
 import asyncio
 import logging
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 from m2pem.api.arbiter import Arbiter, BehaviorReport
 from m2pem.api.runs import OpenPrompt, PromptClosed, RunId
@@ -57,28 +58,19 @@ def paused_by(loss: Loss) -> str:
     return f"m2pem, because {loss}"
 
 
+@dataclass(eq=False)
 class JournalLossPrompts:
     """The questions about losses that are open in one executive."""
 
-    def __init__(
-        self,
-        journal: Journal,
-        arbiters: FleetArbiters,
-        dispatcher: Dispatcher,
-        availability: Availability,
-        handover: Handover,
-        events: ControlEvents,
-        runners: Mapping[RunId, Runner],
-    ) -> None:
-        self._journal = journal
-        self._arbiters = arbiters
-        self._dispatcher = dispatcher
-        self._availability = availability
-        self._handover = handover
-        self._events = events
-        self._runners = runners
-        self._held: dict[RunId, tuple[ResourceId, ...]] = {}
-        self._services: dict[RunId, tuple[RunService, ...]] = {}
+    _journal: Journal
+    _arbiters: FleetArbiters
+    _dispatcher: Dispatcher
+    _availability: Availability
+    _handover: Handover
+    _events: ControlEvents
+    _runners: Mapping[RunId, Runner]
+    _held: dict[RunId, tuple[ResourceId, ...]] = field(default_factory=dict)
+    _services: dict[RunId, tuple[RunService, ...]] = field(default_factory=dict)
 
     async def ask(self, runner: Runner, loss: Loss) -> None:
         """Cancel what the journal does not know, hold what the mission allocates, and ask.

@@ -3,6 +3,7 @@ what there is, which is looked up when it is asked for.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from m2pem.api.clock import Clock
 from m2pem.api.statistics import ExecutiveStatistics, LinkStatistics
@@ -16,25 +17,18 @@ from m2pem.telemetry.link_monitor import LinkMonitor
 from m2pem.units import US_PER_S
 
 
+@dataclass(eq=False)
 class StatisticsReader:
     """Reads the statistics off the parts of an executive.
 
     `links`: returns what watches the links; None: they are not watched.
     """
 
-    def __init__(
-        self,
-        supervisor: Supervisor,
-        bus: Bus,
-        observers: RecordObservers | None,
-        clock: Clock,
-        links: Callable[[], LinkMonitor | None],
-    ) -> None:
-        self._supervisor = supervisor
-        self._bus = bus
-        self._observers = observers
-        self._clock = clock
-        self._links = links
+    _supervisor: Supervisor
+    _bus: Bus
+    _observers: RecordObservers | None
+    _clock: Clock
+    _links: Callable[[], LinkMonitor | None]
 
     def read(self) -> ExecutiveStatistics:
         """What was counted up to now, and what there is."""

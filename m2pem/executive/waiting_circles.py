@@ -7,6 +7,7 @@ for space where a vehicle is.
 import re
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from m2pem.allocation.circles import Until, Waiting, circles
@@ -29,19 +30,14 @@ if TYPE_CHECKING:
 BY_ITSELF = Until()
 
 
+@dataclass(eq=False)
 class WaitingCircles:
     """Warns operators of each circle once. `runners`: the runs that are driven here."""
 
-    def __init__(
-        self,
-        runners: Mapping[RunId, Runner],
-        graph: ResourceGraph,
-        publish: Callable[[Alert], None],
-    ) -> None:
-        self._runners = runners
-        self._graph = graph
-        self._publish = publish
-        self._known: set[frozenset[str]] = set()
+    _runners: Mapping[RunId, Runner]
+    _graph: ResourceGraph
+    _publish: Callable[[Alert], None]
+    _known: set[frozenset[str]] = field(default_factory=set)
 
     def look(
         self,

@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, cast
 
 from m2pem.api.arbiter import Arbiter, ArbiterContext, BehaviorRequest, Connection
@@ -104,6 +104,7 @@ def _with_settings(connection: Connection, changed: Mapping[str, Any]) -> Connec
     return replace(connection, settings=settings)
 
 
+@dataclass(eq=False)
 class ScriptedArbiter:
     """Decorates an arbiter: a behavior with an answer ends as that says.
 
@@ -111,18 +112,11 @@ class ScriptedArbiter:
     for each element.
     """
 
-    def __init__(
-        self,
-        arbiter: Arbiter,
-        answers: Answers,
-        logger: logging.Logger,
-        plugins: ScriptedPlugins,
-    ) -> None:
-        self._arbiter = arbiter
-        self._plugins = plugins
-        self._answers = answers
-        self._logger = logger
-        self._warned: set[str] = set()
+    _arbiter: Arbiter
+    _answers: Answers
+    _logger: logging.Logger
+    _plugins: ScriptedPlugins
+    _warned: set[str] = field(default_factory=set)
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._arbiter, name)

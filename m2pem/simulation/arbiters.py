@@ -4,7 +4,7 @@ import asyncio
 import json
 import math
 from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -38,22 +38,15 @@ from m2pem.simulation.vehicles import SimVehicle, carrier_of
 from m2pem.units import US_PER_S
 
 
+@dataclass(eq=False)
 class RadioRange:
     """Commands wait for a broken link; when it is broken for `lost_after_s`, all is lost."""
 
-    def __init__(
-        self,
-        links: Links,
-        event_queue: EventQueue,
-        memory: Memory,
-        simulation: Simulation,
-        lost_after_s: Callable[[ResourceId], float],
-    ) -> None:
-        self._links = links
-        self._event_queue = event_queue
-        self._memory = memory
-        self._simulation = simulation
-        self._lost_after_s = lost_after_s
+    _links: Links
+    _event_queue: EventQueue
+    _memory: Memory
+    _simulation: Simulation
+    _lost_after_s: Callable[[ResourceId], float]
 
     def command(
         self, execution: Execution, name: str, act: Callable[[int], None], now_us: int

@@ -101,20 +101,14 @@ class Assignment:
         )
 
 
+@dataclass(eq=False)
 class Planner:
     """Knows the bodies and where everybody is."""
 
-    def __init__(
-        self,
-        connections: Mapping[ResourceId, Connection],
-        context: ArbiterContext,
-        frame: FlatFrame,
-        bodies: Mapping[ResourceId, Body],
-    ) -> None:
-        self._connections = connections
-        self._context = context
-        self._frame = frame
-        self._bodies = bodies
+    _connections: Mapping[ResourceId, Connection]
+    _context: ArbiterContext
+    _frame: FlatFrame
+    _bodies: Mapping[ResourceId, Body]
 
     def pose_of(self, vehicle: str, now_us: int) -> Pose | None:
         """Return the pose of a vehicle: of a simulated one, or by its telemetry on the bus."""

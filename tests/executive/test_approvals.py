@@ -103,7 +103,7 @@ async def test_who_edits_a_file_that_it_calls_is_an_editor() -> None:
         control = running.control
         await control.note_edit(file_digest(PATROL.source), by="anna")
         await control.note_edit(file_digest(called.data), by="bob")
-        approvals = running.approvals
+        approvals = running.starter.approvals
         state = await approvals.state(files.file, files.source, files.library)
         assert state.editors == ("anna", "bob")
         assert not state.editor_unknown

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractAsyncContextManager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol, TypeAlias
 
@@ -44,38 +45,27 @@ Estimate: TypeAlias = Callable[[Mission, Fleet, str | None], MissionEstimate]
 """Estimates what a mission takes with a fleet, from the start of a process; None: its main one."""
 
 
+@dataclass(eq=False)
 class ControlParts:
     """The parts of an executive that operations use."""
 
-    def __init__(
-        self,
-        supervisor: Supervisor,
-        starter: RunStarter,
-        bus: Bus,
-        health: ExecutiveHealth,
-        schedule: ScheduleEntries,
-        scheduler: Scheduler,
-        switchover: Switchover,
-        alerts: AlertList,
-        statistics: StatisticsReader,
-        rehearse: Rehearse | None = None,
-        foresee: Foresee | None = None,
-        estimate: Estimate | None = None,
-    ) -> None:
-        self._supervisor = supervisor
-        self._starter = starter
-        self._schedule = schedule
-        self._scheduler = scheduler
-        self._switchover = switchover
-        self._alerts = alerts
-        self._bus = bus
-        self._health = health
-        self._statistics = statistics
-        self._rehearse = rehearse
-        self._estimate = estimate
-        self._choices = IncidentChoices(supervisor, foresee)
-        self._revisions = RunRevisions(supervisor, starter, self._choices)
-        self._direct = DirectBehaviors(supervisor, starter)
+    _supervisor: Supervisor
+    _starter: RunStarter
+    _bus: Bus
+    _health: ExecutiveHealth
+    _schedule: ScheduleEntries
+    _scheduler: Scheduler
+    _switchover: Switchover
+    _alerts: AlertList
+    _statistics: StatisticsReader
+    _rehearse: Rehearse | None = None
+    _foresee: Foresee | None = None
+    _estimate: Estimate | None = None
+
+    def __post_init__(self) -> None:
+        self._choices = IncidentChoices(self._supervisor, self._foresee)
+        self._revisions = RunRevisions(self._supervisor, self._starter, self._choices)
+        self._direct = DirectBehaviors(self._supervisor, self._starter)
 
     def _refuse_others(self, what: str, role: str, by: str) -> None:
         """Check that an operator has the role of those who decide about something.
