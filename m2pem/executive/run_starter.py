@@ -3,6 +3,7 @@
 import asyncio
 import time
 from collections.abc import Callable, Collection, Mapping
+from typing import Any
 
 from m2pem.allocation.assignment import load_solver
 from m2pem.api.alerts import AlertSeverity
@@ -194,12 +195,10 @@ class RunStarter:
         data: Mapping[str, Value] | None,
         by: str,
         *,
-        started: EntryChange | None = None,
-        still: Callable[[], bool] = lambda: True,
         lent: Collection[ResourceId] = (),
-        direct: bool = False,
+        **options: Any,
     ) -> RunId:
-        """Begin a run if all that its mission names is free; the rest as for `begin`.
+        """Begin a run if all that its mission names is free; the options are those of `begin`.
 
         Raises:
             BusyError: other runs or operators have some of it.
@@ -207,16 +206,7 @@ class RunStarter:
         """
         async with self._starting:
             self.refuse_busy(loaded, lent)
-            return await self.begin(
-                loaded,
-                process_id,
-                data,
-                by,
-                started=started,
-                still=still,
-                lent=lent,
-                direct=direct,
-            )
+            return await self.begin(loaded, process_id, data, by, lent=lent, **options)
 
     def refuse_busy(self, loaded: Mission, lent: Collection[ResourceId] = ()) -> None:
         """Check that everything that a mission names is free now, or lent to it.

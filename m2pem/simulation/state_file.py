@@ -109,6 +109,13 @@ class _Behavior(msgspec.Struct):
     shots: Shots | None = None
 
 
+_AS_THEY_ARE = (
+    *("epoch", "behavior", "watch", "strike", "limit_s", "number", "last", "outcome"),
+    *("deaf", "cancelling", "shots"),
+)
+"""What the file has of a behavior as the simulation has it."""
+
+
 def _make_private(path: str) -> None:
     """Make a new file readable by its owner alone: it says where vehicles are. SQLite gives its
     log the same mode."""
@@ -295,10 +302,7 @@ def _body_record(body: Body) -> _Vehicle | _Payload:
 def _behavior_record(execution: Execution) -> _Behavior:
     return _Behavior(
         id=execution.id,
-        epoch=execution.epoch,
-        behavior=execution.behavior,
         resources=list(execution.resources),
-        watch=execution.watch,
         parts=[
             _Part(
                 part.body.id,
@@ -311,24 +315,14 @@ def _behavior_record(execution: Execution) -> _Behavior:
             )
             for part in execution.parts
         ],
-        strike=execution.strike,
-        limit_s=execution.limit_s,
-        number=execution.number,
-        last=execution.last,
-        outcome=execution.outcome,
-        deaf=execution.deaf,
-        cancelling=execution.cancelling,
-        shots=execution.shots,
+        **{name: getattr(execution, name) for name in _AS_THEY_ARE},
     )
 
 
 def _execution(record: _Behavior, bodies: dict[ResourceId, Body], frame: LocalFrame) -> Execution:
     return Execution(
         id=BehaviorId(record.id),
-        epoch=record.epoch,
-        behavior=record.behavior,
         resources=tuple(ResourceId(resource) for resource in record.resources),
-        watch=record.watch,
         parts=[
             Part(
                 bodies[ResourceId(part.resource)],
@@ -341,14 +335,7 @@ def _execution(record: _Behavior, bodies: dict[ResourceId, Body], frame: LocalFr
             for part in record.parts
             if ResourceId(part.resource) in bodies
         ],
-        strike=record.strike,
-        limit_s=record.limit_s,
-        number=record.number,
-        last=record.last,
-        outcome=record.outcome,
-        deaf=record.deaf,
-        cancelling=record.cancelling,
-        shots=record.shots,
+        **{name: getattr(record, name) for name in _AS_THEY_ARE},
     )
 
 
