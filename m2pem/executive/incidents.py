@@ -1,6 +1,7 @@
 """Open incidents as operators see them; their choices, checked against run and fleet, and what
 follows them."""
 
+import logging
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Protocol
 
@@ -20,6 +21,8 @@ from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.mission import Mission
 from m2pem.mission.values import Value
 from m2pem.suggestions import suggest_or
+
+log = logging.getLogger("m2pem.executive")
 
 
 def open_incidents(runners: Iterable[Runner], fleet: Fleet) -> list[OpenIncident]:
@@ -127,15 +130,22 @@ class IncidentChoices:
             for spec in specs
             if spec.writes
         }
-        return await self._foresee(
-            run,
-            mission_run.begun_with,
-            supervisor.fleet,
-            entries,
-            item,
-            supervisor.clock.now_us(),
-            sorted(writers),
-        )
+        try:
+            return await self._foresee(
+                run,
+                mission_run.begun_with,
+                supervisor.fleet,
+                entries,
+                item,
+                supervisor.clock.now_us(),
+                sorted(writers),
+            )
+        except (
+            Exception
+        ):  # what explores is a help: its fault must not keep operators from deciding
+            log.exception("%s: what follows was not explored", run)
+            reason = "its exploration broke off; the log of the executive says why"
+            return IncidentPreview(IncidentVerdict.UNKNOWN, reason)
 
 
 def _members(names: Sequence[str], fleet: Fleet) -> tuple[str, ...]:

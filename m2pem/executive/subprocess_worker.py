@@ -7,6 +7,7 @@ The subprocess ends with the task that awaits it, and with the executive, howeve
 """
 
 import asyncio
+import logging
 import os
 import struct
 import sys
@@ -32,6 +33,8 @@ from m2pem.findings import Finding
 from m2pem.verify.requirements.requirement import RequirementsError
 
 SendProgress: TypeAlias = Callable[[bytes], None]
+
+log = logging.getLogger("m2pem.executive")
 
 _HEAD = struct.Struct(">cQ")
 _RESULT, _PROGRESS, _REFUSED = b"r", b"t", b"e"
@@ -121,8 +124,11 @@ async def run_in_subprocess(
                 content = await process.stdout.readexactly(size)
             except asyncio.IncompleteReadError:
                 await process.wait()
+                # What it said may have paths of this host, which no client is to see.
+                status = process.returncode
+                log.error("%s broke off with status %s: %s", module, status, await words)
                 raise InternalError(
-                    f"{module} broke off with status {process.returncode}: {await words}"
+                    f"{module} broke off with status {status}; the log of the executive says why"
                 ) from None
             if kind == _RESULT:
                 return content

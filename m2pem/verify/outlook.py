@@ -399,7 +399,10 @@ def _scope(state: RunState, scope: Scope, now_us: int) -> Key:
         ),
         _waits(state, scope.waits, now_us),
         loop
-        and (loop.total, loop.started, loop.completed, loop.terminated, _encoded(loop.outputs)),
+        and (
+            *(loop.total, loop.started, loop.completed, loop.terminated),
+            _encoded(sorted(loop.outputs.items())),  # JSON has no numbers as keys
+        ),
         tuple((node.id, tuple(places[t.id] for t in ts)) for node, ts in scope.gathered.items()),
         tuple((node.id, tuple(f.id for f in flows)) for node, flows in scope.activated.items()),
         tuple(node.id for node in scope.chosen),

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from m2pem.api.runs import RunStatus
+from m2pem.api.runs import IncidentPreview, IncidentVerdict, RunStatus
 from m2pem.api.telemetry import LinkState
 from m2pem.engine.inputs import BehaviorReported
 from m2pem.engine.records import (
@@ -15,7 +15,7 @@ from m2pem.engine.records import (
     IncidentOpened,
     IncidentResolved,
 )
-from m2pem.errors import BusyError, OperatorError
+from m2pem.errors import BusyError, InternalError, OperatorError
 from m2pem.mission.catalogue import BehaviorState
 
 from .conftest import World, behavior, fleet, flow, mission, question, sequence, task
@@ -379,3 +379,25 @@ def test_an_incident_is_not_an_idle_run_and_other_branches_go_on(play):
     summary = play(story, "ugv1")
     assert summary.status is RunStatus.FAILED
     assert "error ROUTE_BLOCKED from Drive" in summary.detail
+
+
+async def breaks_off(*_: object) -> IncidentPreview:
+    raise InternalError("the worker broke off with status -9")
+
+
+def test_an_exploration_that_breaks_off_is_not_known_and_keeps_no_operator_from_deciding(play):
+    async def story(world: World):
+        control = world.executive.control
+        run = await failed(world)
+        seen = await control.preview_incident(run, "i1", "retry")
+        same = DRIVE.replace(b'"Drive"', b'"Drive" name="Go"')
+        plan = await control.plan_revision(run, same)
+        await control.revise(run, same, plan.plan)
+        await control.resolve_incident(run, "i1", "retry")
+        await world.fake.until_called("start", f"{run}.b2")
+        return seen, plan.outlook
+
+    not_known = IncidentPreview(
+        IncidentVerdict.UNKNOWN, "its exploration broke off; the log of the executive says why"
+    )
+    assert play(story, "ugv1", foresee=breaks_off) == (not_known, not_known)

@@ -237,10 +237,14 @@ def test_the_process_ends_with_an_executive_that_is_killed(endless: str) -> None
         os.sched_yield()
 
 
-def test_a_worker_that_breaks_off_is_an_error_with_its_last_words(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_a_worker_that_breaks_off_is_an_error_and_its_last_words_are_logged(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     (tmp_path / "broken_work.py").write_text("raise SystemExit('no room')", encoding="utf-8")
     monkeypatch.syspath_prepend(str(tmp_path))
-    with pytest.raises(InternalError, match="no room"):
+    with pytest.raises(InternalError) as broke:
         asyncio.run(run_in_subprocess("broken_work", b""))
+    assert (
+        str(broke.value) == "broken_work broke off with status 1; the log of the executive says why"
+    )
+    assert "no room" in caplog.text

@@ -116,3 +116,24 @@ def test_too_many_states_are_not_known() -> None:
 
 def test_a_paused_run_is_looked_at_as_if_it_went_on() -> None:
     assert seen(stopped(JOINED).pause(), "skip") == Outlook(Verdict.COMPLETES)
+
+
+OUTPUTS = """
+    <startEvent id="start"/> <endEvent id="end"/> <dataObject id="all" name="all"/>
+    <scriptTask id="init">items = [10, 20]; y = 0</scriptTask>
+    <parallelGateway id="fork"/> <parallelGateway id="join"/>
+    <scriptTask id="go">do goto uav1</scriptTask>
+    <userTask id="each" m2pem:store="q">ask yes no <each m2pem:collection="items"
+      m2pem:elementVariable="item" out="all" result="q"></each></userTask>
+    start -> init -> fork -> each -> join -> end
+    fork -> go -> join
+"""
+
+
+@pytest.mark.parametrize("choice", ["retry", "skip", "end", "move"])
+def test_instances_that_collect_outputs_are_explored(choice: str) -> None:
+    play = stopped(OUTPUTS)
+    play.answer("yes")  # one output is there, by its number
+    verdict = Verdict.CANNOT_COMPLETE if choice == "end" else Verdict.COMPLETES
+    options = {"to": "f6"} if choice == "move" else {}
+    assert seen(play, choice, **options).verdict is verdict

@@ -110,7 +110,7 @@ def handle_problems(app: FastAPI, missions: Path = Path()) -> None:
             return problem(status, str(error), stuck=True)
         if status == 500:
             log.error("a request failed: %s", error)
-        return problem(status, str(error))
+        return problem(status, called.text(str(error)))
 
     @app.exception_handler(HTTPException)
     def said(request: Request, error: HTTPException) -> JSONResponse:

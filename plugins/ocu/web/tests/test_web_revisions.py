@@ -82,6 +82,10 @@ async def test_a_file_that_is_wrong_and_a_run_that_is_none(world: MakeWorld) -> 
         path = f"/api/runs/{asked.run}/revision/plan"
         assert (await browser.http.post(path, json={"mission": "wrong"})).status_code == 422
         assert (await browser.http.post(path, json={"mission": "none"})).status_code == 404
+        for more in ({}, {"xml": OTHER.decode()}):  # a name is written without .bpmn
+            named = await browser.http.post(path, json={"mission": "a.bpmn", **more})
+            assert named.status_code == 422
+            assert "a name is written without .bpmn" in named.json()["detail"]
         other = "/api/runs/r99/revision/plan"
         assert (await browser.http.post(other, json={"mission": "wrong"})).status_code == 404
 

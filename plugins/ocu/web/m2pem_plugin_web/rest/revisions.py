@@ -125,7 +125,7 @@ def router(control: MissionControl, folder: MissionFolder) -> APIRouter:
             source = source_of(wanted.xml)
         else:
             source = await of_folder(folder.source, wanted.mission, wanted.version)
-        return Draft(folder.file(wanted.mission), source)
+        return Draft(await of_folder(folder.file, wanted.mission), source)
 
     @routes.get("/{run}/versions")
     async def versions(_: Viewer, run: str) -> list[VersionModel]:
