@@ -3,6 +3,7 @@
 While an operator has a resource, no mission gets it; every run's journal says so.
 """
 
+import asyncio
 from collections.abc import Callable, Collection, Container, Iterable, Mapping
 from typing import TYPE_CHECKING
 
@@ -53,9 +54,7 @@ class Handover:
             raise OperatorError(f"{resource} is with {holder}")
         self.taken[resource] = by or UNNAMED_OPERATOR
         self._withdraw(resource)
-        for runner in list(runners):
-            if not runner.done.is_set():
-                await runner.submit(ControlTaken(resource, by or UNNAMED_OPERATOR))
+        await _submit(runners, ControlTaken(resource, by or UNNAMED_OPERATOR))
 
     def preview(self, name: str, runners: Iterable[Runner]) -> list[TakeEffect]:
         """What `take` of a resource would end now in each run.
@@ -103,9 +102,7 @@ class Handover:
         self._availability.restore(resource)
         if why := self.why_not_free(resource):
             self._availability.withdraw(resource, why)
-        for runner in list(runners):
-            if not runner.done.is_set():
-                await runner.submit(ControlReturned(resource, by, holder, reason))
+        await _submit(runners, ControlReturned(resource, by, holder, reason))
 
     def pass_on(self, resource: ResourceId, to: str) -> None:
         """Another operator has a resource from now on that an operator has."""
@@ -165,6 +162,14 @@ class Handover:
             hint = did_you_mean(name, self._known)
             raise OperatorError(f"the fleet has no {name!r}; {hint}")
         return resource
+
+
+async def _submit(runners: Iterable[Runner], item: ControlTaken | ControlReturned) -> None:
+    """Have all runs decide an input, and wait until they have.
+
+    All get it at once: a run that is given the resource meanwhile knows that it may have it.
+    """
+    await asyncio.gather(*(each.submit(item) for each in runners if not each.done.is_set()))
 
 
 def refuse_busy_resources(

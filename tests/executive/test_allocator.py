@@ -26,7 +26,7 @@ from m2pem.journal.base import Entry, RunHeader
 from m2pem.mission.catalogue import BehaviorState, ResourceId
 from tests.waiting_circle import GO, holding_and_waiting
 
-from .conftest import START_US, World, fleet, flow, mission, sequence, task
+from .conftest import START_US, World, fleet, flow, mission, question, sequence, task
 
 SUCCEEDED = BehaviorState.SUCCEEDED
 
@@ -275,6 +275,32 @@ def test_a_vehicle_that_an_operator_gives_back_is_given_to_who_waits(play):
         return (await control.wait(run)).status
 
     assert play(story, "ugv1") is RunStatus.COMPLETED
+
+
+@pytest.mark.parametrize(
+    "role",
+    [
+        "requires=\"vehicle.name == 'ugv1'\" wait='PT10M'",
+        "vehicle='ugv1' wait='PT10M'",
+        "requires='true' wait='PT10M' onLoss='reassign'",
+    ],
+)
+def test_a_vehicle_that_is_given_back_with_many_runs_open_is_chosen_once(play, role):
+    async def story(world: World):
+        control = world.executive.control
+        await control.take("ugv1", by="ops")
+        for _ in range(20):
+            await control.start(mission(sequence(("Ask", question("Ask")))))
+        run = await control.start(one(role))
+        await world.clock.sleep(1)
+        world.seen.clear()
+        await control.give_back("ugv1", by="ops")
+        await world.fake.until_called("start", f"{run}.b1")
+        return world.seen
+
+    seen = play(story, "ugv1")
+    assert [each for each in seen if isinstance(each, AllocationDelayed)] == []
+    assert len([each for each in seen if isinstance(each, ResourcesAllocated)]) == 1
 
 
 def test_values_that_change_all_the_time_do_not_fill_the_journal(play):
