@@ -15,14 +15,16 @@ data, before the next step. It fires when it is true. What catches again must fi
 (table 10.84): its wait is spent until then.
 """
 
+from collections.abc import Iterable
+
 from m2pem.engine import records as r
 from m2pem.engine.data import reader
-from m2pem.engine.execution import Execution, definitions_of
+from m2pem.engine.execution import Execution, armed_triggers, definitions_of
 from m2pem.engine.records import Trigger
 from m2pem.engine.state import Scope, Token, TokenOrScope, Wait
 from m2pem.engine.throwing import throw_error, throw_expression_error
 from m2pem.errors import ExpressionError, ExpressionSyntaxError
-from m2pem.mission.elements import FlowNode
+from m2pem.mission.elements import FlowNode, Process
 from m2pem.mission.events import (
     ConditionalEventDefinition,
     EventDefinition,
@@ -73,6 +75,23 @@ def arm(
                     throw_error(x, holder, "EXPRESSION", reason, arming=not spent)
                 else:
                     throw_expression_error(x, holder, reason)
+                return False
+    return True
+
+
+def arm_events(
+    x: Execution, holder: TokenOrScope, events: Iterable[FlowNode], *, since_us: int | None = None
+) -> bool:
+    """Arm events for a token or scope that comes to them, or that is there when a revision brings
+    them. False: a timer was wrong, its error was thrown, and the events after it are not armed.
+
+    What begins other processes is awaited by the scope that the run began with. `since_us`: as in
+    `arm`.
+    """
+    for event in events:
+        of_process = isinstance(holder, Scope) and isinstance(event.container, Process)
+        for definition in armed_triggers(event) if of_process else definitions_of(event):
+            if not arm(x, holder, event, definition, since_us=since_us):
                 return False
     return True
 

@@ -28,6 +28,7 @@ from m2pem.engine.elements.behaviors import (
     resource_returned,
 )
 from m2pem.engine.elements.subprocesses import begin
+from m2pem.engine.execution import received_messages
 from m2pem.engine.lifecycle import Admission, admission
 from m2pem.engine.records import RunOutcome
 from m2pem.engine.requirements import (
@@ -275,7 +276,7 @@ def _signal(x: Steps, item: i.SignalReceived) -> None:
 
 
 def _message(x: Steps, item: i.MessageReceived) -> None:
-    if item.message not in x.receivable:
+    if item.message not in received_messages(x.mission):
         x.ignore(f"nothing in the mission receives message {item.message}")
         return
     _remember_id(x, item.id)

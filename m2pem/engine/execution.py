@@ -6,9 +6,10 @@ change is a record that is applied at once, so that the next decision sees it.
 """
 
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from functools import lru_cache
 from typing import ClassVar, TypeAlias
 
 from m2pem.engine import records as r
@@ -96,7 +97,6 @@ class Execution:
 
     __slots__ = (
         "_reach",
-        "_receivable",
         "_triggered_starts",
         "at_breakpoints",
         "breakpoints",
@@ -141,7 +141,6 @@ class Execution:
             and (waits := waits_when_entered(node)) is not Waits.NOTHING
         }
         self._reach: dict[FlowNode, dict[FlowNode, int]] = {}
-        self._receivable: frozenset[str] | None = None
         self._triggered_starts: tuple[FlowNode, ...] | None = None
 
     def emit(self, record: Record) -> None:
@@ -163,13 +162,6 @@ class Execution:
         if reach is None:
             reach = self._reach[join] = upstream(join)
         return reach
-
-    @property
-    def receivable(self) -> frozenset[str]:
-        """Ids of the messages that an element of the mission catches."""
-        if self._receivable is None:
-            self._receivable = frozenset(_caught_messages(self.mission))
-        return self._receivable
 
     @property
     def triggered_starts(self) -> tuple[FlowNode, ...]:
@@ -424,10 +416,24 @@ def _triggered(entry: FlowNode) -> Sequence[FlowNode]:
     return [entry] if isinstance(entry, ReceiveTask) and entry.instantiate else []
 
 
-def _caught_messages(mission: Mission) -> Iterator[str]:
-    for node in mission.nodes:
-        if isinstance(node, EndEvent | IntermediateThrowEvent):
-            continue
-        for definition in definitions_of(node):
-            if isinstance(definition, MessageEventDefinition):
-                yield definition.message.id
+def armed_triggers(start: FlowNode) -> Sequence[EventDefinition]:
+    """Return the triggers of an element that begins another process which are armed: conditions,
+    and timers of start events. The others find it when they are thrown."""
+    return [
+        each
+        for each in definitions_of(start)
+        if isinstance(each, ConditionalEventDefinition)
+        or (isinstance(each, TimerEventDefinition) and isinstance(start, StartEvent))
+    ]
+
+
+@lru_cache(maxsize=16)
+def received_messages(mission: Mission) -> frozenset[str]:
+    """Return the ids of the messages that an element of a mission catches."""
+    return frozenset(
+        definition.message.id
+        for node in mission.nodes
+        if not isinstance(node, EndEvent | IntermediateThrowEvent)
+        for definition in definitions_of(node)
+        if isinstance(definition, MessageEventDefinition)
+    )

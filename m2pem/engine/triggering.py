@@ -2,15 +2,17 @@
 
 A signal reaches every catcher in the run. A message goes to one receiver, the one that has waited
 longest of those that it is for (BPMN 2.0.2, clause 8.4.11; `m2pem.engine.correlation`). A message
-that nothing waits for yet is kept for the next receiver, as long as something in the mission can
-receive it at all.
+that nothing waits for yet is kept for the next receiver; one that nothing in the mission receives,
+for what a revision may bring.
 """
 
+from typing import TypeAlias
+
 from m2pem.engine import records as r
-from m2pem.engine.arming import arm, arm_again, condition_fires, definition_of
+from m2pem.engine.arming import arm, arm_again, arm_events, condition_fires, definition_of
 from m2pem.engine.correlation import keys_of, matches, remember_keys
 from m2pem.engine.data_flow import payload, receive_payload
-from m2pem.engine.execution import Execution, definitions_of
+from m2pem.engine.execution import Execution, armed_triggers, definitions_of, received_messages
 from m2pem.engine.records import Trigger
 from m2pem.engine.scopes import move_to_boundary, start_event_subprocess
 from m2pem.engine.state import Scope, Token, TokenOrScope, Wait
@@ -42,11 +44,11 @@ def arm_boundary(x: Execution, token: Token, activity: Activity) -> bool:
     False: the token has left already, because a timer was wrong, a message had been kept or a
     condition was true.
     """
-    for boundary in activity.boundary:
-        for definition in boundary.definitions:
-            if not arm(x, token, boundary, definition):
-                return False
-    return take_kept_messages(x, token) and fire_true_conditions(x, token)
+    return (
+        arm_events(x, token, activity.boundary)
+        and take_kept_messages(x, token)
+        and fire_true_conditions(x, token)
+    )
 
 
 def arm_event_subprocesses(x: Execution, scope: Scope) -> bool:
@@ -54,12 +56,8 @@ def arm_event_subprocesses(x: Execution, scope: Scope) -> bool:
 
     False: a timer was wrong, and its error has been thrown.
     """
-    for container in scope.container.event_subprocesses:
-        for start in container.starts:
-            for definition in start.definitions:
-                if not arm(x, scope, start, definition):
-                    return False
-    return True
+    subprocesses = scope.container.event_subprocesses
+    return arm_events(x, scope, [start for each in subprocesses for start in each.starts])
 
 
 def arm_triggered_timers(x: Execution, root: Scope) -> bool:
@@ -69,7 +67,7 @@ def arm_triggered_timers(x: Execution, root: Scope) -> bool:
     error has been thrown.
     """
     for start in x.triggered_starts:
-        for definition in definitions_of(start) if isinstance(start, StartEvent) else ():
+        for definition in armed_triggers(start):
             if isinstance(definition, TimerEventDefinition) and not arm(x, root, start, definition):
                 return False
     return True
@@ -89,9 +87,23 @@ def take_kept_messages(x: Execution, holder: TokenOrScope) -> bool:
                 found = True
                 kept = x.state.kept_messages[wait.ref][number]
                 trigger(x, wait, kept.data, kept.keys, kept_index=number)
-                if isinstance(holder, Token) and not x.is_active(holder):
+                if isinstance(holder, Token) and x.state.tokens.get(holder.id) is not holder:
                     return False
     return True
+
+
+def deliver_kept_messages(x: Execution) -> None:
+    """Deliver the kept messages that have a receiver in a new version of the mission: to what waits
+    for them, the longest first, else to the processes that they start."""
+    if not x.state.kept_messages:
+        return
+    for wait in list(x.state.waits.values()):
+        if wait.id in x.state.waits:
+            take_kept_messages(x, wait.token or wait.scope)
+    for message in list(x.state.kept_messages):
+        found = _started_by(x, message)
+        while found is not None and (kept := x.state.kept_messages.get(message)):
+            _start_process(x, *found, kept[0].data, kept[0].keys, kept_message=message)
 
 
 def _kept_message_for(x: Execution, wait: Wait) -> int | None:
@@ -226,17 +238,10 @@ def _definition_of(wait: Wait) -> EventDefinition:
 def await_events_of_gateway(x: Execution, token: Token, but: FlowNode | None = None) -> bool:
     """Make a token on an event-based gateway wait for the events after it, except `but`.
 
-    False: the token has left already, because a timer was wrong or a condition is true.
+    False: a timer was wrong, and its error was thrown.
     """
-    for flow in token.node.outgoing:
-        if flow.target is but:
-            continue
-        for definition in definitions_of(flow.target):
-            if not arm(x, token, flow.target, definition):
-                return False
-            if not x.is_active(token):
-                return False
-    return True
+    targets = [flow.target for flow in token.node.outgoing]
+    return arm_events(x, token, [each for each in targets if each is not but])
 
 
 def _trigger_of_gateway(x: Execution, token: Token, node: FlowNode, data: dict[str, Value]) -> None:
@@ -280,33 +285,34 @@ def throw_signal(x: Execution, signal: str, data: dict[str, Value]) -> bool:
     return bool(waits) or started
 
 
-def message_receiver(x: Execution, message: str, keys: dict[str, Value]) -> Wait | FlowNode | None:
+def message_receiver(x: Execution, message: str, keys: dict[str, Value]) -> "Wait | _Start | None":
     """Return the receiver of a message: the longest wait that matches, else a process to start."""
     for wait in x.state.catchers.get((Trigger.MESSAGE, message), {}).values():
         if not keys or matches(x, message, keys, wait.token or wait.scope):
             return wait
+    return _started_by(x, message)
+
+
+_Start: TypeAlias = tuple[FlowNode, EventDefinition]
+"""An element that begins a process, and the trigger by which it does."""
+
+
+def _started_by(x: Execution, message: str) -> _Start | None:
     for start in x.triggered_starts:
         for definition in definitions_of(start):
             if isinstance(definition, MessageEventDefinition) and definition.message.id == message:
-                return start
+                return start, definition
     return None
 
 
 def deliver(
-    x: Execution,
-    receiver: Wait | FlowNode,
-    message: str,
-    data: dict[str, Value],
-    keys: dict[str, Value],
+    x: Execution, receiver: Wait | _Start, data: dict[str, Value], keys: dict[str, Value]
 ) -> None:
     """Deliver a message to its receiver."""
     if isinstance(receiver, Wait):
         trigger(x, receiver, data, keys)
-        return
-    for definition in definitions_of(receiver):
-        if isinstance(definition, MessageEventDefinition) and definition.message.id == message:
-            _start_process(x, receiver, definition, data, keys)
-            return
+    else:
+        _start_process(x, *receiver, data, keys)
 
 
 def _start_process(
@@ -315,14 +321,17 @@ def _start_process(
     came: EventDefinition,
     data: dict[str, Value],
     keys: dict[str, Value],
+    *,
+    kept_message: str = "",
 ) -> None:
     """Start an instance of a process at the element whose trigger has occurred (clause 13.2).
 
-    Of several triggers that must all occur, the others are awaited in the instance.
+    Of several triggers that must all occur, the others are awaited in the instance. `kept_message`:
+    the trigger is the first of the kept messages of that id.
     """
     process = start.container
     number = x.state.last_scope + 1
-    x.emit(r.ScopeOpened(number, process.id, process.id))
+    x.emit(r.ScopeOpened(number, process.id, process.id, message=kept_message))
     scope = x.state.scopes[number]
     _enter_start(x, scope, start, came, data, keys)
     # Last: its event subprocesses may read the data that came.
@@ -377,7 +386,7 @@ def send(x: Execution, token: Token, message: str) -> None:
         return
     remember_keys(x, token, keys)
     receiver = message_receiver(x, message, keys)
-    kept = receiver is None and message in x.receivable
+    kept = receiver is None and _is_kept(x, message)
     x.emit(
         r.MessageThrown(
             message,
@@ -391,7 +400,17 @@ def send(x: Execution, token: Token, message: str) -> None:
         )
     )
     if receiver is not None:
-        deliver(x, receiver, message, data, keys)
+        deliver(x, receiver, data, keys)
+
+
+UNRECEIVED = 1000
+"""So many messages of one id are kept that nothing in the mission receives: a revision may bring
+what does."""
+
+
+def _is_kept(x: Execution, message: str) -> bool:
+    there = x.state.kept_messages.get(message, ())
+    return message in received_messages(x.mission) or len(there) < UNRECEIVED
 
 
 def receive(x: Execution, message: str, data: dict[str, Value], by: str) -> None:
@@ -405,4 +424,4 @@ def receive(x: Execution, message: str, data: dict[str, Value], by: str) -> None
     kept = receiver is None
     x.emit(r.MessageThrown(message, by=by, kept=kept, data=data if kept else {}, keys=keys))
     if receiver is not None:
-        deliver(x, receiver, message, data, keys)
+        deliver(x, receiver, data, keys)

@@ -148,7 +148,7 @@ class _Judge:
             if verdict.is_certain:
                 (self._bad if verdict is Verdict.VIOLATED else self._good).append(pair)
                 continue
-            if run >= explored.expanded:
+            if run >= explored.expanded or run in explored.undecided:
                 self._unexplored.append(pair)
                 continue
             for step in explored.transitions[run]:

@@ -7,7 +7,8 @@ translated. States that differ only in ids and in the time of day are one.
 
 Behaviors succeed, or fail with an error that some event catches; prompts get any answer; timers
 come in any order with the ends of behaviors; operators may send signals. Incidents that were open
-before are skipped; a new one ends its path.
+before are skipped, or tried again if that helps; what else operators decide about them is not
+known. A new one ends its path.
 
 What is true on the way is read by a `MomentReader`, for requirements.
 """
@@ -23,9 +24,19 @@ from typing import Any, Protocol, TypeAlias
 import msgspec
 
 from m2pem.engine import inputs as i
-from m2pem.engine.records import Record, RunOutcome, Trigger
+from m2pem.engine.execution import received_messages
+from m2pem.engine.records import IncidentOpened, Record, RunOutcome, Trigger
 from m2pem.engine.run import MissionRun
-from m2pem.engine.state import BehaviorPhase, RunState, RunStatus, Scope, Token, Wait
+from m2pem.engine.state import (
+    BehaviorPhase,
+    Incident,
+    KeptMessage,
+    RunState,
+    RunStatus,
+    Scope,
+    Token,
+    Wait,
+)
 from m2pem.engine.throwing import catcher_of_error
 from m2pem.mission.catalogue import BehaviorState
 from m2pem.mission.mission import version_of
@@ -60,13 +71,15 @@ class StateSpace:
     """What was explored, by the numbers of states; 0 is the state after the choice.
 
     `transitions`: from each state. `letters`: of the last moment of each. `final`: the states after
-    which nothing comes. `expanded`: so many states, the first ones, have all their transitions.
+    which nothing comes. `undecided`: the states in which operators must first decide about an
+    earlier incident. `expanded`: so many states, the first ones, have all their transitions.
     `why_incomplete`: why the others have not; "": there are none.
     """
 
     transitions: list[list[Transition]] = field(default_factory=list)
     letters: list[int] = field(default_factory=list)
     final: set[int] = field(default_factory=set)
+    undecided: set[int] = field(default_factory=set)
     expanded: int = 0
     why_incomplete: str = ""
 
@@ -204,9 +217,17 @@ class _Explorer:
                     bad[number] = run.state.detail
                 continue
             steps = self._steps(run, now_us)
-            if not steps:
+            incidents = list(run.state.incidents.values())
+            opened = [each for each in incidents if each.id not in self._open_before]
+            if not steps and incidents and not opened:
+                found.undecided.add(number)
+                stopped = incidents[0].token.node.label
+                found.why_incomplete = (
+                    f"operators must decide about {stopped}, too: {incidents[0].code}"
+                )
+            elif not steps:
                 found.final.add(number)
-                bad[number] = _where_it_stops(run.state)
+                bad[number] = _where_it_stops(run.state, opened)
             texts = [self._said(run.state, item) for item, _ in steps]
             for (item, at_us), text in zip(steps, texts, strict=True):
                 following = copy.deepcopy(run, dict(self._shared)) if len(steps) > 1 else run
@@ -267,14 +288,26 @@ class _Explorer:
                 raise _NotKnownError("what messages from outside bring is not known")
             items.append(i.SignalReceived(ref))
         for incident in state.incidents.values():
-            skip = i.IncidentChoice.SKIP
-            if incident.id in self._open_before and skip in incident.choices:
-                items.append(i.ResolveIncident(incident.id, skip))
+            if incident.id not in self._open_before:
+                continue
+            if i.IncidentChoice.SKIP in incident.choices:
+                items.append(i.ResolveIncident(incident.id, i.IncidentChoice.SKIP))
+            elif self._can_retry(run, incident, now_us):
+                items.append(i.ResolveIncident(incident.id, i.IncidentChoice.RETRY))
         found = [(item, now_us) for item in items]
         due_us = run.next_due_us
         if due_us is not None:
             found.append((i.Tick(), max(now_us, due_us)))
         return found
+
+    def _can_retry(self, run: MissionRun, incident: Incident, now_us: int) -> bool:
+        """Whether the element of an incident succeeds with the data as it is now."""
+        tried = copy.deepcopy(run, dict(self._shared))
+        records: list[Record] = []
+        retry = i.ResolveIncident(incident.id, i.IncidentChoice.RETRY)
+        self._receive(tried, retry, now_us, records.extend)
+        element = incident.token.node.id
+        return not any(isinstance(e, IncidentOpened) and e.element == element for e in records)
 
     def _said(self, state: RunState, item: i.Input) -> str:
         """Return what comes, for people."""
@@ -290,8 +323,9 @@ class _Explorer:
             case i.SignalReceived(ref):
                 signal = state.mission.signals.get(ref)
                 return f"signal {signal.name if signal else ref} comes"
-            case i.ResolveIncident(incident):
-                return f"{self._label(state.incidents[incident].token.node.id)} is skipped"
+            case i.ResolveIncident(incident, choice):
+                done = "skipped" if choice is i.IncidentChoice.SKIP else "tried again"
+                return f"{self._label(state.incidents[incident].token.node.id)} is {done}"
             case _:
                 return "a timer ends"
 
@@ -324,8 +358,8 @@ class _Explorer:
             raise _NotKnownError(f"more than {self._limits.seconds:g} s are needed")
 
 
-def _where_it_stops(state: RunState) -> str:
-    for incident in state.incidents.values():
+def _where_it_stops(state: RunState, opened: Sequence[Incident]) -> str:
+    for incident in opened:
         return f"it stops at {incident.token.node.label}: {incident.code}"
     nodes = dict.fromkeys(t.node.label for t in state.tokens.values() if t.inner is None)
     return f"it waits at {', '.join(nodes)}"
@@ -335,12 +369,15 @@ ROUND_AND_ROUND = "it goes round in a loop that it does not leave"
 
 
 def _judge(found: StateSpace, good: list[int], bad: dict[int, str]) -> Outlook:
-    reaches = leading_to(good, [[each.target for each in steps] for steps in found.transitions])
+    following = [[each.target for each in steps] for steps in found.transitions]
+    reaches = leading_to([*good, *found.undecided], following)
     reason = next(iter(bad.values()), ROUND_AND_ROUND)
     if 0 not in reaches:
         return Outlook(Verdict.CANNOT_COMPLETE, reason, found)
     if bad or len(reaches) < len(found.letters):
         return Outlook(Verdict.MAY_NOT_COMPLETE, reason, found)
+    if found.undecided:
+        return Outlook(Verdict.UNKNOWN, found.why_incomplete, found)
     return Outlook(Verdict.COMPLETES, explored=found)
 
 
@@ -373,10 +410,16 @@ def _key(state: RunState, now_us: int) -> Key:
         state.status,
         tuple(_scope(state, scope, now_us) for scope in roots),
         _encoded(state.shared.data),
-        _encoded({ref: [m.data for m in kept] for ref, kept in state.kept_messages.items()}),
+        _encoded({ref: [m.data for m in kept] for ref, kept in _receivable(state)}),
         tuple(state.taken),
         tuple(sorted((b.name, b.element, b.phase) for b in state.behaviors.values())),
     )
+
+
+def _receivable(state: RunState) -> Iterable[tuple[str, list[KeptMessage]]]:
+    """Return the kept messages that something can receive; others are for a later revision."""
+    received = received_messages(state.mission)
+    return [each for each in state.kept_messages.items() if each[0] in received]
 
 
 def _encoded(data: object) -> bytes:

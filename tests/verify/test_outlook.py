@@ -29,13 +29,16 @@ def stopped(text: str, data: dict[str, Any] | None = None) -> Play:
 
 
 def seen(play: Play, choice: str, **options: Any) -> Outlook:
-    """The outlook of a choice about the first incident; the play itself is not changed."""
+    """The outlook of a choice about an incident; the play itself is not changed. `incident`: its
+    element, else it is the first one."""
     copied = Play(play.mission, fleet=play.fleet)
     for step in play.steps:
         copied.run.replay(step.records)
     Play.made.remove(copied)
     limits = options.pop("limits", None)
-    item = i.ResolveIncident("r1.i1", i.IncidentChoice(choice), "ops", **options)
+    at = options.pop("incident", "go")
+    number = next(e.id for e in play.run.state.incidents.values() if e.token.node.id == at)
+    item = i.ResolveIncident(number, i.IncidentChoice(choice), "ops", **options)
     return outlook(copied.run, play.now_us, item, limits)
 
 
@@ -137,3 +140,44 @@ def test_instances_that_collect_outputs_are_explored(choice: str) -> None:
     verdict = Verdict.CANNOT_COMPLETE if choice == "end" else Verdict.COMPLETES
     options = {"to": "f6"} if choice == "move" else {}
     assert seen(play, choice, **options).verdict is verdict
+
+
+TWO_STOPS = """
+    <startEvent id="start"/> <endEvent id="end"/> <exclusiveGateway id="gate"/>
+    <parallelGateway id="fork"/> <parallelGateway id="join"/> <userTask id="ask">ask yes no</userTask>
+    <scriptTask id="go">do goto uav1</scriptTask>
+    start -> fork -> go -> join -> end
+    fork -> gate
+    ask -> join
+    way: gate -> ask if z == 1
+"""
+
+
+def test_another_incident_at_a_gateway_is_for_operators_to_decide() -> None:
+    play = stopped(TWO_STOPS, {"z": 0})
+    others = Outlook(Verdict.UNKNOWN, "operators must decide about gate, too: NO_FLOW")
+    assert seen(play, "skip", incident="go") == others
+    assert seen(play, "retry", incident="go") == others
+    assert seen(play, "move", incident="gate", to="ask") == Outlook(Verdict.COMPLETES)
+    again = seen(play, "retry", incident="gate")
+    assert again == Outlook(Verdict.CANNOT_COMPLETE, "it stops at gate: NO_FLOW")
+    assert seen(play, "end", incident="go").verdict is Verdict.CANNOT_COMPLETE
+
+
+def test_a_gateway_is_tried_again_where_its_data_has_become_right() -> None:
+    play = stopped(TWO_STOPS, {"z": 0}).resolve("set_data", "gate", data={"z": 1})
+    assert seen(play, "skip", incident="go") == Outlook(Verdict.COMPLETES)
+
+
+UNRECEIVED = """
+    <startEvent id="start"/> <endEvent id="end"/> <exclusiveGateway id="again"/>
+    <scriptTask id="go">do goto uav1</scriptTask> <userTask id="ask">ask yes no</userTask>
+    <intermediateThrowEvent id="tell">message m</intermediateThrowEvent>
+    start -> go -> ask -> tell -> again
+    again -> ask if user.decision == 'yes'
+    again -> end if user.decision != 'yes'
+"""
+
+
+def test_messages_that_nothing_receives_are_no_new_states() -> None:
+    assert seen(stopped(UNRECEIVED), "skip") == Outlook(Verdict.COMPLETES)

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 from random import Random
 
 import pytest
@@ -9,7 +10,9 @@ import pytest
 from m2pem.engine import inputs as i
 from m2pem.engine.revision import plan_revision
 from m2pem.engine.state import BehaviorPhase, RunStatus
+from m2pem.fleet.default_fleet import fleet_for
 from m2pem.mission.catalogue import BehaviorState
+from m2pem.mission.elements import ErrorPolicy
 from m2pem.mission.mission import Mission
 from m2pem.verify.outlook import Outlook, OutlookLimits, Verdict, outlook
 from tests.engine.kit import Play
@@ -165,3 +168,22 @@ def test_a_breakpoint_on_the_way_is_no_end() -> None:
     play.give(i.SetBreakpoints(tuple(node.id for node in play.mission.nodes)))
     same = mission(FORK.replace('id="a"', 'id="a" name="A"'))
     assert foreseen(play, item_of(play, same)) == Outlook(Verdict.COMPLETES)
+
+
+GATE = """
+    <startEvent id="start"/> <endEvent id="end"/> <exclusiveGateway id="gate"/> <userTask id="a"/>
+    start -> gate
+    a -> end
+    one: gate -> a if z == 2
+    two: gate -> end if z == 1
+"""
+
+
+def test_a_version_that_mends_the_gateway_of_an_incident_completes() -> None:
+    wrong = mission(GATE)
+    play = Play(wrong, fleet=replace(fleet_for(wrong), on_error=ErrorPolicy.INCIDENT))
+    play.start({"z": 0})
+    mended = mission(GATE.replace("z == 2", "z == 0"))
+    assert foreseen(play, item_of(play, mended)) == Outlook(Verdict.COMPLETES)
+    others = Outlook(Verdict.UNKNOWN, "operators must decide about gate, too: NO_FLOW")
+    assert foreseen(play, item_of(play, mission(GATE.replace("z == 2", "z == 3")))) == others

@@ -98,10 +98,15 @@ def event_triggered(state: RunState, record: r.EventTriggered) -> None:
     wait = state.waits[record.wait]
     end_wait(state, wait)
     if record.kept:
-        messages = state.kept_messages[wait.ref]
-        messages.pop(record.letter)
-        if not messages:
-            del state.kept_messages[wait.ref]
+        take_message(state, wait.ref, record.letter)
+
+
+def take_message(state: RunState, message: str, letter: int = 0) -> None:
+    """Remove one of the kept messages of an id: it is received."""
+    messages = state.kept_messages[message]
+    messages.pop(letter)
+    if not messages:
+        del state.kept_messages[message]
 
 
 def condition_reset(state: RunState, record: r.ConditionReset) -> None:

@@ -2,7 +2,7 @@
 
 from m2pem.engine import records as r
 from m2pem.engine.apply import compensation
-from m2pem.engine.apply.events import end_wait, node_of
+from m2pem.engine.apply.events import end_wait, node_of, take_message
 from m2pem.engine.state import (
     Join,
     Loop,
@@ -150,6 +150,8 @@ def scope_opened(state: RunState, record: r.ScopeOpened) -> None:
         owner.inner = scope
     if state.root is None:
         state.root = scope
+    if record.message:
+        take_message(state, record.message)
 
 
 def scope_closed(state: RunState, record: r.ScopeClosed) -> None:

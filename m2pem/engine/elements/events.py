@@ -1,7 +1,7 @@
 """Events (BPMN 2.0.2, clauses 10.5 and 13.5)."""
 
 from m2pem.engine import records as r
-from m2pem.engine.arming import arm, arm_entered
+from m2pem.engine.arming import arm_entered, arm_events
 from m2pem.engine.compensation import throw_compensation
 from m2pem.engine.data_flow import pass_event_outputs, payload
 from m2pem.engine.elements.sequence_flows import true_flows
@@ -75,7 +75,7 @@ def catch(x: Execution, token: Token) -> None:
     if not node.definitions or (isinstance(node, IntermediateCatchEvent) and node.linked_from):
         complete(x, token)
         return
-    if all(arm(x, token, node, definition) for definition in node.definitions):
+    if arm_events(x, token, [node]):
         take_kept_messages(x, token)
 
 

@@ -1,7 +1,7 @@
 """Tasks: what each kind does (BPMN 2.0.2, clause 10.3.3; paper, sections 4.1 and 4.2)."""
 
 from m2pem.engine import records as r
-from m2pem.engine.arming import await_event, due_after
+from m2pem.engine.arming import arm_events, await_event, due_after
 from m2pem.engine.data import reader
 from m2pem.engine.elements.activities import complete
 from m2pem.engine.elements.behaviors import request_behavior
@@ -160,5 +160,5 @@ def receive_task(x: Execution, token: Token) -> None:
     if node.message is None:
         complete(x, token)
         return
-    await_event(x, token, node, Trigger.MESSAGE, node.message.id)
+    arm_events(x, token, [node])
     take_kept_messages(x, token)

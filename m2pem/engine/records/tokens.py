@@ -9,7 +9,7 @@ class ScopeOpened(BaseRecord, frozen=True):
 
     `instances`: the scope holds the instances of a loop or multi-instance activity; their number,
     -1 if not known (a standard loop). `items`: the collection that they come from; the nth instance
-    has the nth item.
+    has the nth item. `message`: it begins with the first of the kept messages of that id.
     """
 
     scope: int
@@ -19,6 +19,7 @@ class ScopeOpened(BaseRecord, frozen=True):
     token: int | None = None
     instances: int | None = None
     items: tuple[Value, ...] | None = None
+    message: str = ""
 
 
 class ScopeClosed(BaseRecord, frozen=True):

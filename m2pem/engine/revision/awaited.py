@@ -5,10 +5,10 @@ counts from when it was first armed, a cycle from now. What has occurred already
 again, and so is not armed.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 from m2pem.engine.data import reader
-from m2pem.engine.execution import definitions_of, is_awaited, triggered_starts
+from m2pem.engine.execution import armed_triggers, definitions_of, is_awaited, triggered_starts
 from m2pem.engine.records import Trigger
 from m2pem.engine.revision.draft import PlanDraft
 from m2pem.engine.revision.plan import Arming, EffectKind, called
@@ -26,7 +26,6 @@ from m2pem.mission.elements import (
     ReceiveTask,
 )
 from m2pem.mission.events import (
-    ConditionalEventDefinition,
     TimerEventDefinition,
     TimerKind,
 )
@@ -70,8 +69,8 @@ class AwaitedEvents:
         if scope is self._state.root:
             assert isinstance(container, Process)
             assert isinstance(scope.container, Process)
-            old += _began_by_itself(triggered_starts(self._state.mission, scope.container))
-            new += _began_by_itself(triggered_starts(self._new, container))
+            old += filter(armed_triggers, triggered_starts(self._state.mission, scope.container))
+            new += filter(armed_triggers, triggered_starts(self._new, container))
         live = not (scope.interrupted or scope.completing or scope.cancelled or scope.reopened)
         self._compare(scope, old, new, awaited, may_arm=live)
 
@@ -99,7 +98,9 @@ class AwaitedEvents:
             return  # boundary events belong to the outer instance
         inner = token.inner
         undone = inner is not None and (inner.reopened or inner.cancelled)
-        later = not token.armed and (restarts or bool(token.incident))  # armed as its turn comes
+        # Armed as its turn comes: it begins again, or it could not be armed before its incident.
+        failed = bool(token.incident) and any(map(is_awaited, node.boundary))
+        later = not token.armed and (restarts or failed)
         may_arm = has_begun(token) and not undone and not later
         here = {each: waits for each, waits in awaited.items() if each is not node}
         self._compare(token, node.boundary, again.boundary, here, may_arm=may_arm)
@@ -216,12 +217,6 @@ def _is_awaited(node: FlowNode) -> bool:
 
 def _starts(container: Container) -> list[FlowNode]:
     return [start for inner in container.event_subprocesses for start in inner.starts]
-
-
-def _began_by_itself(starts: Iterable[FlowNode]) -> list[FlowNode]:
-    """Return the starts of other processes that are armed: timers and conditions."""
-    armed = (ConditionalEventDefinition, TimerEventDefinition)
-    return [each for each in starts if any(isinstance(d, armed) for d in definitions_of(each))]
 
 
 def _since(old: FlowNode, new: FlowNode, waits: list[Wait]) -> int | None:

@@ -5,20 +5,22 @@ then `MissionRevised` binds the state to the new version; then tokens enter elem
 are armed and tasks begin again.
 """
 
+from collections.abc import Iterable
+
 from m2pem.engine import records as r
 from m2pem.engine.apply.tokens import is_join
-from m2pem.engine.arming import arm
+from m2pem.engine.arming import arm_events
 from m2pem.engine.elements.activities import activate_later
-from m2pem.engine.execution import Execution, definitions_of
+from m2pem.engine.execution import Execution
 from m2pem.engine.inputs import Revise
 from m2pem.engine.records import TokenOutcome
 from m2pem.engine.requirements import monitor
 from m2pem.engine.revision.plan import Arming, Move, RevisionPlan
 from m2pem.engine.revision.planning import plan_revision
 from m2pem.engine.scopes import stop_activity
-from m2pem.engine.state import Scope
+from m2pem.engine.state import Scope, Token, TokenOrScope
 from m2pem.engine.steps import Steps
-from m2pem.engine.triggering import take_kept_messages
+from m2pem.engine.triggering import deliver_kept_messages
 from m2pem.mission.elements import (
     ComplexGateway,
     FlowNode,
@@ -65,12 +67,12 @@ def _carry_out(x: Steps, plan: RevisionPlan, item: Revise) -> None:
         _enter(x, move)
     for adjustment in plan.adjustments:
         x.emit(r.BehaviorAdjusted(adjustment.behavior, adjustment.parameters))
-    for arming in plan.armings:
-        _arm(x, arming)
-    for number in plan.restarted:
-        stays = state.tokens.get(number)
-        if stays is not None and x.is_active(stays):
-            activate_later(x, stays)
+    restarted = [state.tokens[number] for number in plan.restarted]
+    _arm(x, plan.armings)
+    deliver_kept_messages(x)
+    for token in restarted:
+        if x.is_active(token):
+            activate_later(x, token)
     for number in plan.rechecked:
         x.queue.append(state.scopes[number])
     for scope in state.scopes.values():
@@ -95,17 +97,22 @@ def _enter(x: Execution, move: Move) -> None:
         x.enter(move.token, element, scope)
 
 
-def _arm(x: Execution, arming: Arming) -> None:
-    """Arm the events of an element, unless an error in one of them has moved the token on."""
-    node = x.mission.elements[arming.element]
-    assert isinstance(node, FlowNode)
-    holder = x.state.tokens.get(arming.token) if arming.token else x.state.scopes.get(arming.scope)
-    if holder is None:
-        return
-    for definition in definitions_of(node):
-        if not arm(x, holder, node, definition, since_us=arming.since_us):
-            return
-    take_kept_messages(x, holder)
+def _arm(x: Execution, armings: Iterable[Arming]) -> None:
+    """Arm events as by tokens and scopes that come there: a scope's before those of its tokens."""
+    events: dict[TokenOrScope, list[Arming]] = {}
+    for each in sorted(armings, key=lambda each: (each.scope, each.token != 0)):
+        holder = x.state.tokens[each.token] if each.token else x.state.scopes[each.scope]
+        events.setdefault(holder, []).append(each)
+    for holder, those in events.items():
+        # An error in one of them moves a token on, or stops it until a retry arms all of them; one
+        # that is stopped already stays.
+        stopped = isinstance(holder, Token) and bool(holder.incident)
+        for each in those:
+            gone = isinstance(holder, Token) and x.state.tokens.get(holder.id) is not holder
+            node = x.mission.elements[each.element]
+            assert isinstance(node, FlowNode)
+            if gone or not (arm_events(x, holder, [node], since_us=each.since_us) or stopped):
+                break
 
 
 def _look_at_joins(x: Execution, scope: Scope) -> None:
