@@ -4,6 +4,8 @@ import itertools
 import json
 from pathlib import Path
 
+import pytest
+
 from m2pem.mission.mission import version_of_files
 from tests.command_line import CommandLine
 
@@ -142,5 +144,40 @@ def test_an_executive_that_is_killed_right_after_it_resumes_with_the_new_version
     resumed.until_record("RunClaimed")
     resumed.until_record("TokenEntered", element="Stop")
     resumed.until_record("RunEnded", outcome="completed")
+    status, replayed, _ = m2pem.run("replay", "r1", "--verify")
+    assert status == 0, replayed
+
+
+_MESSAGE = '<messageEventDefinition messageRef="M"/>'
+_GOT = '<scriptTask id="Got"><script>got = 1</script></scriptTask>'
+_TO_GOT = '<sequenceFlow id="on" sourceRef="B" targetRef="Got"/>'
+_INSIDE = f'<startEvent id="B">{_MESSAGE}</startEvent>{_GOT}{_TO_GOT}'
+_CATCHERS = {
+    "boundary": f'<boundaryEvent id="B" attachedToRef="Drive">{_MESSAGE}</boundaryEvent>'
+    f"{_GOT}{_TO_GOT}</process>",
+    "subprocess": f'<subProcess id="Sub" triggeredByEvent="true">{_INSIDE}</subProcess></process>',
+    "process": f'</process><process id="Q" isExecutable="true">{_INSIDE}</process>',
+}
+"""What catches a message, at the end of the process."""
+
+
+@pytest.mark.parametrize("kind", _CATCHERS)
+def test_a_message_that_was_kept_before_kill_9_reaches_what_a_revision_brings(
+    m2pem: CommandLine, tmp_path: Path, kind: str
+) -> None:
+    fleet, old, new = _files(tmp_path)
+    tell = f'<intermediateThrowEvent id="Tell">{_MESSAGE}</intermediateThrowEvent>'
+    text = _mission(_lane(38.9), ("Tell", tell), ("Drive", _DRIVE))
+    text = text.replace("<process", '<message id="M" name="m"/><process', 1)
+    old.write_text(text, encoding="utf-8")
+    new.write_text(text.replace("</process>", _CATCHERS[kind]), encoding="utf-8")
+    program = m2pem.start("run", old, "--fleet", fleet, "--format", "json", "--ocu", "none")
+    program.until_record("BehaviorProgressed", state="RUNNING")
+    program.kill()
+    resumed = m2pem.start("resume", "r1", "--format", "json", "--ocu", "none")
+    resumed.until_record("RunClaimed")
+    assert m2pem.run("revise", "r1", new, "--yes", "--even-if-stuck")[0] == 0
+    resumed.until_record("TokenEntered", element="Got")
+    resumed.kill()
     status, replayed, _ = m2pem.run("replay", "r1", "--verify")
     assert status == 0, replayed

@@ -261,7 +261,8 @@ def test_what_cannot_be_armed_opens_no_second_incident_and_hides_no_other_event(
 
 
 def test_of_a_boundary_event_and_an_event_subprocess_the_subprocess_has_waited_longer() -> None:
-    inside = f'<subProcess id="sub" triggeredByEvent="true"><startEvent id="go">message m</startEvent></subProcess>'
+    start = '<startEvent id="go">message m</startEvent>'
+    inside = f'<subProcess id="sub" triggeredByEvent="true">{start}</subProcess>'
     both = at_job("message m").replace("    <boundaryEvent", f"    {inside}<boundaryEvent")
     play = played(PLAIN).report("before").revise(both)
     entered = [each.element for each in play.records() if isinstance(each, r.TokenEntered)]
@@ -288,6 +289,6 @@ def test_messages_that_nothing_receives_are_kept_up_to_a_bound() -> None:
     """
     play = Play(mission(text)).start({"n": 0})
     assert len(play.run.state.kept_messages["m"]) == 1000
-    event = '<boundaryEvent id="ev" attachedToRef="job" cancelActivity="false">message m</boundaryEvent>'
-    play.revise(f"{text}\n{event}")
+    event = '<boundaryEvent id="ev" attachedToRef="job" cancelActivity="false">message m'
+    play.revise(f"{text}\n{event}</boundaryEvent>")
     assert play.run.state.kept_messages == {}

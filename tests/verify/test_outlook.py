@@ -144,8 +144,8 @@ def test_instances_that_collect_outputs_are_explored(choice: str) -> None:
 
 TWO_STOPS = """
     <startEvent id="start"/> <endEvent id="end"/> <exclusiveGateway id="gate"/>
-    <parallelGateway id="fork"/> <parallelGateway id="join"/> <userTask id="ask">ask yes no</userTask>
-    <scriptTask id="go">do goto uav1</scriptTask>
+    <parallelGateway id="fork"/> <parallelGateway id="join"/>
+    <scriptTask id="go">do goto uav1</scriptTask> <userTask id="ask">ask yes no</userTask>
     start -> fork -> go -> join -> end
     fork -> gate
     ask -> join
