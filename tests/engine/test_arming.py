@@ -5,8 +5,11 @@ comes to an element, its events see the same: messages kept before, signals afte
 are true, dates that have passed, durations and cycles.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from functools import partial
+from random import Random
+from typing import Any, Self
 
 import pytest
 
@@ -20,6 +23,7 @@ from m2pem.journal.codec import decode_body, encode_body
 from m2pem.mission.elements import ErrorPolicy
 from tests.engine.kit import FAILED, Play
 from tests.engine.notation import mission
+from tests.seeds import seeds_for
 
 MAIN = """
 <process id="MAIN" isExecutable="true">
@@ -140,11 +144,15 @@ KINDS = {
 }
 
 
-def played(text: str) -> Play:
+Make = Callable[..., Play]
+Way = Callable[..., Play]
+
+
+def played(text: str, make: Make = Play) -> Play:
     """A run whose errors open incidents, at the task before the job."""
     parsed = mission(text)
     fleet: Fleet = replace(fleet_for(parsed), on_error=ErrorPolicy.INCIDENT)
-    return Play(parsed, fleet=fleet).start(process="MAIN")
+    return make(parsed, fleet=fleet).start(process="MAIN")
 
 
 def resume(play: Play) -> None:
@@ -157,47 +165,52 @@ def resume(play: Play) -> None:
     play.give(i.ClaimRun(play.run.state.epoch + 1))
 
 
-def fresh(kind: Kind) -> Play:
-    return played(kind.new).report("before")
+def fresh(kind: Kind, make: Make = Play) -> Play:
+    return played(kind.new, make).report("before")
 
 
-def revised(kind: Kind) -> Play:
-    return played(kind.old or PLAIN).report("before").revise(kind.new)
+def revised(kind: Kind, make: Make = Play) -> Play:
+    return played(kind.old or PLAIN, make).report("before").revise(kind.new)
 
 
-def moved(kind: Kind) -> Play:
-    return played(kind.old or PLAIN).revise(kind.new, before="job")
+def moved(kind: Kind, make: Make = Play) -> Play:
+    return played(kind.old or PLAIN, make).revise(kind.new, before="job")
 
 
-def skipped(kind: Kind) -> Play:
-    play = played(kind.old or PLAIN).report("before", FAILED).revise(kind.new)
+def skipped(kind: Kind, make: Make = Play) -> Play:
+    play = played(kind.old or PLAIN, make).report("before", FAILED).revise(kind.new)
     return play.resolve("skip")
 
 
-def moved_by_choice(kind: Kind) -> Play:
-    play = played(kind.old or PLAIN).report("before", FAILED).revise(kind.new)
+def moved_by_choice(kind: Kind, make: Make = Play) -> Play:
+    play = played(kind.old or PLAIN, make).report("before", FAILED).revise(kind.new)
     return play.resolve("move", to="job")
 
 
-def resumed_before(kind: Kind) -> Play:
-    play = played(kind.old or PLAIN).report("before")
+def resumed_before(kind: Kind, make: Make = Play) -> Play:
+    play = played(kind.old or PLAIN, make).report("before")
     resume(play)
     return play.revise(kind.new)
 
 
-def resumed_after(kind: Kind) -> Play:
-    play = revised(kind)
+def resumed_after(kind: Kind, make: Make = Play) -> Play:
+    play = revised(kind, make)
     if not play.ended:
         resume(play)
     return play
 
 
-WAYS = (revised, moved, skipped, moved_by_choice, resumed_before, resumed_after)
+def paused(kind: Kind, make: Make = Play) -> Play:
+    play = played(kind.old or PLAIN, make).report("before").pause().revise(kind.new)
+    return play.resume()
 
 
-def outcome(kind: Kind, way: Callable[[Kind], Play]) -> tuple[int, list[str], str]:
+WAYS = (revised, paused, moved, skipped, moved_by_choice, resumed_before, resumed_after)
+
+
+def outcome(kind: Kind, way: Way, make: Make = Play) -> tuple[int, list[str], str]:
     """How often the event has led on, where tokens are then, and how the run has ended."""
-    play = way(kind)
+    play = way(kind, make)
     if not play.ended:
         kind.happens(play)
     entered = [each for each in play.records() if isinstance(each, r.TokenEntered)]
@@ -207,9 +220,7 @@ def outcome(kind: Kind, way: Callable[[Kind], Play]) -> tuple[int, list[str], st
 
 @pytest.mark.parametrize("way", WAYS, ids=lambda way: way.__name__)
 @pytest.mark.parametrize("kind", KINDS)
-def test_events_are_armed_as_in_a_run_that_came_there_by_itself(
-    kind: str, way: Callable[[Kind], Play]
-) -> None:
+def test_events_are_armed_as_in_a_run_that_came_there_by_itself(kind: str, way: Way) -> None:
     expected = outcome(KINDS[kind], fresh)
     assert expected[0] > 0, "the fresh run sees the event"
     assert outcome(KINDS[kind], way) == expected
@@ -219,12 +230,12 @@ def driving(text: str) -> str:
     return text.replace('<userTask id="job"/>', '<scriptTask id="job">do goto uav2</scriptTask>')
 
 
-def stopped(kind: Kind) -> Play:
-    play = played(driving(PLAIN)).report("before").report("job", FAILED)
+def stopped(kind: Kind, make: Make = Play) -> Play:
+    play = played(driving(PLAIN), make).report("before").report("job", FAILED)
     return play.revise(driving(kind.new))
 
 
-def stopped_and_resumed(kind: Kind) -> Play:
+def stopped_and_resumed(kind: Kind, make: Make = Play) -> Play:
     play = played(driving(PLAIN)).report("before").report("job", FAILED)
     resume(play)
     play.revise(driving(kind.new))
@@ -236,7 +247,7 @@ def stopped_and_resumed(kind: Kind) -> Play:
 @pytest.mark.parametrize("way", [stopped, stopped_and_resumed], ids=lambda way: way.__name__)
 @pytest.mark.parametrize("kind", [each for each in KINDS if each.startswith("boundary")])
 def test_a_boundary_event_that_is_new_at_a_task_with_an_incident_is_armed(
-    kind: str, way: Callable[[Kind], Play]
+    kind: str, way: Way
 ) -> None:
     assert outcome(KINDS[kind], way) == outcome(KINDS[kind], fresh)
 
@@ -292,3 +303,34 @@ def test_messages_that_nothing_receives_are_kept_up_to_a_bound() -> None:
     event = '<boundaryEvent id="ev" attachedToRef="job" cancelActivity="false">message m'
     play.revise(f"{text}\n{event}</boundaryEvent>")
     assert play.run.state.kept_messages == {}
+
+
+class Killed(Play):
+    """A play whose process is killed after some of its inputs, at random."""
+
+    def __init__(self, *words: Any, random: Random, **options: Any) -> None:
+        super().__init__(*words, **options)
+        self._random = random
+
+    def give(self, item: i.Input) -> Self:
+        super().give(item)
+        if not self.ended and not isinstance(item, i.ClaimRun) and self._random.random() < 0.5:
+            resume(self)
+        return self
+
+
+def all_end_as_the_fresh_run(seeds: Iterable[int]) -> None:
+    for seed in seeds:
+        random = Random(seed)
+        kind, way = random.choice(list(KINDS)), random.choice(WAYS)
+        found = outcome(KINDS[kind], way, partial(Killed, random=random))
+        assert found == outcome(KINDS[kind], fresh), f"{seed}: {kind}, {way.__name__}"
+
+
+def test_kills_around_revisions_and_choices_lose_nothing_and_deliver_nothing_twice() -> None:
+    all_end_as_the_fresh_run(range(20))
+
+
+@pytest.mark.long
+def test_many_kills_around_revisions_and_choices_lose_nothing_and_deliver_nothing_twice() -> None:
+    all_end_as_the_fresh_run(seeds_for(60.0))
