@@ -289,6 +289,12 @@ def test_events_after_a_gateway_that_a_revision_brings_take_one_message_together
     assert ("got" in entered) != ("late" in entered)
 
 
+def test_the_plan_says_which_process_begins_with_kept_messages() -> None:
+    plan = played(PLAIN).report("before").plan(another("message m"))
+    said = "start event ev takes messages that were kept and nothing waits for"
+    assert [(each.element, each.text) for each in plan.effects] == [("ev", said)]
+
+
 def test_messages_that_nothing_receives_are_kept_up_to_a_bound() -> None:
     text = """
         <startEvent id="start"/> <task id="more"/> <exclusiveGateway id="again" default="out"/>

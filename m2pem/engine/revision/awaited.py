@@ -5,7 +5,7 @@ counts from when it was first armed, a cycle from now. What has occurred already
 again, and so is not armed.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from m2pem.engine.data import reader
 from m2pem.engine.execution import armed_triggers, definitions_of, is_awaited, triggered_starts
@@ -26,6 +26,7 @@ from m2pem.mission.elements import (
     ReceiveTask,
 )
 from m2pem.mission.events import (
+    MessageEventDefinition,
     TimerEventDefinition,
     TimerKind,
 )
@@ -70,9 +71,20 @@ class AwaitedEvents:
             assert isinstance(container, Process)
             assert isinstance(scope.container, Process)
             old += filter(armed_triggers, triggered_starts(self._state.mission, scope.container))
-            new += filter(armed_triggers, triggered_starts(self._new, container))
+            began = triggered_starts(self._new, container)
+            new += filter(armed_triggers, began)
+            self._kept_messages_for(scope, began)
         live = not (scope.interrupted or scope.completing or scope.cancelled or scope.reopened)
         self._compare(scope, old, new, awaited, may_arm=live)
+
+    def _kept_messages_for(self, root: Scope, starts: Iterable[FlowNode]) -> None:
+        """Say which processes begin with messages that the run has kept."""
+        kept = self._state.kept_messages
+        for start in starts:
+            for each in definitions_of(start):
+                if isinstance(each, MessageEventDefinition) and each.message.id in kept:
+                    text = f"{called(start)} takes messages that were kept and nothing waits for"
+                    self._add(EffectKind.ARMS, root, start, text)
 
     def _gateway(self, token: Token, again: FlowNode, awaited: dict[FlowNode, list[Wait]]) -> None:
         node = token.node
