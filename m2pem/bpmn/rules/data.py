@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from lxml import etree
 
 from m2pem.bpmn.rules.references import ITEMS
-from m2pem.bpmn.rules.rule import E, Rule, W
+from m2pem.bpmn.rules.rule import Rule, error, warning
 from m2pem.bpmn.rules.tree import (
     SUBPROCESSES,
     Check,
@@ -21,166 +21,142 @@ from m2pem.bpmn.rules.tree import (
     texts,
 )
 
-BAD_KEY = Rule(
+BAD_KEY = error(
     214,
     "bad-key",
-    "missions.md",
-    E,
     "a name is none of the data store",
     "write a dotted name",
 )
-ASSOCIATION_IGNORED = Rule(
+ASSOCIATION_IGNORED = warning(
     306,
     "association-ignored",
-    "missions.md",
-    W,
     "a data association of a call activity passes nothing",
     "use m2pem:in, m2pem:out",
 )
-UNWRITTEN_NAME = Rule(
+UNWRITTEN_NAME = warning(
     307,
     "unwritten-name",
-    "missions.md",
-    W,
     "a name is read that nothing writes",
     "write it before, or pass it in",
 )
-EMPTY_ASSIGNMENT = Rule(
+EMPTY_ASSIGNMENT = warning(
     311,
     "empty-assignment",
-    "missions.md",
-    W,
     "an assignment's 'from' is empty",
     "write what it assigns, or delete it",
 )
-BAD_ASSIGNMENT = Rule(
+BAD_ASSIGNMENT = error(
     10424,
     "bad-assignment",
-    "10.4.1",
-    E,
     "an assignment of a data association lacks from or to",
     "write both",
+    "10.4.1",
 )
 
-DATA_REFERENCE_OBJECT = Rule(
+DATA_REFERENCE_OBJECT = warning(
     10401,
     "data-reference-object",
-    "10.4.1",
-    W,
     "the data object reference names no data object",
     "add dataObjectRef",
+    "10.4.1",
 )
-DATA_REFERENCE_ITEM = Rule(
+DATA_REFERENCE_ITEM = warning(
     10402,
     "data-reference-item",
-    "10.4.1",
-    W,
     "a data object reference must not have an item definition of its own",
     "move itemSubjectRef to the data object",
+    "10.4.1",
 )
-DATA_OBJECT_STATE = Rule(
+DATA_OBJECT_STATE = warning(
     10403,
     "data-object-state",
-    "10.4.1",
-    W,
     "a data object must not have a state; references to it can",
     "move dataState to a data object reference",
+    "10.4.1",
 )
-COLLECTION_MISMATCH = Rule(
+COLLECTION_MISMATCH = warning(
     10405,
     "collection-mismatch",
-    "10.4.1",
-    W,
     "isCollection is not what the item definition says",
     "write the same in both",
+    "10.4.1",
 )
-STORE_CAPACITY = Rule(
+STORE_CAPACITY = warning(
     10406,
     "store-capacity",
-    "10.4.1",
-    W,
     "the data store's capacity is no whole number",
     "write a number, or delete it",
+    "10.4.1",
 )
-NO_INPUT_SET = Rule(
+NO_INPUT_SET = warning(
     10407,
     "no-input-set",
-    "10.4.1",
-    W,
     "the ioSpecification has no input set",
     "add an inputSet with the data inputs that are needed; it may be empty",
+    "10.4.1",
 )
-NO_OUTPUT_SET = Rule(
+NO_OUTPUT_SET = warning(
     10408,
     "no-output-set",
-    "10.4.1",
-    W,
     "the ioSpecification has no output set",
     "add an outputSet with the data outputs that are made; it may be empty",
+    "10.4.1",
 )
-INPUT_IN_NO_SET = Rule(
+INPUT_IN_NO_SET = warning(
     10409,
     "input-in-no-set",
-    "10.4.1",
-    W,
     "the data input is in no input set",
     "add dataInputRefs with its id to an inputSet",
+    "10.4.1",
 )
-OUTPUT_IN_NO_SET = Rule(
+OUTPUT_IN_NO_SET = warning(
     10410,
     "output-in-no-set",
-    "10.4.1",
-    W,
     "the data output is in no output set",
     "add dataOutputRefs with its id to an outputSet",
+    "10.4.1",
 )
-INPUT_SET_REFERENCE = Rule(
+INPUT_SET_REFERENCE = warning(
     10411,
     "input-set-reference",
-    "10.4.1",
-    W,
     "the input set names no data input",
     "name a dataInput of the same ioSpecification or event",
+    "10.4.1",
 )
-OUTPUT_SET_REFERENCE = Rule(
+OUTPUT_SET_REFERENCE = warning(
     10412,
     "output-set-reference",
-    "10.4.1",
-    W,
     "the output set names no data output",
     "name a dataOutput of the same ioSpecification or event",
+    "10.4.1",
 )
-OPTIONAL_INPUT = Rule(
+OPTIONAL_INPUT = warning(
     10413,
     "optional-input",
-    "10.4.1",
-    W,
     "an optional data input is not among the set's dataInputRefs",
     "add it to dataInputRefs, too",
+    "10.4.1",
 )
-OPTIONAL_OUTPUT = Rule(
+OPTIONAL_OUTPUT = warning(
     10414,
     "optional-output",
-    "10.4.1",
-    W,
     "an optional data output is not among the set's dataOutputRefs",
     "add it to dataOutputRefs, too",
+    "10.4.1",
 )
-PAIRED_SET = Rule(
+PAIRED_SET = warning(
     10415,
     "paired-set",
-    "10.4.1",
-    W,
     "the set is paired with a set that does not exist",
     "name an outputSet in outputSetRefs, an inputSet in inputSetRefs",
+    "10.4.1",
 )
-SUBPROCESS_DATA = Rule(
+SUBPROCESS_DATA = warning(
     10416,
     "subprocess-data",
-    "10.4.1",
-    W,
     "a subprocess must not have data inputs and outputs of its own",
     "use data objects of the process around it",
+    "10.4.1",
 )
 
 
@@ -271,61 +247,54 @@ CHECKS = Checks(
 )
 
 
-DATA_ASSOCIATION_TARGET = Rule(
+DATA_ASSOCIATION_TARGET = warning(
     10421,
     "data-association-target",
-    "10.4.1",
-    W,
     "the data association has no targetRef",
     "name the data that it writes",
+    "10.4.1",
 )
-DATA_ASSOCIATION_END = Rule(
+DATA_ASSOCIATION_END = warning(
     10422,
     "data-association-end",
-    "10.4.1",
-    W,
     "an end of the data association names no data",
     "name a data object, store, property, data input or data output",
+    "10.4.1",
 )
-DATA_ASSOCIATION_SOURCES = Rule(
+DATA_ASSOCIATION_SOURCES = warning(
     10423,
     "data-association-sources",
-    "10.4.1",
-    W,
     "a data association with several sources must have a transformation",
     "keep one sourceRef, or add a transformation",
+    "10.4.1",
 )
-PROCESS_INPUT_WRITTEN = Rule(
+PROCESS_INPUT_WRITTEN = warning(
     10425,
     "process-input-written",
-    "10.4.1",
-    W,
     "a data association must not write a data input of its process; the caller does",
     "write a data object instead",
+    "10.4.1",
 )
-PROCESS_OUTPUT_READ = Rule(
+PROCESS_OUTPUT_READ = warning(
     10426,
     "process-output-read",
-    "10.4.1",
-    W,
     "a data association must not read a data output of its process; the caller does",
     "read a data object instead",
+    "10.4.1",
 )
-DATA_ASSOCIATION_ITEMS = Rule(
+DATA_ASSOCIATION_ITEMS = warning(
     10427,
     "data-association-items",
-    "10.4.1",
-    W,
     "a data association without a transformation must join data of one structure",
     "give both ends an item definition of the same structureRef, or add a transformation",
+    "10.4.1",
 )
-IO_BINDING = Rule(
+IO_BINDING = warning(
     10323,
     "io-binding",
-    "10.3.6",
-    W,
     "the ioBinding lacks an operation, an input or an output",
     "name an operation of an interface, an inputSet and an outputSet of the process",
+    "10.3.6",
 )
 
 

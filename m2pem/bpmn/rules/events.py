@@ -2,7 +2,7 @@
 
 from lxml import etree
 
-from m2pem.bpmn.rules.rule import E, Rule, W
+from m2pem.bpmn.rules.rule import Rule, error, warning
 from m2pem.bpmn.rules.tree import (
     SUBPROCESSES,
     THROWING,
@@ -20,261 +20,229 @@ from m2pem.bpmn.rules.tree import (
 )
 from m2pem.bpmn.xml import BPMN, a, kind
 
-OUTSIDE_ONLY = Rule(
+OUTSIDE_ONLY = warning(
     308,
     "outside-only",
-    "missions.md",
-    W,
     "what is awaited only the outside can send",
     'mark it m2pem:from="operator"',
 )
-TYPED_START_IN_SUBPROCESS = Rule(
+TYPED_START_IN_SUBPROCESS = error(
     10331,
     "typed-start-in-subprocess",
-    "10.3.5",
-    E,
     "a start event in an embedded subprocess waits for something",
     "use a plain start event, and a catching intermediate event after it",
+    "10.3.5",
 )
-EVENT_NOT_ALLOWED = Rule(
+EVENT_NOT_ALLOWED = error(
     10387,
     "event-not-allowed",
-    "10.3.8",
-    E,
     "a multi-instance activity throws by itself what it cannot",
     "let it throw a message, signal, escalation, error or compensation",
+    "10.3.8",
 )
-NO_TRIGGER = Rule(
+NO_TRIGGER = error(
     10507,
     "no-trigger",
-    "10.5.4",
-    E,
     "a catching intermediate event, a boundary event or the start event of an event subprocess "
     "has no trigger",
     "give it an event definition",
+    "10.5.4",
 )
-ERROR_NOT_INTERRUPTING = Rule(
+ERROR_NOT_INTERRUPTING = error(
     10508,
     "error-not-interrupting",
-    "10.5.4",
-    E,
     "a boundary or start event that catches an error does not interrupt",
     "make it interrupting, or throw and catch an escalation",
+    "10.5.4",
 )
-BAD_ATTACHMENT = Rule(
+BAD_ATTACHMENT = error(
     10519,
     "bad-attachment",
-    "10.5.4",
-    E,
     "a boundary event is attached to no activity beside it",
     "attach it to an activity of the same process or subprocess",
+    "10.5.4",
 )
-TIMER_TIME = Rule(
+TIMER_TIME = error(
     10531,
     "timer-time",
-    "10.5.5",
-    E,
     "a timer has no time, several, or one that is no ISO 8601",
     "give it one timeDuration, timeDate or timeCycle",
+    "10.5.5",
 )
-MISSING_REFERENCE = Rule(
+MISSING_REFERENCE = warning(
     10532,
     "missing-reference",
-    "10.5.5",
-    W,
     "an event or task names no message, signal, error or escalation",
     "add messageRef, signalRef, errorRef or escalationRef",
+    "10.5.5",
 )
-NO_CONDITION = Rule(
+NO_CONDITION = error(
     10533,
     "no-condition",
-    "10.5.5",
-    E,
     "a conditional event has no condition",
     "write the condition that it waits for",
+    "10.5.5",
 )
-LINK_NAME = Rule(
+LINK_NAME = error(
     10541,
     "link-name",
-    "10.5.5",
-    E,
     "a link event has no name",
     "give both of its ends the same name",
+    "10.5.5",
 )
-DANGLING_LINK = Rule(
+DANGLING_LINK = error(
     10542,
     "dangling-link",
-    "10.5.4",
-    E,
     "no catching link event has the name of a throwing one",
     "add a catching intermediate event with a link of this name",
+    "10.5.4",
 )
-DUPLICATE_LINK = Rule(
+DUPLICATE_LINK = error(
     10543,
     "duplicate-link",
-    "10.5.4",
-    E,
     "two catching link events have the same name",
     "give one another name",
+    "10.5.4",
 )
-LINK_THROW_OUTGOING = Rule(
+LINK_THROW_OUTGOING = error(
     10545,
     "link-throw-outgoing",
-    "10.5.4",
-    E,
     "a sequence flow leads out of a throwing link event",
     "let it begin at what follows the link target",
+    "10.5.4",
 )
-LINK_CATCH_INCOMING = Rule(
+LINK_CATCH_INCOMING = error(
     10546,
     "link-catch-incoming",
-    "10.5.4",
-    E,
     "a sequence flow leads into a catching link event",
     "lead it to what follows the link target",
+    "10.5.4",
 )
-LINK_CROSSES_BORDER = Rule(
+LINK_CROSSES_BORDER = error(
     10547,
     "link-crosses-border",
-    "10.5.5",
-    E,
     "a link leads out of its process or subprocess",
     "put both of its ends into the same process or subprocess",
+    "10.5.5",
 )
 
-START_TRIGGER = Rule(
+START_TRIGGER = error(
     10501,
     "start-trigger",
-    "10.5.2",
-    E,
     "a process can begin only plainly, or by a message, timer, condition or signal",
     "give the start event one of these triggers, or none",
+    "10.5.2",
 )
-EVENT_SUBPROCESS_START_TRIGGER = Rule(
+EVENT_SUBPROCESS_START_TRIGGER = error(
     10502,
     "event-subprocess-start-trigger",
-    "10.5.2",
-    E,
     "an event subprocess can begin only by a message, timer, escalation, error, compensation, "
     "condition or signal",
     "give its start event one of these triggers",
+    "10.5.2",
 )
-END_RESULT = Rule(
+END_RESULT = error(
     10503,
     "end-result",
-    "10.5.3",
-    E,
     "an end event can result only in a message, error, escalation, cancellation, compensation, "
     "signal or termination, or in nothing",
     "give it one of these results, or none",
+    "10.5.3",
 )
-CATCH_TRIGGER = Rule(
+CATCH_TRIGGER = error(
     10504,
     "catch-trigger",
-    "10.5.4",
-    E,
     "an intermediate event in the flow can wait only for a message, timer, condition, link or "
     "signal",
     "give it one of these triggers, or attach it to an activity",
+    "10.5.4",
 )
-THROW_RESULT = Rule(
+THROW_RESULT = error(
     10505,
     "throw-result",
-    "10.5.4",
-    E,
     "an intermediate event can throw only a message, escalation, link, compensation or signal",
     "give it one of these results, or none; or make it an end event",
+    "10.5.4",
 )
-BOUNDARY_TRIGGER = Rule(
+BOUNDARY_TRIGGER = error(
     10506,
     "boundary-trigger",
-    "10.5.4",
-    E,
     "a boundary event can wait only for a message, timer, escalation, error, cancellation, "
     "compensation, condition or signal",
     "give it one of these triggers",
+    "10.5.4",
 )
-NOT_INTERRUPTING_ELSEWHERE = Rule(
+NOT_INTERRUPTING_ELSEWHERE = warning(
     10511,
     "not-interrupting-elsewhere",
-    "10.5.2",
-    W,
     "isInterrupting has no meaning on this start event, which is in no event subprocess",
     "delete it",
+    "10.5.2",
 )
-PARALLEL_MULTIPLE = Rule(
+PARALLEL_MULTIPLE = warning(
     10512,
     "parallel-multiple",
-    "10.5.1",
-    W,
     "an event with parallelMultiple must have several triggers",
     "add event definitions, or delete parallelMultiple",
+    "10.5.1",
 )
-START_WITHOUT_END = Rule(
+START_WITHOUT_END = warning(
     10513,
     "start-without-end",
-    "10.5.3",
-    W,
     "it has a start event and no end event",
     "add an end event to each path",
+    "10.5.3",
 )
-END_WITHOUT_START = Rule(
+END_WITHOUT_START = warning(
     10514,
     "end-without-start",
-    "10.5.2",
-    W,
     "it has an end event and no start event",
     "add a start event",
+    "10.5.2",
 )
-START_WITHOUT_FLOW = Rule(
+START_WITHOUT_FLOW = warning(
     10515,
     "start-without-flow",
-    "10.5.2",
-    W,
     "no sequence flow leads out of the start event",
     "draw one to what comes first",
+    "10.5.2",
 )
-INTERMEDIATE_WITHOUT_FLOW = Rule(
+INTERMEDIATE_WITHOUT_FLOW = warning(
     10516,
     "intermediate-without-flow",
-    "10.5.4",
-    W,
     "no sequence flow leads out of the intermediate event",
     "draw one to what follows, or make it an end event",
+    "10.5.4",
 )
-BOUNDARY_WITHOUT_FLOW = Rule(
+BOUNDARY_WITHOUT_FLOW = warning(
     10517,
     "boundary-without-flow",
-    "10.5.4",
-    W,
     "no sequence flow leads out of the boundary event",
     "draw one to what follows when it is triggered",
+    "10.5.4",
 )
 
-INTERMEDIATE_WITHOUT_INCOMING = Rule(
+INTERMEDIATE_WITHOUT_INCOMING = warning(
     10520,
     "intermediate-without-incoming",
-    "10.5.4",
-    W,
     "no sequence flow leads into the intermediate event; it happens when its process begins",
     "draw one from what comes before",
+    "10.5.4",
 )
-COMPENSATION_NOT_INTERRUPTING = Rule(
+COMPENSATION_NOT_INTERRUPTING = warning(
     10521,
     "compensation-not-interrupting",
-    "10.5.2",
-    W,
     "the start event of a compensation event subprocess cannot be non-interrupting",
     'delete isInterrupting="false"; what it compensates has ended',
+    "10.5.2",
 )
 
-SUBPROCESS_STARTS = Rule(
+SUBPROCESS_STARTS = warning(
     13301,
     "subprocess-starts",
-    "13.3.4",
-    W,
     "an embedded subprocess must not have several start events; each gets a token",
     "keep one, with a parallel gateway after it if both paths are meant",
+    "13.3.4",
 )
 
 
@@ -400,53 +368,47 @@ CHECKS = Checks(
 )
 
 
-THROWN_ERROR_CODE = Rule(
+THROWN_ERROR_CODE = warning(
     8422,
     "thrown-error-code",
-    "8.4.3",
-    W,
     "the error that is thrown has no errorCode",
     "add errorCode to the error; until then its id is its code",
+    "8.4.3",
 )
-THROWN_ESCALATION_CODE = Rule(
+THROWN_ESCALATION_CODE = warning(
     8432,
     "thrown-escalation-code",
-    "8.4.4",
-    W,
     "the escalation that is thrown has no escalationCode",
     "add escalationCode to the escalation; until then its id is its code",
+    "8.4.4",
 )
-CANCEL_END_PLACE = Rule(
+CANCEL_END_PLACE = error(
     10549,
     "cancel-end-place",
-    "10.5.5",
-    E,
     "a cancel end event may be only in a transaction",
     "make what is around it a transaction, or use an error or terminate end event",
+    "10.5.5",
 )
-CANCEL_BOUNDARY_PLACE = Rule(
+CANCEL_BOUNDARY_PLACE = error(
     10550,
     "cancel-boundary-place",
-    "10.5.5",
-    E,
     "a cancel boundary event can be attached only to a transaction",
     "make the activity a transaction, or catch an error",
+    "10.5.5",
 )
-CANCEL_NOT_INTERRUPTING = Rule(
+CANCEL_NOT_INTERRUPTING = error(
     10551,
     "cancel-not-interrupting",
-    "10.5.5",
-    E,
     "a cancel boundary event must interrupt the transaction",
     'delete cancelActivity="false"',
+    "10.5.5",
 )
-CANCEL_UNCAUGHT = Rule(
+CANCEL_UNCAUGHT = warning(
     10552,
     "cancel-uncaught",
-    "10.5.6",
-    W,
     "no boundary event of the transaction catches the cancellation; its token ends there",
     "attach a cancel boundary event to the transaction",
+    "10.5.6",
 )
 
 

@@ -18,49 +18,39 @@ from m2pem.bpmn.foreign_elements import (
     PROPAGATES_REMEDY,
     SERVING,
 )
-from m2pem.bpmn.rules.rule import E, Rule, W
+from m2pem.bpmn.rules.rule import error, warning
 from m2pem.bpmn.rules.tree import Check, Checks, Tree, parent
 from m2pem.bpmn.xml import BPMN, CAMUNDA, M2PEM, OPERATON, a, attribute_names, kind, local
 from m2pem.suggestions import suggest_or
 
-WRONG_NAMESPACE = Rule(
+WRONG_NAMESPACE = error(
     218,
     "wrong-namespace",
-    "missions.md",
-    E,
     "a prefix or namespace is like m2pem's, but is not",
     "see extensions.md",
 )
-MISPLACED_EXTENSION = Rule(
+MISPLACED_EXTENSION = warning(
     304,
     "misplaced-extension",
-    "missions.md",
-    W,
     "an m2pem: name has no effect in this place",
     "move it, or delete it",
 )
-UNKNOWN_EXTENSION = Rule(
+UNKNOWN_EXTENSION = error(
     305,
     "unknown-extension",
-    "missions.md",
-    E,
     "m2pem has no such element or attribute",
     "correct it, or delete it",
 )
-FOREIGN_EXTENSION = Rule(
+FOREIGN_EXTENSION = warning(
     312,
     "foreign-extension",
-    "missions.md",
-    W,
     "another program's extension elements have no effect here",
     "see extensions.md",
 )
 
-FOREIGN_EFFECT = Rule(
+FOREIGN_EFFECT = warning(
     317,
     "foreign-effect",
-    "missions.md",
-    W,
     "another engine's element or attribute changes what is executed there, and has no effect here",
     "see missions.md",
 )

@@ -2,137 +2,119 @@
 
 from lxml import etree
 
-from m2pem.bpmn.rules.rule import E, Rule, W
+from m2pem.bpmn.rules.rule import error, warning
 from m2pem.bpmn.rules.tree import Checks, Tree, has, texts
 
-ENDLESS_LOOP = Rule(
+ENDLESS_LOOP = error(
     313,
     "endless-loop",
-    "missions.md",
-    E,
     "a loop has no wait and no end",
     "wait in each round, or draw a way out",
 )
-BUSY_LOOP = Rule(
+BUSY_LOOP = warning(
     314,
     "busy-loop",
-    "missions.md",
-    W,
     "a loop has no wait; only data can end it",
     "wait in each round, or count the rounds",
 )
-LOOP_NOT_ALLOWED = Rule(
+LOOP_NOT_ALLOWED = error(
     10336,
     "loop-not-allowed",
-    "10.3.5",
-    E,
     "an event subprocess has a loop marker",
     "delete it, or put it on an activity inside",
+    "10.3.5",
 )
-TWO_LOOPS = Rule(
+TWO_LOOPS = error(
     10371,
     "two-loops",
-    "10.3.8",
-    E,
     "an activity has two loop markers",
     "keep one; put the activity into a subprocess that has the other",
+    "10.3.8",
 )
-LOOP_MAXIMUM = Rule(
+LOOP_MAXIMUM = error(
     10372,
     "loop-maximum",
-    "10.3.8",
-    E,
     "loopMaximum is no whole number",
     "write the number of rounds at most, or delete it",
+    "10.3.8",
 )
-INSTANCE_COUNT = Rule(
+INSTANCE_COUNT = error(
     10374,
     "instance-count",
-    "10.3.8",
-    E,
     "a multi-instance activity does not say how many instances there are",
     "add a loopCardinality or a collection",
+    "10.3.8",
 )
-INSTANCES_COUNTED_TWICE = Rule(
+INSTANCES_COUNTED_TWICE = error(
     10375,
     "instances-counted-twice",
-    "10.3.8",
-    E,
     "a multi-instance activity has both a loopCardinality and a collection",
     "keep one of the two",
+    "10.3.8",
 )
-INSTANCES_BEHAVIOR = Rule(
+INSTANCES_BEHAVIOR = error(
     10376,
     "instances-behavior",
-    "10.3.8",
-    E,
     "the multi-instance behavior is none that BPMN has",
     "write None, One, All or Complex",
+    "10.3.8",
 )
-COMPLEX_BEHAVIOR = Rule(
+COMPLEX_BEHAVIOR = error(
     10381,
     "complex-behavior",
-    "10.3.8",
-    E,
     "a complexBehaviorDefinition lacks its condition or its event",
     "say when something is thrown, and what",
+    "10.3.8",
 )
-NO_LOOP = Rule(
+NO_LOOP = error(
     10386,
     "no-loop",
-    "10.3.8",
-    E,
     "a loop marker does not say which kind of loop",
     "write standardLoopCharacteristics or multiInstanceLoopCharacteristics",
+    "10.3.8",
 )
 
-LOOP_WITHOUT_CONDITION = Rule(
+LOOP_WITHOUT_CONDITION = warning(
     10373,
     "loop-without-condition",
-    "10.3.8",
-    W,
     "the loop does not say how long it goes on",
     "add a loopCondition or a loopMaximum",
+    "10.3.8",
 )
-INSTANCES_EVENT_UNUSED = Rule(
+INSTANCES_EVENT_UNUSED = warning(
     10378,
     "instances-event-unused",
-    "10.3.8",
-    W,
     "the multi-instance activity names an event that its behavior never throws",
     'write behavior="None" or behavior="One" as the event is meant, or delete its reference',
+    "10.3.8",
 )
-INSTANCES_COMPLEX = Rule(
+INSTANCES_COMPLEX = error(
     10379,
     "instances-complex",
-    "10.3.8",
-    E,
     "the multi-instance behavior is Complex, but nothing says what is thrown, and when",
     "add a complexBehaviorDefinition",
+    "10.3.8",
 )
-INSTANCES_COMPLEX_UNUSED = Rule(
+INSTANCES_COMPLEX_UNUSED = warning(
     10380,
     "instances-complex-unused",
-    "10.3.8",
-    W,
     "complexBehaviorDefinition has no effect without the behavior Complex",
     'write behavior="Complex", or delete it',
+    "10.3.8",
 )
-INPUT_ITEM_WITHOUT_INPUT = Rule(
+INPUT_ITEM_WITHOUT_INPUT = warning(
     10382,
     "input-item-without-input",
-    "10.3.8",
-    W,
     "inputDataItem has no effect without loopDataInputRef",
     "add the collection, or delete the item",
+    "10.3.8",
 )
-OUTPUT_WITHOUT_ITEM = Rule(
+OUTPUT_WITHOUT_ITEM = warning(
     10383,
     "output-without-item",
-    "10.3.8",
-    W,
     "one of loopDataOutputRef and outputDataItem is missing",
     "add it, or delete the other",
+    "10.3.8",
 )
 _THROWN = {"noneBehaviorEventRef": "None", "oneBehaviorEventRef": "One"}
 

@@ -5,17 +5,16 @@ References that execution needs (flows, attachments, signals, ...) are looked up
 
 from lxml import etree
 
-from m2pem.bpmn.rules.rule import E, Rule, W
+from m2pem.bpmn.rules.rule import Rule, error, warning
 from m2pem.bpmn.rules.tree import ACTIVITIES, EVENTS, Check, Checks, Tree, name_of, names, texts
 
-DANGLING_REFERENCE = Rule(
+DANGLING_REFERENCE = error(
     15301,
     "dangling-reference",
-    "15.3.2",
-    E,
     "a reference names nothing, or nothing of the right kind (a warning where it has no effect on "
     "execution: pools, lanes, message flows, data)",
     "name an element that is there",
+    "15.3.2",
 )
 
 ITEMS = names(
@@ -24,173 +23,152 @@ ITEMS = names(
 )
 """Tags of BPMN's item-aware elements (clause 10.4.1)."""
 
-CATEGORY_VALUE = Rule(
+CATEGORY_VALUE = warning(
     8404,
     "category-value",
-    "8.4.1",
-    W,
     "categoryValueRef names no category value",
     "name a categoryValue of a category, or delete it",
+    "8.4.1",
 )
-ERROR_STRUCTURE = Rule(
+ERROR_STRUCTURE = warning(
     8421,
     "error-structure",
-    "8.4.3",
-    W,
     "the error's structureRef names no item definition",
     "name an itemDefinition, or delete it",
+    "8.4.3",
 )
-ESCALATION_STRUCTURE = Rule(
+ESCALATION_STRUCTURE = warning(
     8431,
     "escalation-structure",
-    "8.4.4",
-    W,
     "the escalation's structureRef names no item definition",
     "name an itemDefinition, or delete it",
+    "8.4.4",
 )
-MESSAGE_ITEM = Rule(
+MESSAGE_ITEM = warning(
     8451,
     "message-item",
-    "8.4.11",
-    W,
     "the message's itemRef names no item definition",
     "name an itemDefinition, or delete it",
+    "8.4.11",
 )
-OPERATION_OUT_MESSAGE = Rule(
+OPERATION_OUT_MESSAGE = warning(
     8505,
     "operation-out-message",
-    "8.5.3",
-    W,
     "the operation's outMessageRef names no message",
     "name a message in definitions, or delete it",
+    "8.5.3",
 )
-OPERATION_ERROR = Rule(
+OPERATION_ERROR = warning(
     8506,
     "operation-error",
-    "8.5.3",
-    W,
     "the operation's errorRef names no error",
     "name an error in definitions, or delete it",
+    "8.5.3",
 )
-PARTICIPANT_INTERFACE = Rule(
+PARTICIPANT_INTERFACE = warning(
     9303,
     "participant-interface",
-    "9.3.1",
-    W,
     "the pool's interfaceRef names no interface",
     "name an interface in definitions, or delete it",
+    "9.3.1",
 )
-PARTICIPANT_END_POINT = Rule(
+PARTICIPANT_END_POINT = warning(
     9304,
     "participant-end-point",
-    "9.3.1",
-    W,
     "the pool's endPointRef names no end point",
     "name an endPoint in definitions, or delete it",
+    "9.3.1",
 )
-PARTNER_PARTICIPANT = Rule(
+PARTNER_PARTICIPANT = warning(
     9305,
     "partner-participant",
-    "9.3.1",
-    W,
     "the partner's participantRef names no pool",
     "name a participant of a collaboration, or delete it",
+    "9.3.1",
 )
-CALLED_COLLABORATION = Rule(
+CALLED_COLLABORATION = warning(
     9505,
     "called-collaboration",
-    "9.5.4",
-    W,
     "the call conversation's calledCollaborationRef names no collaboration",
     "name a collaboration or globalConversation, or delete it",
+    "9.5.4",
 )
-CONVERSATION_MESSAGE_FLOW = Rule(
+CONVERSATION_MESSAGE_FLOW = warning(
     9506,
     "conversation-message-flow",
-    "9.5.1",
-    W,
     "the conversation's messageFlowRef names no message flow",
     "name a messageFlow of the collaboration, or delete it",
+    "9.5.1",
 )
-COLLABORATION_CHOREOGRAPHY = Rule(
+COLLABORATION_CHOREOGRAPHY = warning(
     9701,
     "collaboration-choreography",
-    "9.7",
-    W,
     "the collaboration's choreographyRef names no choreography",
     "name a choreography in definitions, or delete it",
+    "9.7",
 )
-DEFINITIONAL_COLLABORATION = Rule(
+DEFINITIONAL_COLLABORATION = warning(
     10103,
     "definitional-collaboration",
-    "10.1",
-    W,
     "definitionalCollaborationRef names no collaboration",
     "name a collaboration of the file, or delete it",
+    "10.1",
 )
-SUPPORTED_PROCESS = Rule(
+SUPPORTED_PROCESS = warning(
     10104,
     "supported-process",
-    "10.1",
-    W,
     "supports names no process",
     "name a process of the file, or delete it",
+    "10.1",
 )
-SUPPORTED_INTERFACE = Rule(
+SUPPORTED_INTERFACE = warning(
     10322,
     "supported-interface",
-    "10.3.6",
-    W,
     "supportedInterfaceRef names no interface",
     "name an interface in definitions, or delete it",
+    "10.3.6",
 )
-ROLE_RESOURCE = Rule(
+ROLE_RESOURCE = warning(
     10303,
     "role-resource",
-    "10.3.1",
-    W,
     "the role's resourceRef names no resource",
     "name a resource in definitions, or delete it",
+    "10.3.1",
 )
-TASK_OPERATION = Rule(
+TASK_OPERATION = warning(
     10311,
     "task-operation",
-    "10.3.3",
-    W,
     "the task's operationRef names no operation",
     "name an operation of an interface, or delete it",
+    "10.3.3",
 )
-DATA_ITEM = Rule(
+DATA_ITEM = warning(
     10404,
     "data-item",
-    "10.4.1",
-    W,
     "itemSubjectRef names no item definition",
     "name an itemDefinition, or delete it",
+    "10.4.1",
 )
-EVENT_OPERATION = Rule(
+EVENT_OPERATION = warning(
     10534,
     "event-operation",
-    "10.5.5",
-    W,
     "the event's operationRef names no operation",
     "name an operation of an interface, or delete it",
+    "10.5.5",
 )
-SIGNAL_STRUCTURE = Rule(
+SIGNAL_STRUCTURE = warning(
     10539,
     "signal-structure",
-    "10.5.5",
-    W,
     "the signal's structureRef names no item definition",
     "name an itemDefinition, or delete it",
+    "10.5.5",
 )
-LANE_PARTITION = Rule(
+LANE_PARTITION = warning(
     10804,
     "lane-partition",
-    "10.8",
-    W,
     "the lane's partitionElementRef names nothing",
     "name an element of the file, or delete it",
+    "10.8",
 )
 
 _ITEM_DEFINITION = names("itemDefinition")

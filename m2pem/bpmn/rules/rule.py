@@ -2,11 +2,9 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 
 from m2pem.findings import Finding, Severity
-
-E = Severity.ERROR
-W = Severity.WARNING
 
 _FIRST_OF_BPMN = 1000
 
@@ -18,14 +16,17 @@ class Rule:
     Numbers are never used again: those of BPMN's rules are a section of the specification (10.6)
     and two digits (10601), smaller ones are m2pem's own. `slug` names the rule in findings.
     `clause` is one of BPMN 2.0.2, or a page of the docs.
+
+    A family declares its rules by `error`, of what is not loaded, and `warning`, of what is
+    doubtful.
     """
 
+    severity: Severity
     number: int
     slug: str
-    clause: str
-    severity: Severity
     wrong: str
     right: str
+    clause: str = "missions.md"
 
     @property
     def code(self) -> str:
@@ -44,6 +45,10 @@ class Rule:
         """Return a finding of this rule; `severity` where it is not the rule's."""
         level = self.severity if severity is None else severity
         return Finding(level, file, line, element, self.slug, message, remedy, self.code)
+
+
+error = partial(Rule, Severity.ERROR)
+warning = partial(Rule, Severity.WARNING)
 
 
 def declared(names: Mapping[str, object]) -> tuple[Rule, ...]:

@@ -2,7 +2,7 @@
 
 from lxml import etree
 
-from m2pem.bpmn.rules.rule import E, Rule, W
+from m2pem.bpmn.rules.rule import error, warning
 from m2pem.bpmn.rules.tree import (
     ACTIVITIES,
     SUBPROCESSES,
@@ -17,126 +17,108 @@ from m2pem.bpmn.rules.tree import (
     what,
 )
 
-NO_PROCESS = Rule(
+NO_PROCESS = error(
     108,
     "no-process",
-    "missions.md",
-    E,
     "the file has no process",
     "draw a process with a start event",
 )
-EMPTY_PROCESS = Rule(
+EMPTY_PROCESS = error(
     109,
     "empty-process",
-    "missions.md",
-    E,
     "a process has no elements (a warning for a closed pool)",
     "draw its content",
 )
-EMPTY_SUBPROCESS = Rule(
+EMPTY_SUBPROCESS = warning(
     301,
     "empty-subprocess",
-    "missions.md",
-    W,
     "a subprocess has no elements",
     "draw its content, or make it a task",
 )
-AD_HOC_ORDERING = Rule(
+AD_HOC_ORDERING = error(
     10355,
     "ad-hoc-ordering",
-    "10.3.5",
-    E,
     "the ad-hoc subprocess's ordering is none that BPMN has",
     "write Parallel or Sequential",
+    "10.3.5",
 )
-NO_START = Rule(
+NO_START = error(
     13201,
     "no-start",
-    "13.2",
-    E,
     "nothing in a process or subprocess can start, or an event subprocess has no start event",
     "add a start event",
+    "13.2",
 )
-UNREACHABLE = Rule(
+UNREACHABLE = error(
     13202,
     "unreachable",
-    "13.2",
-    E,
     "no start event, and nothing else that begins, leads to an element",
     "draw a sequence flow to it, or delete it",
+    "13.2",
 )
 
-EVENT_SUBPROCESS_INCOMING = Rule(
+EVENT_SUBPROCESS_INCOMING = error(
     10332,
     "event-subprocess-incoming",
-    "10.3.5",
-    E,
     "an event subprocess must not have an incoming flow; its start event begins it",
     "delete the flow, or triggeredByEvent",
+    "10.3.5",
 )
-EVENT_SUBPROCESS_OUTGOING = Rule(
+EVENT_SUBPROCESS_OUTGOING = error(
     10333,
     "event-subprocess-outgoing",
-    "10.3.5",
-    E,
     "an event subprocess must not have an outgoing flow",
     "delete the flow, or triggeredByEvent",
+    "10.3.5",
 )
-EVENT_SUBPROCESS_STARTS = Rule(
+EVENT_SUBPROCESS_STARTS = error(
     10334,
     "event-subprocess-starts",
-    "10.3.5",
-    E,
     "an event subprocess must not have several start events",
     "keep one, or draw an event subprocess for each",
+    "10.3.5",
 )
-TRANSACTION_METHOD = Rule(
+TRANSACTION_METHOD = warning(
     10341,
     "transaction-method",
-    "10.3.5",
-    W,
     "the transaction's method is none that BPMN has",
     "write ##Compensate, ##Store, ##Image or the URI of a protocol",
+    "10.3.5",
 )
-AD_HOC_ACTIVITIES = Rule(
+AD_HOC_ACTIVITIES = warning(
     10351,
     "ad-hoc-activities",
-    "10.3.5",
-    W,
     "the ad-hoc subprocess has no activity",
     "draw the activities that may be done in it",
+    "10.3.5",
 )
-AD_HOC_START = Rule(
+AD_HOC_START = error(
     10352,
     "ad-hoc-start",
-    "10.3.5",
-    E,
     "an ad-hoc subprocess must not have a start event",
     "delete it; activities without an incoming flow can be begun at any time",
+    "10.3.5",
 )
-AD_HOC_END = Rule(
+AD_HOC_END = warning(
     10353,
     "ad-hoc-end",
-    "10.3.5",
-    W,
     "an ad-hoc subprocess must not have an end event",
     "delete it; write a completionCondition",
+    "10.3.5",
 )
-AD_HOC_CANCEL = Rule(
+AD_HOC_CANCEL = warning(
     10354,
     "ad-hoc-cancel",
-    "10.3.5",
-    W,
     "cancelRemainingInstances has no meaning in an ad-hoc subprocess of ordering Sequential",
     "delete it; only one activity runs at a time",
+    "10.3.5",
 )
-EVENT_SUBPROCESS_TWICE = Rule(
+EVENT_SUBPROCESS_TWICE = warning(
     10555,
     "event-subprocess-twice",
-    "10.5.6",
-    W,
     "two interrupting event subprocesses wait for the same event",
     "keep one, or let one not interrupt",
+    "10.5.6",
 )
 _REFERENCES = {
     "message": "messageRef",
