@@ -56,7 +56,7 @@ def read_mission(path: str | Path, search_path: Iterable[Path | str] = ()) -> Mi
             data = stream.read(max_bytes() + 1)
     except OSError as error:
         message = f"cannot read the file: {error.strerror or error}"
-        finding = UNREADABLE_FILE.finding(file, 0, "", message, UNREADABLE_FILE.right)
+        finding = UNREADABLE_FILE.finding(file, 0, "", message)
         raise MissionError(f"{file}: no mission", [finding]) from error
     return parse_mission(data, file, SearchPath(Path(path), map(Path, search_path)))
 
@@ -122,13 +122,7 @@ def _resolve(part: Part) -> None:
     context = part.context
     if not context.processes:
         root = part.document.root
-        context.findings.error(
-            root,
-            root.get("id", ""),
-            NO_PROCESS,
-            "the file has no process",
-            "draw a process with a start event",
-        )
+        context.findings.error(root, root.get("id", ""), NO_PROCESS)
     resolve_data(context)
     resolve_loops(context)
     resolve_data_flows(context)

@@ -199,13 +199,7 @@ def _warn_of_order(
 def _source(context: ReadingContext, found: Children, element: etree._Element) -> Expression | None:
     text = element.get("source") or element.get("sourceExpression") or ""
     if not text.strip():
-        context.findings.error(
-            element,
-            found.id,
-            MAPPING_SOURCE,
-            "the mapping has no source",
-            'write a name or an expression, for example source="mission.speed"',
-        )
+        context.findings.error(element, found.id, MAPPING_SOURCE, "the mapping has no source")
         return None
     if element.tag.startswith(ZEEBE):
         return context.template(element, found.id, text)
@@ -290,7 +284,6 @@ def _not_passed(
         pending.call.id,
         ASSOCIATION_IGNORED,
         f"the data association passes nothing: {because}",
-        'use <m2pem:in source="a.b" target="x"/> or <m2pem:out .../>',
     )
     return None
 

@@ -96,7 +96,6 @@ class BehaviorReader:
                 line,
                 BEHAVIOR_NAME,
                 f"the behavior cannot be commanded: {what}",
-                'write for example <property name="name" value="goto"/>',
             )
         if kind not in list(BehaviorType) or not name:
             return None
@@ -155,12 +154,7 @@ class BehaviorReader:
         name = (_attribute(element, "class") or "").strip()
         line = self._line(element)
         if not name:
-            self._error(
-                line,
-                SERVICE_CLASS,
-                "the service has no class",
-                'write for example <m2pem:service class="Detector"/>',
-            )
+            self._error(line, SERVICE_CLASS, "the service has no class")
             return None
         return ServiceCall(name, line, tuple(roles), tuple(parameters))
 
@@ -179,12 +173,7 @@ class BehaviorReader:
         text = _value_text(element)
         line = self._line(element)
         if not name:
-            self._error(
-                line,
-                PARAMETER_NAME,
-                "a property has no name",
-                'write <property name="speed" value="2 m/s"/>',
-            )
+            self._error(line, PARAMETER_NAME, "a property has no name")
             return []
         if not MARK.search(text) and not text.lstrip().startswith("="):
             return [Parameter(name, text, line)]
@@ -210,7 +199,6 @@ class BehaviorReader:
                     line,
                     ROLE_NOT_LITERAL,
                     f"{key}='{text}' of role '{name}' is an expression, but roles are literal",
-                    "write the vehicle, payload or team itself",
                 )
                 return []
         given = ((key, _attribute(element, key)) for key in NEED_ATTRIBUTES)
@@ -314,12 +302,7 @@ class BehaviorReader:
         seen = {item.name for item in besides}
         for item in items:
             if item.name in seen:
-                self._error(
-                    item.line,
-                    rule,
-                    f"the {what} '{item.name}' is given twice",
-                    "keep one of the two",
-                )
+                self._error(item.line, rule, f"the {what} '{item.name}' is given twice")
             seen.add(item.name)
 
     def _misplaced(self, element: etree._Element, what: str, wrapper: str) -> None:
@@ -330,7 +313,7 @@ class BehaviorReader:
             f"move it into <{wrapper}>",
         )
 
-    def _error(self, line: int, rule: Rule, message: str, remedy: str) -> None:
+    def _error(self, line: int, rule: Rule, message: str, remedy: str = "") -> None:
         self._findings.error(line, self._task, rule, message, remedy)
 
 

@@ -206,7 +206,6 @@ class ReadingContext:
                 identifier,
                 DUPLICATE_ID,
                 f"the id '{identifier}' is already that of the element on line {first}",
-                "give one of the two another id, and its references too",
             )
         return identifier
 
@@ -226,7 +225,6 @@ class ReadingContext:
                 MISSING_ID,
                 f"{a(kind(element.tag))} has no id{f' (its name is {name!r})' if name else ''}; it "
                 f"is called '{identifier}'",
-                "give it an id that nothing else in the file has, so that others can name it",
             )
         return identifier
 

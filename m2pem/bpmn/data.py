@@ -188,7 +188,6 @@ def _assignment(
             pending.node.id,
             EMPTY_ASSIGNMENT,
             f"the assignment of '{written}' has an empty 'from'; it assigns nothing",
-            "write what it assigns, or delete it",
         )
         return
     if "from" not in ends or not KEY.fullmatch(key):
@@ -199,7 +198,6 @@ def _assignment(
             f"the assignment's 'to', '{written}', is no name of the data"
             if "from" in ends and written
             else "the assignment does not say what to write, or where",
-            "write <assignment><from>expression</from><to>name</to></assignment>",
         )
         return
     source = ends["from"]

@@ -196,11 +196,7 @@ def _conditional(context: ReadingContext, found: Children) -> ConditionalEventDe
                 return None
             return ConditionalEventDefinition(context.findings.line(found.element), condition)
     context.findings.error(
-        found.element,
-        found.id,
-        NO_CONDITION,
-        "the conditional event has no condition",
-        "add one, for example <condition>battery.level &lt; 20</condition>",
+        found.element, found.id, NO_CONDITION, "the conditional event has no condition"
     )
     return None
 
@@ -304,7 +300,6 @@ def _no_error(context: ReadingContext, element: etree._Element, event: Event) ->
         ERROR_NOT_INTERRUPTING,
         f'a {word} event that catches an error cannot have {attribute}="false": the {what} has '
         "already failed",
-        "make it interrupting, or throw and catch an escalation",
     )
 
 
@@ -374,7 +369,6 @@ def _definition(
             found.id,
             TYPED_START_IN_SUBPROCESS,
             f"a start event in an embedded subprocess cannot wait for {a(kind(definition.tag))}",
-            "use a plain start event, and a catching intermediate event after it",
         )
         return None
     if name not in allowed_triggers(found.element):
@@ -432,7 +426,6 @@ def resolve_links(context: ReadingContext) -> None:
                 node,
                 LINK_NAME,
                 "the link event has no name, so nothing says what it is joined to",
-                'name it: <linkEventDefinition name="A"/>, and the other end alike',
             )
         elif isinstance(node, IntermediateCatchEvent):
             first = targets.setdefault((node.container, link.name), node)
@@ -442,7 +435,6 @@ def resolve_links(context: ReadingContext) -> None:
                     node,
                     DUPLICATE_LINK,
                     f"the link '{link.name}' has another target, '{first.id}' on line {first.line}",
-                    "give it another name, or lead the sources to one of the two",
                 )
         _check_flows(context, node)
     for node in context.nodes:
@@ -469,14 +461,12 @@ def _link(node: FlowNode) -> LinkEventDefinition | None:
 def _check_flows(context: ReadingContext, node: FlowNode) -> None:
     catches = isinstance(node, IntermediateCatchEvent)
     said = f"into the link target '{node.id}'" if catches else f"out of '{node.id}', a link"
-    follows = "what follows the link target"
     for flow in node.incoming if catches else node.outgoing:
         context.findings.error(
             flow.line,
             flow.id,
             LINK_CATCH_INCOMING if catches else LINK_THROW_OUTGOING,
             f"no sequence flow can lead {said}",
-            f"lead it to {follows}" if catches else f"let it begin at {follows}",
         )
 
 
@@ -497,6 +487,8 @@ def _no_target(
     _say(context, node, rule, message, suggest_or(link.name, here, remedy))
 
 
-def _say(context: ReadingContext, node: FlowNode, rule: Rule, message: str, remedy: str) -> None:
+def _say(
+    context: ReadingContext, node: FlowNode, rule: Rule, message: str, remedy: str = ""
+) -> None:
     context.broken.add(node.container)
     context.findings.error(node.line, node.id, rule, message, remedy)

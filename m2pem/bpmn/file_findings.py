@@ -25,12 +25,16 @@ class FileFindings:
         self.line = line
         self.all: list[Finding] = []
 
-    def error(self, where: Where, element: str, rule: Rule, message: str, remedy: str) -> None:
-        """Note something that stops the mission from being loaded."""
+    def error(
+        self, where: Where, element: str, rule: Rule, message: str = "", remedy: str = ""
+    ) -> None:
+        """Note something that stops the mission from being loaded; by default as the rule says."""
         self._add(Severity.ERROR, where, element, rule, (message, remedy))
 
-    def warning(self, where: Where, element: str, rule: Rule, message: str, remedy: str) -> None:
-        """Add a warning."""
+    def warning(
+        self, where: Where, element: str, rule: Rule, message: str = "", remedy: str = ""
+    ) -> None:
+        """Add a warning; by default as the rule says."""
         self._add(Severity.WARNING, where, element, rule, (message, remedy))
 
     def _add(

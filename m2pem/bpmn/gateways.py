@@ -44,8 +44,6 @@ def read_gateway(context: ReadingContext, element: etree._Element) -> Gateway:
                 PARALLEL_EVENT_GATEWAY,
                 "an event-based gateway that waits for all of its events (eventGatewayType="
                 '"Parallel") is allowed only where it begins the process',
-                'add instantiate="true" where it has no incoming flow; else fork with a parallel '
-                "gateway, and wait for one event on each branch",
             )
         gateway = EventBasedGateway(identifier, name, line, instantiate, parallel)
     else:
@@ -66,6 +64,5 @@ def _activation(context: ReadingContext, found: Children) -> Expression | None:
         found.id,
         NO_ACTIVATION_CONDITION,
         "the complex gateway has no activationCondition; any token activates it",
-        "add one, for example <activationCondition>activationCount >= 2</activationCondition>",
     )
     return None

@@ -77,10 +77,9 @@ def by_file(mission: Mission) -> Callable[[Finding], tuple[bool, str]]:
 
 
 def _warning(
-    mission: Mission, about: FlowNode | Signal | Message, rule: Rule, said: tuple[str, str]
+    mission: Mission, about: FlowNode | Signal | Message, rule: Rule, message: str, remedy: str = ""
 ) -> Finding:
-    file = mission.file_of(about)
-    return rule.finding(file, about.line, about.id, *said)
+    return rule.finding(mission.file_of(about), about.line, about.id, message, remedy)
 
 
 def _unreachable(mission: Mission) -> Iterator[Finding]:
@@ -107,11 +106,8 @@ def _undecided_gateways(mission: Mission) -> Iterator[Finding]:
                 mission,
                 node,
                 NO_CONDITIONS,
-                (
-                    f"none of the gateway's {len(node.outgoing)} outgoing flows has a condition; "
-                    f"{what}",
-                    "give the flows conditions",
-                ),
+                f"none of the gateway's {len(node.outgoing)} outgoing flows has a condition; "
+                f"{what}",
             )
 
 
@@ -148,13 +144,11 @@ def _incomplete_conditions(
             mission,
             node,
             INCOMPLETE_CONDITIONS,
-            (
-                "no flow out of the gateway may be true"
-                + (f", for example if {case}" if case else "")
-                + "; the run then ends with error NO_FLOW, unless an event catches it",
-                f'make one the default, <{kind} id="{node.id}" default="{last}">, or cover the '
-                "case; m2pem verify shows whether a run can get there",
-            ),
+            "no flow out of the gateway may be true"
+            + (f", for example if {case}" if case else "")
+            + "; the run then ends with error NO_FLOW, unless an event catches it",
+            f'make one the default, <{kind} id="{node.id}" default="{last}">, or cover the case; '
+            "m2pem verify shows whether a run can get there",
         )
 
 
@@ -195,12 +189,10 @@ def _outside_only(mission: Mission) -> Iterator[Finding]:
             mission,
             root,
             OUTSIDE_ONLY,
-            (
-                f"{waiting} {'wait' if len(catchers) > 1 else 'waits'} for the {what} "
-                f"'{root.name or root.id}', which nothing in the file "
-                f"{'throws' if what == 'signal' else 'sends'}",
-                f'if operators send it, say so: <{what} id="{root.id}" m2pem:from="operator"/>',
-            ),
+            f"{waiting} {'wait' if len(catchers) > 1 else 'waits'} for the {what} "
+            f"'{root.name or root.id}', which nothing in the file "
+            f"{'throws' if what == 'signal' else 'sends'}",
+            f'if operators send it, say so: <{what} id="{root.id}" m2pem:from="operator"/>',
         )
 
 
@@ -245,10 +237,7 @@ def _recursion(mission: Mission) -> Iterator[Finding]:
                     mission,
                     call,
                     CALL_RECURSION,
-                    (
-                        f"process '{process.id}' calls itself through '{call.called.id}'"
-                        if call.called is not process
-                        else f"process '{process.id}' calls itself",
-                        "make sure that a decision before the call can end it",
-                    ),
+                    f"process '{process.id}' calls itself through '{call.called.id}'"
+                    if call.called is not process
+                    else f"process '{process.id}' calls itself",
                 )

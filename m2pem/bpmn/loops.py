@@ -37,7 +37,6 @@ from m2pem.bpmn.rules.loops import (
     TWO_LOOPS,
 )
 from m2pem.bpmn.rules.references import DANGLING_REFERENCE
-from m2pem.bpmn.rules.rule import Rule
 from m2pem.bpmn.xml import BPMN, M2PEM, ZEEBE, local
 from m2pem.mission.elements import Activity, SubProcess
 from m2pem.mission.events import EventDefinition, Signal, SignalEventDefinition
@@ -67,16 +66,15 @@ def read_loop(context: ReadingContext, found: Children, node: Activity) -> None:
     markers = [each for tag in LOOPS for each in found.children.get(tag, [])]
     element = markers[0]
     if len(markers) > 1:
-        _error(context, markers[1], node, TWO_LOOPS, "an activity has one loop marker", "keep one")
+        what = "an activity has one loop marker"
+        context.findings.error(markers[1], node.id, TWO_LOOPS, what, "keep one")
     if isinstance(node, SubProcess) and node.triggered_by_event:
-        _error(
-            context,
+        context.findings.error(
             element,
-            node,
+            node.id,
             LOOP_NOT_ALLOWED,
             "an event subprocess is begun by its start event, as often as that is triggered; it "
             "cannot have a loop marker",
-            "delete the marker, or put it on an activity inside",
         )
     loop: StandardLoop | MultiInstance
     if element.tag == _STANDARD:
@@ -87,21 +85,9 @@ def read_loop(context: ReadingContext, found: Children, node: Activity) -> None:
             own = frozenset({*node.own_data, loop.output_item})
             object.__setattr__(node, "own_data", own)
     else:
-        remedy = "write standardLoopCharacteristics or multiInstanceLoopCharacteristics"
-        _error(context, element, node, NO_LOOP, "it does not say which kind of loop", remedy)
+        context.findings.error(element, node.id, NO_LOOP, "it does not say which kind of loop")
         return
     object.__setattr__(node, "loop", loop)
-
-
-def _error(
-    context: ReadingContext,
-    where: etree._Element,
-    node: Activity,
-    rule: Rule,
-    what: str,
-    remedy: str,
-) -> None:
-    context.findings.error(where, node.id, rule, what, remedy)
 
 
 def _expression(
@@ -127,7 +113,7 @@ def _standard_loop(
         maximum = int(text)
     elif text is not None:
         what = f"loopMaximum='{text}' is no number of rounds"
-        _error(context, element, node, LOOP_MAXIMUM, what, 'write for example loopMaximum="5"')
+        context.findings.error(element, node.id, LOOP_MAXIMUM, what)
     return StandardLoop(
         _expression(context, found, "loopCondition", node),
         context.boolean(element, "testBefore", False, node.id),
@@ -227,7 +213,8 @@ def _key(context: ReadingContext, element: etree._Element, node: Activity, key: 
     if not key or KEY.fullmatch(key):
         return key
     what = f"'{key}' is no name of the data store"
-    _error(context, element, node, BAD_KEY, what, 'write a dotted name, for example "field"')
+    remedy = 'write a dotted name, for example "field"'
+    context.findings.error(element, node.id, BAD_KEY, what, remedy)
     return ""
 
 
@@ -236,24 +223,19 @@ def _check_count(
 ) -> None:
     has_cardinality = any(text_of(each) for each in found.of("loopCardinality"))
     if has_cardinality and has_collection:
-        _error(
-            context,
+        context.findings.error(
             found.element,
-            node,
+            node.id,
             INSTANCES_COUNTED_TWICE,
             "the multi-instance activity has both a loopCardinality and a collection, either of "
             "which says how many instances there are",
-            "keep one",
         )
     elif not has_cardinality and not has_collection:
-        _error(
-            context,
+        context.findings.error(
             found.element,
-            node,
+            node.id,
             INSTANCE_COUNT,
             "the multi-instance activity does not say how many instances it has",
-            "add a loopCardinality (a number or an expression), or name a collection: "
-            'm2pem:collection="fields" m2pem:elementVariable="field"',
         )
 
 
@@ -268,7 +250,7 @@ def _behavior(context: ReadingContext, element: etree._Element, node: Activity) 
         known = list(InstanceBehavior)
         remedy = suggest_or(text, known, f"write one of: {', '.join(known)}")
         what = f"behavior='{text}' is no behavior of a multi-instance activity"
-        _error(context, element, node, INSTANCES_BEHAVIOR, what, remedy)
+        context.findings.error(element, node.id, INSTANCES_BEHAVIOR, what, remedy)
         return InstanceBehavior.ALL
 
 
@@ -300,13 +282,11 @@ def _complex(
         condition = _expression(context, definition, "condition", node)
         events = definition.of("event")
         if not events or not definition.of("condition"):
-            _error(
-                context,
+            context.findings.error(
                 each,
-                node,
+                node.id,
                 COMPLEX_BEHAVIOR,
                 "a complexBehaviorDefinition says when something is thrown, and what",
-                "give it a condition, and an event with an event definition",
             )
         elif condition is not None:
             thrower = read_children(context, events[0], events[0].get("id") or node.id)

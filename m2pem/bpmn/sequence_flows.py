@@ -90,7 +90,6 @@ def _condition(
             identifier,
             EMPTY_CONDITION,
             "the condition is empty; the flow counts as one without a condition",
-            "write the condition, or delete the conditionExpression",
         )
         return None
     return context.expression(element, identifier, text, element.get("language"))
@@ -180,7 +179,6 @@ def _crossing(
         FLOW_CROSSES_BORDER,
         f"the sequence flow leads from '{source.id}' in {_called(source.container)} to "
         f"'{target.id}' in {_called(target.container)}",
-        "let it lead from or to the subprocess itself; between pools, draw a message flow",
     )
 
 
@@ -193,18 +191,12 @@ def _wrong_end(
     context: ReadingContext, flow: SequenceFlow, source: FlowNode, target: FlowNode
 ) -> None:
     if isinstance(source, EndEvent):
-        rule = FLOW_OUT_OF_END
-        said = f"out of the end event '{source.id}'"
-        remedy = "make it an intermediate throw event, or delete the flow"
+        rule, said = FLOW_OUT_OF_END, f"out of the end event '{source.id}'"
     elif isinstance(target, BoundaryEvent):
-        rule = FLOW_INTO_BOUNDARY
-        said = f"into the boundary event '{target.id}'"
-        remedy = "lead it to the activity, or to what follows the boundary event"
+        rule, said = FLOW_INTO_BOUNDARY, f"into the boundary event '{target.id}'"
     else:
-        rule = FLOW_INTO_START
-        said = f"into the start event '{target.id}'"
-        remedy = "lead it to what follows the start event"
-    context.findings.error(flow.line, flow.id, rule, f"no sequence flow can lead {said}", remedy)
+        rule, said = FLOW_INTO_START, f"into the start event '{target.id}'"
+    context.findings.error(flow.line, flow.id, rule, f"no sequence flow can lead {said}")
 
 
 def _link_containers(context: ReadingContext) -> None:
@@ -260,7 +252,6 @@ def _link_defaults(context: ReadingContext) -> None:
                     flow.id,
                     DEFAULT_WITH_CONDITION,
                     f"the condition of a default flow is ignored (it is that of '{node.id}')",
-                    "delete the condition, or make another flow the default",
                 )
                 _set(flow, "condition", None)
         elif ref in flows:
@@ -269,7 +260,6 @@ def _link_defaults(context: ReadingContext) -> None:
                 node.id,
                 DEFAULT_NOT_OWN,
                 f"the default flow '{ref}' does not leave '{node.id}'",
-                "name one of its own outgoing sequence flows",
             )
         else:
             context.findings.error(
@@ -325,7 +315,6 @@ def check_graph(context: ReadingContext) -> None:
                 container.id,
                 EMPTY_SUBPROCESS,
                 "the subprocess is empty; it ends as soon as it is entered",
-                "draw its content, or make it a task",
             )
     _check_conditions(context)
 
@@ -339,13 +328,7 @@ def _check_processes(context: ReadingContext) -> None:
         say = context.findings.error
         if filled and process.id not in called:
             say = context.findings.warning  # a pool that was drawn closed
-        say(
-            process.line,
-            process.id,
-            EMPTY_PROCESS,
-            "the process has no elements",
-            "draw its content, or delete it",
-        )
+        say(process.line, process.id, EMPTY_PROCESS, "the process has no elements")
 
 
 def _check_start(context: ReadingContext, container: Container) -> None:
@@ -365,7 +348,6 @@ def _check_start(context: ReadingContext, container: Container) -> None:
             NO_START,
             "nothing in it can start: there is no start event, and every element has an incoming "
             "flow or waits for a trigger",
-            "add a start event",
         )
 
 
@@ -408,7 +390,6 @@ def _check_conditions(context: ReadingContext) -> None:
                 flow.id,
                 CONDITION_IGNORED,
                 "a parallel gateway takes every flow; the condition is ignored",
-                "delete the condition, or make the gateway inclusive",
             )
             _set(flow, "condition", None)
         elif isinstance(flow.source, Event):
@@ -417,5 +398,4 @@ def _check_conditions(context: ReadingContext) -> None:
                 flow.id,
                 CONDITION_NOT_ALLOWED,
                 "BPMN allows no condition on a flow out of an event",
-                "put an exclusive gateway behind the event",
             )

@@ -192,7 +192,6 @@ def read_process(context: ReadingContext, element: etree._Element) -> None:
                 inner.id,
                 TOO_DEEP,
                 f"subprocesses are nested more than {MAX_DEPTH} deep",
-                "move inner subprocesses to processes of their own and call them",
             )
         else:
             stack.pop()
@@ -270,11 +269,7 @@ def read_ad_hoc(
     ordering = element.get("ordering", AdHocOrdering.PARALLEL.value)
     if ordering not in [each.value for each in AdHocOrdering]:
         context.findings.error(
-            element,
-            identifier,
-            AD_HOC_ORDERING,
-            f"ordering='{ordering}' is none that BPMN knows",
-            'write ordering="Parallel" or ordering="Sequential"',
+            element, identifier, AD_HOC_ORDERING, f"ordering='{ordering}' is none that BPMN knows"
         )
         ordering = AdHocOrdering.PARALLEL.value
     return AdHocSubProcess(

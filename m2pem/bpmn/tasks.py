@@ -105,8 +105,6 @@ def _service_task(context: ReadingContext, found: Children, task: type[Serving])
             NO_SERVICE,
             f"the {kind(found.element.tag)} names no service{_bound_elsewhere(found)}; it does "
             "nothing",
-            'add <m2pem:service class="Detector"/> to its extension elements, or make it a plain '
-            "task",
         )
     line = context.findings.line(found.element)
     return task(found.id, found.element.get("name", ""), line, call, behavior)
@@ -131,7 +129,6 @@ def _service_call(
             found.id,
             TWO_SERVICES,
             f"the task names several service classes: {', '.join(sorted(classes))}",
-            "keep one",
         )
     if not named:
         return None
@@ -331,17 +328,12 @@ class _Asked:
                 'write <m2pem:decision value="continue" label="Continue"/>',
             )
         elif any(value == other.value for other in self.decisions):
-            self._error(
-                element,
-                DECISION_VALUE,
-                f"two decisions have the value '{value}'",
-                "give each its own value",
-            )
+            self._error(element, DECISION_VALUE, f"two decisions have the value '{value}'")
         else:
             label = element.get("label", element.get(M2PEM + "label")) or value
             self.decisions.append(Decision(value, label))
 
-    def _error(self, element: etree._Element, rule: Rule, message: str, remedy: str) -> None:
+    def _error(self, element: etree._Element, rule: Rule, message: str, remedy: str = "") -> None:
         self.context.findings.error(element, self.task, rule, message, remedy)
 
 
@@ -376,11 +368,7 @@ def read_script_task(context: ReadingContext, found: Children) -> ScriptTask:
         behavior, statements = _script(context, found, script)
     else:
         context.findings.warning(
-            found.element,
-            found.id,
-            EMPTY_SCRIPT,
-            "the script task has no script; it does nothing",
-            "give it a behavior, or make it a plain task",
+            found.element, found.id, EMPTY_SCRIPT, "the script task has no script; it does nothing"
         )
     line = context.findings.line(found.element)
     return ScriptTask(found.id, found.element.get("name", ""), line, behavior, statements)

@@ -113,7 +113,6 @@ class _Replacement:
                     self._owner(),
                     DUPLICATE_PROPERTY,
                     f"the property '{whole}' is given twice",
-                    "keep one of the two",
                 )
             return first is element
         what, colon, name = whole.removeprefix(PREFIX).partition(":")

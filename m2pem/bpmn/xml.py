@@ -127,12 +127,12 @@ _REFUSED_CODECS = frozenset(
 class XmlError(Exception):
     """The bytes are no XML that m2pem reads. `line` counts from 1."""
 
-    def __init__(self, rule: Rule, line: int, message: str, remedy: str) -> None:
+    def __init__(self, rule: Rule, line: int, message: str, remedy: str = "") -> None:
         super().__init__(message)
         self.rule = rule
         self.line = line
         self.message = message
-        self.remedy = remedy
+        self.remedy = remedy or rule.right
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,9 +216,7 @@ def _declared_encoding(data: bytes) -> str:
     except (LookupError, UnicodeError):
         encoding = ""
     if not encoding or encoding.replace("_", "-") in _REFUSED_CODECS:
-        raise XmlError(
-            ENCODING, 1, f"m2pem does not know the encoding '{name}'", "save the file as UTF-8"
-        )
+        raise XmlError(ENCODING, 1, f"m2pem does not know the encoding '{name}'")
     if encoding.startswith(("utf-16", "utf-32")):
         return "utf-8"  # the declaration was readable byte by byte, so it is wrong about itself
     return encoding
@@ -238,7 +236,6 @@ def _doctype_found(line: int) -> XmlError:
         line,
         "the file has a document type declaration (DOCTYPE), which m2pem refuses: it can pull in "
         "other files",
-        "delete the <!DOCTYPE ...> declaration; BPMN files need none",
     )
 
 
@@ -246,18 +243,8 @@ def _not_well_formed(error: etree.XMLSyntaxError) -> XmlError:
     message = re.sub(r", line \d+, column \d+.*", "", error.msg or "the XML is not well-formed")
     line = max(error.lineno or 1, 1)
     if "Excessive depth" in message:
-        return XmlError(
-            TOO_DEEP,
-            line,
-            f"elements are nested more than {MAX_ELEMENT_DEPTH} deep",
-            "move inner subprocesses to processes of their own and call them",
-        )
-    return XmlError(
-        NOT_XML,
-        line,
-        f"the file is not well-formed XML: {message.strip()}",
-        "correct it, or export it again from the editor",
-    )
+        return XmlError(TOO_DEEP, line, f"elements are nested more than {MAX_ELEMENT_DEPTH} deep")
+    return XmlError(NOT_XML, line, f"the file is not well-formed XML: {message.strip()}")
 
 
 def _line_finder(root: etree._Element, utf8: bytes) -> Callable[[etree._Element], int]:

@@ -21,7 +21,7 @@ MAPPING_SOURCE = error(
     215,
     "mapping-source",
     "a mapping of a call activity has no source",
-    "write a name or an expression",
+    'write a name or an expression, for example source="mission.speed"',
 )
 PASSES_EVERYTHING = error(
     216,
@@ -51,13 +51,13 @@ EMPTY_SCRIPT = warning(
     302,
     "empty-script",
     "a script task has no script",
-    "write one, or make it a plain task",
+    "give it a behavior, or make it a plain task",
 )
 CALL_RECURSION = warning(
     310,
     "call-recursion",
     "a process can call itself",
-    "make sure that a decision can end it",
+    "make sure that a decision before the call can end it",
 )
 START_QUANTITY = error(
     10301,

@@ -6,7 +6,7 @@ BEHAVIOR_NAME = error(
     204,
     "behavior-name",
     "a behavior has no name",
-    "name a behavior of the catalogue",
+    'write for example <property name="name" value="goto"/>',
 )
 BEHAVIOR_TYPE = error(
     205,
@@ -18,7 +18,7 @@ PARAMETER_NAME = error(
     206,
     "parameter-name",
     "a parameter has no name, or the name of another",
-    "give each its own name",
+    'write <property name="speed" value="2 m/s"/>',
 )
 ROLE_NAME = error(
     207,
@@ -36,7 +36,7 @@ ROLE_NOT_LITERAL = error(
     209,
     "role-not-literal",
     "a role is an expression",
-    "name the vehicle, payload or team itself",
+    "write the vehicle, payload or team itself",
 )
 ROLE_NEED = error(
     210,
@@ -60,13 +60,13 @@ SERVICE_CLASS = error(
     213,
     "service-class",
     "a service has no class",
-    "write the class of the service",
+    'write for example <m2pem:service class="Detector"/>',
 )
 NO_SERVICE = warning(
     303,
     "no-service",
     "a service task names no service",
-    "name one, or make it a plain task",
+    'add <m2pem:service class="Detector"/> to its extension elements, or make it a plain task',
 )
 MISPLACED = error(
     219,

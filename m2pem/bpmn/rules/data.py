@@ -31,7 +31,7 @@ ASSOCIATION_IGNORED = warning(
     306,
     "association-ignored",
     "a data association of a call activity passes nothing",
-    "use m2pem:in, m2pem:out",
+    'use <m2pem:in source="a.b" target="x"/> or <m2pem:out .../>',
 )
 UNWRITTEN_NAME = warning(
     307,
@@ -49,7 +49,7 @@ BAD_ASSIGNMENT = error(
     10424,
     "bad-assignment",
     "an assignment of a data association lacks from or to",
-    "write both",
+    "write <assignment><from>expression</from><to>name</to></assignment>",
     "10.4.1",
 )
 

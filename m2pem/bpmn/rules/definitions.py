@@ -10,7 +10,7 @@ MISSING_ID = warning(
     8301,
     "missing-id",
     "an element that others could refer to has no id; m2pem makes one up",
-    "give it an id that nothing else in the file has",
+    "give it an id that nothing else in the file has, so that others can name it",
     "8.3.1",
 )
 DUPLICATE_ID = error(

@@ -80,14 +80,14 @@ NO_CONDITION = error(
     10533,
     "no-condition",
     "a conditional event has no condition",
-    "write the condition that it waits for",
+    "add one, for example <condition>battery.level &lt; 20</condition>",
     "10.5.5",
 )
 LINK_NAME = error(
     10541,
     "link-name",
     "a link event has no name",
-    "give both of its ends the same name",
+    'name it: <linkEventDefinition name="A"/>, and the other end alike',
     "10.5.5",
 )
 DANGLING_LINK = error(
@@ -101,7 +101,7 @@ DUPLICATE_LINK = error(
     10543,
     "duplicate-link",
     "two catching link events have the same name",
-    "give one another name",
+    "give it another name, or lead the sources to one of the two",
     "10.5.4",
 )
 LINK_THROW_OUTGOING = error(

@@ -24,7 +24,7 @@ DOCTYPE = error(
     104,
     "doctype",
     "the file has a document type declaration",
-    "delete it; BPMN files need none",
+    "delete the <!DOCTYPE ...> declaration; BPMN files need none",
 )
 ENCODING = error(
     105,
@@ -42,7 +42,7 @@ TOO_DEEP = error(
     107,
     "too-deep",
     "elements nest too deep",
-    "call processes instead of nesting subprocesses",
+    "move inner subprocesses to processes of their own and call them",
 )
 NOT_EXECUTED = error(
     110,

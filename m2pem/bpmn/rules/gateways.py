@@ -37,14 +37,15 @@ NO_ACTIVATION_CONDITION = warning(
     10605,
     "no-activation-condition",
     "a complex gateway does not say when it is activated",
-    "add an activationCondition",
+    "add one, for example <activationCondition>activationCount >= 2</activationCondition>",
     "10.6.5",
 )
 PARALLEL_EVENT_GATEWAY = error(
     10618,
     "parallel-event-gateway",
     "an event-based gateway that does not begin a process cannot be parallel",
-    "use a parallel gateway before the events",
+    'add instantiate="true" where it has no incoming flow; else fork with a parallel '
+    "gateway, and wait for one event on each branch",
     "10.6.6",
 )
 

@@ -21,7 +21,7 @@ LOOP_NOT_ALLOWED = error(
     10336,
     "loop-not-allowed",
     "an event subprocess has a loop marker",
-    "delete it, or put it on an activity inside",
+    "delete the marker, or put it on an activity inside",
     "10.3.5",
 )
 TWO_LOOPS = error(
@@ -35,21 +35,22 @@ LOOP_MAXIMUM = error(
     10372,
     "loop-maximum",
     "loopMaximum is no whole number",
-    "write the number of rounds at most, or delete it",
+    'write for example loopMaximum="5"',
     "10.3.8",
 )
 INSTANCE_COUNT = error(
     10374,
     "instance-count",
     "a multi-instance activity does not say how many instances there are",
-    "add a loopCardinality or a collection",
+    "add a loopCardinality (a number or an expression), or name a collection: "
+    'm2pem:collection="fields" m2pem:elementVariable="field"',
     "10.3.8",
 )
 INSTANCES_COUNTED_TWICE = error(
     10375,
     "instances-counted-twice",
     "a multi-instance activity has both a loopCardinality and a collection",
-    "keep one of the two",
+    "keep one",
     "10.3.8",
 )
 INSTANCES_BEHAVIOR = error(
@@ -63,7 +64,7 @@ COMPLEX_BEHAVIOR = error(
     10381,
     "complex-behavior",
     "a complexBehaviorDefinition lacks its condition or its event",
-    "say when something is thrown, and what",
+    "give it a condition, and an event with an event definition",
     "10.3.8",
 )
 NO_LOOP = error(

@@ -18,7 +18,7 @@ class Rule:
     `clause` is one of BPMN 2.0.2, or a page of the docs.
 
     A family declares its rules by `error`, of what is not loaded, and `warning`, of what is
-    doubtful.
+    doubtful. A finding says what is `wrong` and what is `right` unless it says it otherwise.
     """
 
     severity: Severity
@@ -38,13 +38,21 @@ class Rule:
         file: str,
         line: int,
         element: str,
-        message: str,
-        remedy: str,
+        message: str = "",
+        remedy: str = "",
         severity: Severity | None = None,
     ) -> Finding:
-        """Return a finding of this rule; `severity` where it is not the rule's."""
-        level = self.severity if severity is None else severity
-        return Finding(level, file, line, element, self.slug, message, remedy, self.code)
+        """Return a finding of this rule; the last three where they are not the rule's."""
+        return Finding(
+            severity or self.severity,
+            file,
+            line,
+            element,
+            self.slug,
+            message or self.wrong,
+            remedy or self.right,
+            self.code,
+        )
 
 
 error = partial(Rule, Severity.ERROR)

@@ -27,7 +27,7 @@ EMPTY_PROCESS = error(
     109,
     "empty-process",
     "a process has no elements (a warning for a closed pool)",
-    "draw its content",
+    "draw its content, or delete it",
 )
 EMPTY_SUBPROCESS = warning(
     301,
@@ -39,7 +39,7 @@ AD_HOC_ORDERING = error(
     10355,
     "ad-hoc-ordering",
     "the ad-hoc subprocess's ordering is none that BPMN has",
-    "write Parallel or Sequential",
+    'write ordering="Parallel" or ordering="Sequential"',
     "10.3.5",
 )
 NO_START = error(
