@@ -116,9 +116,7 @@ def read_call_activity(context: ReadingContext, found: Children) -> CallActivity
             called = called or each.get("processId", "")
             _refuse_propagation(context, found, each)
     call = CallActivity(
-        found.id,
-        found.element.get("name", ""),
-        context.findings.line(found.element),
+        *context.head(found.element, found.id),
         reference(called) if "{" not in called and not called.startswith("=") else called,
         Mappings(tuple(inputs), tuple(outputs)),
     )
@@ -301,9 +299,7 @@ GLOBAL_TASKS = frozenset(_GLOBAL_TASKS)
 def read_global_task(context: ReadingContext, element: etree._Element) -> Process:
     """Read a global task as the process that calling it begins."""
     identifier = element.get("id", "")  # claimed with the root elements
-    process = Process(
-        identifier, element.get("name", ""), context.findings.line(element), global_task=True
-    )
+    process = Process(*context.head(element, identifier), global_task=True)
     task = _GLOBAL_TASKS[element.tag](context, read_children(context, element, identifier))
     context.processes.append(process)
     context.nodes.append(task)

@@ -20,7 +20,7 @@ from m2pem.bpmn.rules.collaboration import (
 )
 from m2pem.bpmn.rules.events import MISSING_REFERENCE
 from m2pem.bpmn.rules.references import DANGLING_REFERENCE
-from m2pem.bpmn.xml import BPMN, M2PEM, ZEEBE, local
+from m2pem.bpmn.xml import BPMN, local
 from m2pem.mission.elements import Element, Process, ReceiveTask
 from m2pem.mission.events import CorrelationProperty, Message, MessageEventDefinition
 from m2pem.mission.expression import Expression
@@ -39,18 +39,15 @@ def read_collaboration(context: ReadingContext, collaboration: etree._Element) -
             continue
         identifier = context.optional_id(element)
         read_children(context, element, identifier)
-        label = element.get("name", "")
-        line = context.findings.line(element)
+        head = context.head(element, identifier)
         if name == "participant":
             process_id = reference(element.get("processRef", ""))
-            context.participants.append(Participant(identifier, label, line, process_id))
+            context.participants.append(Participant(*head, process_id))
             continue
         source = reference(element.get("sourceRef", ""))
         target = reference(element.get("targetRef", ""))
         message = reference(element.get("messageRef", ""))
-        context.message_flows.append(
-            (MessageFlow(identifier, label, line, source, target), message)
-        )
+        context.message_flows.append((MessageFlow(*head, source, target), message))
 
 
 def check_collaborations(context: ReadingContext) -> None:
@@ -110,9 +107,7 @@ def read_lanes(context: ReadingContext, lane_set: etree._Element, process: Proce
             found = read_children(context, element, identifier)
             context.lanes.append(
                 Lane(
-                    identifier,
-                    element.get("name", ""),
-                    context.findings.line(element),
+                    *context.head(element, identifier),
                     process.id,
                     tuple(reference(text_of(each)) for each in found.of("flowNodeRef")),
                 )
@@ -127,19 +122,6 @@ def read_property(context: ReadingContext, element: etree._Element) -> None:
         context.correlation_properties[identifier] = element
 
 
-def correlation_key(
-    context: ReadingContext, element: etree._Element, identifier: str
-) -> Expression | None:
-    """The key of a message: `m2pem:correlationKey`, or Zeebe's subscription."""
-    text = element.get(M2PEM + "correlationKey", "")
-    where = element
-    for extensions in element.iterchildren(BPMN + "extensionElements"):
-        for each in extensions.iterchildren(ZEEBE + "subscription"):
-            text = text or each.get("correlationKey", "")
-            where = each
-    return context.expression(where, identifier, text) if text.strip() else None
-
-
 def read_subscription(context: ReadingContext, element: etree._Element, process: Process) -> None:
     """A process's correlationSubscription, kept until all properties are known."""
     for binding in element.iterchildren(BPMN + "correlationPropertyBinding"):
@@ -151,8 +133,7 @@ def resolve_correlation(context: ReadingContext) -> tuple[CorrelationProperty, .
     found = []
     for identifier, element in context.correlation_properties.items():
         retrieve = dict(_retrievals(context, identifier, element))
-        line = context.findings.line(element)
-        found.append(CorrelationProperty(identifier, element.get("name", ""), line, retrieve))
+        found.append(CorrelationProperty(*context.head(element, identifier), retrieve))
     for process, binding in context.subscriptions:
         name = reference(binding.get("correlationPropertyRef", ""))
         if name not in context.correlation_properties:
@@ -182,7 +163,7 @@ def _path(
 ) -> Expression | None:
     for each in element.iterchildren(BPMN + tag):
         if text_of(each):
-            return context.expression(each, identifier, text_of(each), each.get("language"))
+            return context.expression_in(each, identifier)
     context.findings.error(
         element,
         identifier,

@@ -1,6 +1,7 @@
 """What is known while a file is being read: elements so far, and references to resolve."""
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from lxml import etree
@@ -12,7 +13,7 @@ from m2pem.bpmn.rules.attributes import BAD_EXPRESSION, BAD_VALUE, unknown_attri
 from m2pem.bpmn.rules.definitions import DUPLICATE_ID, MISSING_ID
 from m2pem.bpmn.rules.extensions import MISPLACED_EXTENSION, UNKNOWN_EXTENSION, WRONG_NAMESPACE
 from m2pem.bpmn.schema import Shape
-from m2pem.bpmn.xml import M2PEM, a, attribute_names, kind, local
+from m2pem.bpmn.xml import BPMN, M2PEM, a, attribute_names, kind, local
 from m2pem.errors import ExpressionSyntaxError
 from m2pem.mission.behavior import Mappings
 from m2pem.mission.elements import (
@@ -228,6 +229,10 @@ class ReadingContext:
             )
         return identifier
 
+    def head(self, element: etree._Element, identifier: str) -> tuple[str, str, int]:
+        """Id, name and line: what each element of the model begins with."""
+        return identifier, element.get("name", ""), self.findings.line(element)
+
     def optional_id(self, element: etree._Element) -> str:
         """The id of an element that can do without one."""
         return self.claim(element) if element.get("id") else ""
@@ -304,6 +309,31 @@ class ReadingContext:
         except ExpressionSyntaxError as error:
             self._bad_expression(where, identifier, error)
             return None
+
+    def expression_in(self, element: etree._Element, identifier: str) -> Expression | None:
+        """Parse the text of an element, in the language that it names."""
+        return self.expression(element, identifier, text_of(element), element.get("language"))
+
+    def first_expression(
+        self, elements: Iterable[etree._Element], identifier: str
+    ) -> Expression | None:
+        """Parse the first of the elements that has a text; None: there is none, or it is wrong."""
+        written = next((each for each in elements if text_of(each)), None)
+        return None if written is None else self.expression_in(written, identifier)
+
+    def own_expression(
+        self, element: etree._Element, identifier: str, attribute: str, foreign: tuple[str, str]
+    ) -> Expression | None:
+        """Parse an attribute of m2pem's, else of another engine's extension element.
+
+        `foreign`: the tag of that, and the name of the attribute there.
+        """
+        text, where = element.get(M2PEM + attribute, ""), element
+        tag, name = foreign
+        for extensions in element.iterchildren(BPMN + "extensionElements"):
+            for where in extensions.iterchildren(tag):
+                text = text or where.get(name, "")
+        return self.expression(where, identifier, text) if text.strip() else None
 
     def _parse(self, text: str, language: str | None) -> Expression:
         """Parse by the language given; by the bare dialect what only a file's default misnames.

@@ -30,10 +30,9 @@ def read_data(context: ReadingContext, element: etree._Element, container: Conta
     """A dataObject, dataObjectReference, dataStoreReference or property of a container."""
     identifier = context.optional_id(element)
     read_children(context, element, identifier)
-    name = element.get("name", "")
     what = local(element.tag)
     if what in ("dataObject", "property"):
-        declared = DataObject(identifier, name, context.findings.line(element))
+        declared = DataObject(*context.head(element, identifier))
         if declared.key:
             context.declared.append((container, declared))
         if identifier:
@@ -42,9 +41,8 @@ def read_data(context: ReadingContext, element: etree._Element, container: Conta
         if what == "dataStoreReference":
             context.data_stores.add(identifier)
         target = element.get("dataObjectRef") or element.get("dataStoreRef") or ""
-        context.data.setdefault(
-            identifier, DataEnd(name or identifier, [element], refers_to=reference(target))
-        )
+        key = element.get("name") or identifier
+        context.data.setdefault(identifier, DataEnd(key, [element], refers_to=reference(target)))
 
 
 def resolve_data(context: ReadingContext) -> None:
@@ -155,14 +153,12 @@ def _mappings(
     data around it anyway. Nor does one whose name no expression can read ("Route prompt").
     """
     line = context.findings.line(found.element)
-    identifier = pending.node.id
     assigned = False
     for child in found.element:
         name = local(child.tag)
         if name == "transformation" and target:
             assigned = True
-            text, language = text_of(child), child.get("language")
-            expression = context.expression(child, identifier, text, language)
+            expression = context.expression_in(child, pending.node.id)
             if expression is not None:
                 yield Mapping(expression, target, line)
         elif name == "assignment":

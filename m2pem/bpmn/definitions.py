@@ -4,12 +4,12 @@ from lxml import etree
 
 from m2pem.bpmn.activities import GLOBAL_TASKS
 from m2pem.bpmn.children import ChildOrder, read_children
-from m2pem.bpmn.collaboration import correlation_key, read_collaboration, read_property
+from m2pem.bpmn.collaboration import read_collaboration, read_property
 from m2pem.bpmn.context import DataEnd, ReadingContext
 from m2pem.bpmn.rules.attributes import BAD_VALUE, UNKNOWN_ELEMENT
-from m2pem.bpmn.rules.files import NOT_EXECUTED
 from m2pem.bpmn.schema import ROOT_NAMES, SHAPES
-from m2pem.bpmn.xml import BPMN, M2PEM, a, kind, local
+from m2pem.bpmn.subprocesses import not_executed
+from m2pem.bpmn.xml import BPMN, M2PEM, ZEEBE, local
 from m2pem.mission.events import Error, Escalation, Message, Signal
 from m2pem.suggestions import suggest_or
 
@@ -52,7 +52,7 @@ def read_roots(context: ReadingContext, definitions: etree._Element) -> list[etr
         elif name == "correlationProperty":
             read_property(context, element)
         elif name in _CHOREOGRAPHIES:
-            _refuse_choreography(context, element)
+            not_executed(context, element, "draw the mission as processes and collaborations")
         elif name not in ROOT_NAMES and name not in _DI:
             context.findings.warning(
                 element,
@@ -70,24 +70,22 @@ def _read_event_root(context: ReadingContext, element: etree._Element, name: str
     identifier = context.claim(element)
     read_children(context, element, identifier)
     context.declared_roots.add(identifier)
-    label = element.get("name", "")
-    line = context.findings.line(element)
+    head = context.head(element, identifier)
     if name == "signal":
         returned = element.get(M2PEM + "returned", "").strip()
         sent = _from_operator(context, element, identifier)
-        signal = Signal(identifier, label, line, sent, returned)
-        context.signals.setdefault(identifier, signal)
+        context.signals.setdefault(identifier, Signal(*head, sent, returned))
     elif name == "message":
         sent = _from_operator(context, element, identifier)
-        key = correlation_key(context, element, identifier)
-        message = Message(identifier, label, line, sent, key)
-        context.messages.setdefault(identifier, message)
+        subscription = (ZEEBE + "subscription", "correlationKey")
+        key = context.own_expression(element, identifier, "correlationKey", subscription)
+        context.messages.setdefault(identifier, Message(*head, sent, key))
     elif name == "error":
-        error = Error(identifier, label, line, element.get("errorCode") or identifier)
-        context.errors.setdefault(identifier, error)
+        code = element.get("errorCode") or identifier
+        context.errors.setdefault(identifier, Error(*head, code))
     else:
         code = element.get("escalationCode") or identifier
-        context.escalations.setdefault(identifier, Escalation(identifier, label, line, code))
+        context.escalations.setdefault(identifier, Escalation(*head, code))
 
 
 def _from_operator(context: ReadingContext, element: etree._Element, identifier: str) -> bool:
@@ -108,14 +106,3 @@ def _read_data_store(context: ReadingContext, element: etree._Element) -> None:
     read_children(context, element, identifier)
     key = element.get("name") or identifier
     context.data.setdefault(identifier, DataEnd(key, [element]))
-
-
-def _refuse_choreography(context: ReadingContext, element: etree._Element) -> None:
-    word = kind(element.tag)
-    context.findings.error(
-        element,
-        element.get("id", ""),
-        NOT_EXECUTED,
-        f"m2pem does not execute {a(word)} yet",
-        "draw the mission as processes and collaborations",
-    )

@@ -188,10 +188,9 @@ def _message(
 
 def _conditional(context: ReadingContext, found: Children) -> ConditionalEventDefinition | None:
     for element in found.of("condition"):
-        text = text_of(element)
         context.check_attributes(element, SHAPES[element.tag], found.id)
-        if text:
-            condition = context.expression(element, found.id, text, element.get("language"))
+        if text_of(element):
+            condition = context.expression_in(element, found.id)
             if condition is None:
                 return None
             return ConditionalEventDefinition(context.findings.line(found.element), condition)
@@ -244,46 +243,26 @@ def read_event(context: ReadingContext, element: etree._Element, container: Cont
     found = read_children(context, element, identifier)
     tag_name = local(element.tag)
     definitions = _definitions(context, found, tag_name, container)
-    name = element.get("name", "")
-    line = context.findings.line(element)
+    head = context.head(element, identifier)
     parallel = context.boolean(element, "parallelMultiple", False, identifier)
+    interrupting = True
     event: Event
     if tag_name == "startEvent":
         interrupting = context.boolean(element, "isInterrupting", True, identifier)
-        event = StartEvent(identifier, name, line, definitions, parallel, interrupting)
-        if not interrupting:
-            _no_error(context, element, event)
+        event = StartEvent(*head, definitions, parallel, interrupting)
     elif tag_name == "endEvent":
-        event = EndEvent(identifier, name, line, definitions)
+        event = EndEvent(*head, definitions)
     elif tag_name == "intermediateThrowEvent":
-        event = IntermediateThrowEvent(identifier, name, line, definitions)
+        event = IntermediateThrowEvent(*head, definitions)
     elif tag_name == "intermediateCatchEvent":
-        event = IntermediateCatchEvent(identifier, name, line, definitions, parallel)
+        event = IntermediateCatchEvent(*head, definitions, parallel)
     else:
-        event = _boundary(context, element, identifier, definitions, parallel)
-    read_data_flow(context, found, event)
-    return event
-
-
-def _boundary(
-    context: ReadingContext,
-    element: etree._Element,
-    identifier: str,
-    definitions: tuple[EventDefinition, ...],
-    parallel: bool,
-) -> BoundaryEvent:
-    interrupting = context.boolean(element, "cancelActivity", True, identifier)
-    event = BoundaryEvent(
-        identifier,
-        element.get("name", ""),
-        context.findings.line(element),
-        definitions,
-        parallel,
-        interrupting,
-    )
-    context.attachments.append((event, reference(element.get("attachedToRef", ""))))
+        interrupting = context.boolean(element, "cancelActivity", True, identifier)
+        event = BoundaryEvent(*head, definitions, parallel, interrupting)
+        context.attachments.append((event, reference(element.get("attachedToRef", ""))))
     if not interrupting:
         _no_error(context, element, event)
+    read_data_flow(context, found, event)
     return event
 
 

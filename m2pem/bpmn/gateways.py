@@ -30,10 +30,10 @@ def read_gateway(context: ReadingContext, element: etree._Element) -> Gateway:
     """A gateway of any kind."""
     identifier = context.claim(element)
     found = read_children(context, element, identifier)
-    name, line = element.get("name", ""), context.findings.line(element)
+    head = context.head(element, identifier)
     gateway: Gateway
     if element.tag == _COMPLEX:
-        gateway = ComplexGateway(identifier, name, line, _activation(context, found))
+        gateway = ComplexGateway(*head, _activation(context, found))
     elif element.tag == _EVENT_BASED:
         instantiate = context.boolean(element, "instantiate", False, identifier)
         parallel = element.get("eventGatewayType") == "Parallel"
@@ -45,20 +45,19 @@ def read_gateway(context: ReadingContext, element: etree._Element) -> Gateway:
                 "an event-based gateway that waits for all of its events (eventGatewayType="
                 '"Parallel") is allowed only where it begins the process',
             )
-        gateway = EventBasedGateway(identifier, name, line, instantiate, parallel)
+        gateway = EventBasedGateway(*head, instantiate, parallel)
     else:
-        gateway = _PLAIN[element.tag](identifier, name, line)
+        gateway = _PLAIN[element.tag](*head)
     default = element.get("default")
     if default:
-        context.defaults.append((gateway, reference(default), line))
+        context.defaults.append((gateway, reference(default), gateway.line))
     return gateway
 
 
 def _activation(context: ReadingContext, found: Children) -> Expression | None:
     for condition in found.of("activationCondition"):
-        text = text_of(condition)
-        if text:
-            return context.expression(condition, found.id, text, condition.get("language"))
+        if text_of(condition):
+            return context.expression_in(condition, found.id)
     context.findings.warning(
         found.element,
         found.id,

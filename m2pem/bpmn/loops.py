@@ -90,16 +90,6 @@ def read_loop(context: ReadingContext, found: Children, node: Activity) -> None:
     object.__setattr__(node, "loop", loop)
 
 
-def _expression(
-    context: ReadingContext, found: Children, name: str, node: Activity
-) -> Expression | None:
-    for each in found.of(name):
-        text = text_of(each)
-        if text:
-            return context.expression(each, node.id, text, each.get("language"))
-    return None
-
-
 # --- standard loops -----------------------------------------------------------------------------
 
 
@@ -115,7 +105,7 @@ def _standard_loop(
         what = f"loopMaximum='{text}' is no number of rounds"
         context.findings.error(element, node.id, LOOP_MAXIMUM, what)
     return StandardLoop(
-        _expression(context, found, "loopCondition", node),
+        context.first_expression(found.of("loopCondition"), node.id),
         context.boolean(element, "testBefore", False, node.id),
         maximum,
     )
@@ -146,7 +136,7 @@ def _multi_instance(
     behavior = _behavior(context, element, node)
     return MultiInstance(
         sequential=context.boolean(element, "isSequential", False, node.id),
-        cardinality=_expression(context, found, "loopCardinality", node),
+        cardinality=context.first_expression(found.of("loopCardinality"), node.id),
         collection=collection,
         item=_key(context, element, node, item or _data_item(context, found, "inputDataItem")),
         output_collection=_key(context, element, node, output_collection),
@@ -154,7 +144,7 @@ def _multi_instance(
             context, element, node, result or _data_item(context, found, "outputDataItem")
         ),
         output=output,
-        completion=_expression(context, found, "completionCondition", node),
+        completion=context.first_expression(found.of("completionCondition"), node.id),
         behavior=behavior,
         events=_events(context, activity, element, node, behavior),
         complex=_complex(context, found, node),
@@ -186,15 +176,10 @@ def _zeebe_output(
     """The key that an instance has for its output, and what is collected instead of it."""
     text = zeebe.get("outputElement", "")
     key = text.removeprefix("=").strip()
-    if not text or KEY.fullmatch(key):
-        return key.partition(".")[0], _nested(context, element, node, key)
-    return "", context.expression(element, node.id, text)
-
-
-def _nested(
-    context: ReadingContext, element: etree._Element, node: Activity, key: str
-) -> Expression | None:
-    return context.expression(element, node.id, key, "m2pem") if "." in key else None
+    if text and not KEY.fullmatch(key):
+        return "", context.expression(element, node.id, text)
+    nested = context.expression(element, node.id, key, "m2pem") if "." in key else None
+    return key.partition(".")[0], nested
 
 
 def _data_item(context: ReadingContext, found: Children, name: str) -> str:
@@ -279,7 +264,7 @@ def _complex(
     result = []
     for each in found.of("complexBehaviorDefinition"):
         definition = read_children(context, each, node.id)
-        condition = _expression(context, definition, "condition", node)
+        condition = context.first_expression(definition.of("condition"), node.id)
         events = definition.of("event")
         if not events or not definition.of("condition"):
             context.findings.error(
@@ -329,8 +314,7 @@ def _collection(
         for association in passed:
             for child in association.element:
                 if local(child.tag) == "transformation":
-                    text, language = text_of(child), child.get("language")
-                    return context.expression(child, pending.node.id, text, language)
+                    return context.expression_in(child, pending.node.id)
             key = next(_keys(context, association.source_refs), key)
     key = key or _named(context, pending, "loopDataInputRef", ref)
     return context.expression(pending.element, pending.node.id, key, "m2pem") if key else None

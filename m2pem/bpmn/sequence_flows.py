@@ -66,9 +66,7 @@ def read_flow(context: ReadingContext, element: etree._Element, container: Conta
             order.check(context, element, child, _SHAPE, identifier)
             if child.tag == _CONDITION:
                 condition = _condition(context, child, identifier)
-    flow = SequenceFlow(
-        identifier, element.get("name", ""), context.findings.line(element), condition
-    )
+    flow = SequenceFlow(*context.head(element, identifier), condition)
     context.flows.append(
         FlowEnds(
             flow,
@@ -83,8 +81,7 @@ def _condition(
     context: ReadingContext, element: etree._Element, identifier: str
 ) -> Expression | None:
     context.check_attributes(element, SHAPES[_CONDITION], identifier)
-    text = text_of(element)
-    if not text:
+    if not text_of(element):
         context.findings.warning(
             element,
             identifier,
@@ -92,7 +89,7 @@ def _condition(
             "the condition is empty; the flow counts as one without a condition",
         )
         return None
-    return context.expression(element, identifier, text, element.get("language"))
+    return context.expression_in(element, identifier)
 
 
 _set = object.__setattr__

@@ -12,7 +12,7 @@ from m2pem.bpmn.activities import TASKS, read_activity_attributes
 from m2pem.bpmn.children import EXTENSIONS, ChildOrder, Children, read_children
 from m2pem.bpmn.collaboration import read_lanes, read_subscription
 from m2pem.bpmn.compensation import ASSOCIATION, read_association
-from m2pem.bpmn.context import ReadingContext, text_of
+from m2pem.bpmn.context import ReadingContext
 from m2pem.bpmn.data import read_data, read_data_flow
 from m2pem.bpmn.events import read_event
 from m2pem.bpmn.gateways import GATEWAYS, read_gateway
@@ -21,6 +21,7 @@ from m2pem.bpmn.loops import LOOPS, read_loop
 from m2pem.bpmn.rules.attributes import BAD_VALUE, UNKNOWN_ELEMENT
 from m2pem.bpmn.rules.files import NOT_EXECUTED, TOO_DEEP
 from m2pem.bpmn.rules.subprocesses import AD_HOC_ORDERING
+from m2pem.bpmn.rules.tree import EVENTS, SUBPROCESSES, names
 from m2pem.bpmn.schema import FLOW_ELEMENT_NAMES, SHAPES, Shape
 from m2pem.bpmn.sequence_flows import SEQUENCE_FLOW, read_flow
 from m2pem.bpmn.xml import BPMN, M2PEM, ZEEBE, a, kind, local
@@ -35,21 +36,8 @@ from m2pem.mission.elements import (
     SubProcess,
     Transaction,
 )
-from m2pem.mission.expression import Expression
 from m2pem.suggestions import suggest_or
 
-SUBPROCESSES = frozenset(BPMN + name for name in ("subProcess", "transaction", "adHocSubProcess"))
-
-_EVENTS = frozenset(
-    BPMN + name
-    for name in (
-        "startEvent",
-        "endEvent",
-        "intermediateCatchEvent",
-        "intermediateThrowEvent",
-        "boundaryEvent",
-    )
-)
 _REFUSED = {
     "choreographyTask": "draw the mission as processes",
     "callChoreography": "draw the mission as processes",
@@ -64,7 +52,7 @@ def read_node(
 ) -> FlowNode | None:
     """A flow node with all but its flows; None when the tag is that of none."""
     tag = element.tag
-    if tag in _EVENTS:
+    if tag in EVENTS:
         return read_event(context, element, container)
     if tag in GATEWAYS:
         return read_gateway(context, element)
@@ -74,7 +62,7 @@ def read_node(
     identifier = context.claim(element)
     node: Activity
     if task is None:
-        # Its children are read with its content, by containers.py.
+        # Its children are read with its content, by `read_process`.
         node = _subprocess(context, element, identifier)
     else:
         found = read_children(context, element, identifier)
@@ -90,9 +78,8 @@ def _refuse(context: ReadingContext, element: etree._Element) -> FlowNode | None
     instead = _REFUSED.get(local(element.tag))
     if instead is None:
         return None
-    not_executed(context, element, element.get("id", ""), kind(element.tag), instead)
-    identifier = context.claim(element)
-    return FlowNode(identifier, element.get("name", ""), context.findings.line(element))
+    not_executed(context, element, instead)
+    return FlowNode(*context.head(element, context.claim(element)))
 
 
 def _subprocess(context: ReadingContext, element: etree._Element, identifier: str) -> SubProcess:
@@ -107,32 +94,25 @@ def _subprocess(context: ReadingContext, element: etree._Element, identifier: st
         )
     if element.tag == BPMN + "adHocSubProcess":
         return read_ad_hoc(context, element, identifier)
-    name, line = element.get("name", ""), context.findings.line(element)
-    if element.tag == BPMN + "transaction":
-        return Transaction(identifier, name, line, triggered)
-    return SubProcess(identifier, name, line, triggered)
+    made = Transaction if element.tag == BPMN + "transaction" else SubProcess
+    return made(*context.head(element, identifier), triggered)
 
 
-def not_executed(
-    context: ReadingContext, element: etree._Element, identifier: str, what: str, instead: str
-) -> None:
+def not_executed(context: ReadingContext, element: etree._Element, instead: str) -> None:
     """Report an element of BPMN that m2pem does not execute."""
-    context.findings.error(
-        element, identifier, NOT_EXECUTED, f"m2pem does not execute {a(what)} yet", instead
-    )
+    what = f"m2pem does not execute {a(kind(element.tag))} yet"
+    context.findings.error(element, element.get("id", ""), NOT_EXECUTED, what, instead)
 
 
 MAX_DEPTH = 1000
 """How deep subprocesses may nest in a process."""
 
-_DATA = frozenset(
-    BPMN + name for name in ("dataObject", "dataObjectReference", "dataStoreReference", "property")
-)
+_DATA = names("dataObject dataObjectReference dataStoreReference property")
 _LANES = BPMN + "laneSet"
 _SUBSCRIPTION = BPMN + "correlationSubscription"
 _COMPLETION = BPMN + "completionCondition"
-_DATA_FLOW = ("ioSpecification", "dataInputAssociation", "dataOutputAssociation")
-_MARKS = frozenset((*LOOPS, EXTENSIONS, *(BPMN + name for name in _DATA_FLOW)))
+_DATA_FLOW = names("ioSpecification dataInputAssociation dataOutputAssociation")
+_MARKS = frozenset((*LOOPS, EXTENSIONS, *_DATA_FLOW))
 
 
 @dataclass(slots=True)
@@ -167,9 +147,7 @@ def read_process(context: ReadingContext, element: etree._Element) -> None:
     """Read a process and all that it contains."""
     identifier = context.claim(element)
     process = Process(
-        identifier,
-        element.get("name", ""),
-        context.findings.line(element),
+        *context.head(element, identifier),
         context.boolean(element, "isExecutable", False, identifier),
         on_error=_on_error(context, element, identifier),
         incident_role=(element.get(M2PEM + "incidentRole") or "").strip(),
@@ -224,30 +202,21 @@ def _read_child(
         frame.order.last = tag
     if tag == SEQUENCE_FLOW:
         read_flow(context, child, container)
-        return None
-    if tag in _DATA:
+    elif tag in _DATA:
         read_data(context, child, container)
-        return None
-    if tag == ASSOCIATION:
+    elif tag == ASSOCIATION:
         read_association(context, child)
-        return None
-    if tag == _LANES:
+    elif tag == _LANES:
         read_lanes(context, child, process)
-        return None
-    if tag in _MARKS:
+    elif tag in _MARKS:
         frame.marks.children.setdefault(tag, []).append(child)
-        return None
-    if tag == _SUBSCRIPTION:
+    elif tag == _SUBSCRIPTION:
         read_subscription(context, child, process)
-        return None
-    if tag == _COMPLETION:
-        return None
-    node = read_node(context, child, container)
-    if node is None:
-        return None
-    context.nodes.append(node)
-    context.containers.append(container)
-    return node if isinstance(node, SubProcess) else None
+    elif tag != _COMPLETION and (node := read_node(context, child, container)) is not None:
+        context.nodes.append(node)
+        context.containers.append(container)
+        return node if isinstance(node, SubProcess) else None
+    return None
 
 
 def _refuse_unknown(context: ReadingContext, frame: _Frame, child: etree._Element) -> None:
@@ -273,33 +242,11 @@ def read_ad_hoc(
         )
         ordering = AdHocOrdering.PARALLEL.value
     return AdHocSubProcess(
-        identifier,
-        element.get("name", ""),
-        context.findings.line(element),
+        *context.head(element, identifier),
         ordering=AdHocOrdering(ordering),
-        completion=_completion(context, element, identifier),
+        completion=context.first_expression(element.iterchildren(_COMPLETION), identifier),
         cancel_remaining=context.boolean(element, "cancelRemainingInstances", True, identifier),
-        active_elements=_active_elements(context, element, identifier),
+        active_elements=context.own_expression(
+            element, identifier, "activeElements", (ZEEBE + "adHoc", "activeElementsCollection")
+        ),
     )
-
-
-def _completion(
-    context: ReadingContext, element: etree._Element, identifier: str
-) -> Expression | None:
-    for condition in element.iterchildren(BPMN + "completionCondition"):
-        text = text_of(condition)
-        if text:
-            return context.expression(condition, identifier, text, condition.get("language"))
-    return None
-
-
-def _active_elements(
-    context: ReadingContext, element: etree._Element, identifier: str
-) -> Expression | None:
-    text = element.get(M2PEM + "activeElements", "")
-    where = element
-    for extensions in element.iterchildren(BPMN + "extensionElements"):
-        for each in extensions.iterchildren(ZEEBE + "adHoc"):
-            text = text or each.get("activeElementsCollection", "")
-            where = each
-    return context.expression(where, identifier, text) if text.strip() else None

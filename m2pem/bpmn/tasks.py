@@ -64,12 +64,12 @@ _JOB = ZEEBE + "taskDefinition"
 
 def read_plain_task(context: ReadingContext, found: Children) -> Task:
     """A task without a type."""
-    return Task(found.id, found.element.get("name", ""), context.findings.line(found.element))
+    return Task(*context.head(found.element, found.id))
 
 
 def read_manual_task(context: ReadingContext, found: Children) -> ManualTask:
     """A manual task."""
-    return ManualTask(found.id, found.element.get("name", ""), context.findings.line(found.element))
+    return ManualTask(*context.head(found.element, found.id))
 
 
 def read_service_task(context: ReadingContext, found: Children) -> ServiceTask:
@@ -106,8 +106,7 @@ def _service_task(context: ReadingContext, found: Children, task: type[Serving])
             f"the {kind(found.element.tag)} names no service{_bound_elsewhere(found)}; it does "
             "nothing",
         )
-    line = context.findings.line(found.element)
-    return task(found.id, found.element.get("name", ""), line, call, behavior)
+    return task(*context.head(found.element, found.id), call, behavior)
 
 
 def _service_call(
@@ -172,22 +171,20 @@ def read_send_task(context: ReadingContext, found: Children) -> SendTask:
             "the task has both m2pem:behavior and a message to send",
             "draw a task for each",
         )
-    name = found.element.get("name", "")
-    line = context.findings.line(found.element)
-    task = SendTask(found.id, name, line, message, behavior)
+    head = context.head(found.element, found.id)
+    task = SendTask(*head, message, behavior)
     if not carried:
-        context.message_uses.append(MessageUse(task, found.id, name, line, False, message))
+        context.message_uses.append(MessageUse(task, *head, False, message))
     return task
 
 
 def read_receive_task(context: ReadingContext, found: Children) -> ReceiveTask:
     """A receive task."""
     message = _message(context, found)
-    name = found.element.get("name", "")
-    line = context.findings.line(found.element)
+    head = context.head(found.element, found.id)
     instantiate = context.boolean(found.element, "instantiate", False, found.id)
-    task = ReceiveTask(found.id, name, line, message, instantiate)
-    context.message_uses.append(MessageUse(task, found.id, name, line, True, message))
+    task = ReceiveTask(*head, message, instantiate)
+    context.message_uses.append(MessageUse(task, *head, True, message))
     return task
 
 
@@ -204,12 +201,11 @@ _DONE = (Decision("done", "Done"),)
 
 def read_user_task(context: ReadingContext, found: Children) -> UserTask:
     """A user task; its prompt follows in `resolve_prompts`."""
-    element = found.element
-    task = UserTask(found.id, element.get("name", ""), context.findings.line(element))
+    task = UserTask(*context.head(found.element, found.id))
     context.prompts.append(
         PendingPrompt(
             task,
-            element,
+            found.element,
             own_extensions(found, _USED),
             found.documentation(),
             [association(each) for each in found.of("dataInputAssociation")],
@@ -370,8 +366,7 @@ def read_script_task(context: ReadingContext, found: Children) -> ScriptTask:
         context.findings.warning(
             found.element, found.id, EMPTY_SCRIPT, "the script task has no script; it does nothing"
         )
-    line = context.findings.line(found.element)
-    return ScriptTask(found.id, found.element.get("name", ""), line, behavior, statements)
+    return ScriptTask(*context.head(found.element, found.id), behavior, statements)
 
 
 def read_carried(
@@ -406,7 +401,14 @@ def _script(
         return None, None
     if len(script):
         if form == "m2pem":
-            _form_differs(context, found, "XML")
+            said = _language(found)
+            context.findings.error(
+                found.element,
+                found.id,
+                SCRIPT_LANGUAGE,
+                f"the script says {said}='{written}', but is XML",
+                f"correct its {said}",
+            )
         return _child_behavior(context, found, script), None
     if form in _XML_FORMATS or (not form and text.lstrip().startswith("<")):
         return _text_behavior(context, found, script, text), None
@@ -427,17 +429,6 @@ def _script(
 def _language(found: Children) -> str:
     """Return the name of the attribute with the language (BPMN 2.0.2, tables 10.17, 10.18)."""
     return "scriptLanguage" if found.element.tag == GLOBAL_SCRIPT else "scriptFormat"
-
-
-def _form_differs(context: ReadingContext, found: Children, actual: str) -> None:
-    context.findings.error(
-        found.element,
-        found.id,
-        SCRIPT_LANGUAGE,
-        f"the script says {_language(found)}='{found.element.get(_language(found))}', but is "
-        f"{actual}",
-        f"correct its {_language(found)}",
-    )
 
 
 def _child_behavior(
