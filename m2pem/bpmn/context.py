@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from typing import Any
 
 from lxml import etree
 
@@ -191,6 +192,11 @@ class ReadingContext:
     associations: list[Drawn] = field(default_factory=list)
     broken: set[Container] = field(default_factory=set)
     """Containers with an error in their graph; further checks of it would mislead."""
+
+    @property
+    def roots(self) -> tuple[dict[str, Any], ...]:
+        """The signals, messages, errors and escalations, by id."""
+        return self.signals, self.messages, self.errors, self.escalations
 
     def claim(self, element: etree._Element) -> str:
         """Return the element's id, and report one that is taken. An element without one gets one.

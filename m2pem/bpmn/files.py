@@ -39,7 +39,7 @@ from m2pem.mission.elements import (
     SequenceFlow,
     SubProcess,
 )
-from m2pem.mission.events import CorrelationProperty, Message, RootElement, Signal
+from m2pem.mission.events import CorrelationProperty, Message, Signal
 from m2pem.mission.library import Library, LibraryError, Question, Source
 from m2pem.mission.mission import Mission
 from m2pem.suggestions import suggest_or
@@ -82,7 +82,7 @@ class Part:
         context = self.context
         self._drawn = read_roots(context, self.document.root)
         self._drawn_ids = frozenset(element.get("id") for element in self._drawn)
-        for table in (context.signals, context.messages, context.errors, context.escalations):
+        for table in context.roots:
             for root in table.values():
                 object.__setattr__(root, "file", self.name)
 
@@ -268,14 +268,9 @@ class Files:
 
 def _share_roots(importing: ReadingContext, imported: ReadingContext) -> None:
     """Signals, messages, errors and escalations may be referred to where they are imported."""
-    for identifier, signal in imported.signals.items():
-        importing.signals.setdefault(identifier, signal)
-    for identifier, message in imported.messages.items():
-        importing.messages.setdefault(identifier, message)
-    for identifier, error in imported.errors.items():
-        importing.errors.setdefault(identifier, error)
-    for identifier, escalation in imported.escalations.items():
-        importing.escalations.setdefault(identifier, escalation)
+    for own, others in zip(importing.roots, imported.roots, strict=True):
+        for identifier, root in others.items():
+            own.setdefault(identifier, root)
     importing.declared_roots |= imported.declared_roots
 
 
@@ -376,7 +371,6 @@ def _look(files: Files, part: Part, name: str, namespace: str) -> Part | None:
     return part if part.has(name) else None  # editors write prefixes that mean nothing
 
 
-Root = TypeVar("Root", bound=RootElement)
 T = TypeVar("T")
 Operated = TypeVar("Operated", Signal, Message)
 
@@ -443,19 +437,13 @@ def _qualify(part: Part) -> None:
         _set(element, "id", f"{part.qualifier}:{element.id}")
     for process in context.processes:
         _set(process, "file", part.name)
-    _qualify_roots(part, context.signals)
-    _qualify_roots(part, context.messages)
-    _qualify_roots(part, context.errors)
-    _qualify_roots(part, context.escalations)
-
-
-def _qualify_roots(part: Part, table: dict[str, Root]) -> None:
-    for identifier, root in list(table.items()):
-        if not root.file:
-            _set(root, "file", part.name)
-        if identifier not in part.context.declared_roots:
-            _set(root, "id", f"{part.qualifier}:{identifier}")
-            table[root.id] = table.pop(identifier)
+    for table in context.roots:
+        for identifier, root in list(table.items()):
+            if not root.file:
+                _set(root, "file", part.name)
+            if identifier not in context.declared_roots:
+                _set(root, "id", f"{part.qualifier}:{identifier}")
+                table[root.id] = table.pop(identifier)
 
 
 def _elements(

@@ -2,8 +2,8 @@
 
 from lxml import etree
 
-from m2pem.bpmn.rules.rule import error, warning
-from m2pem.bpmn.rules.tree import Checks, Tree, children, has, is_true, names, texts
+from m2pem.bpmn.rules.rule import Rule, error, warning
+from m2pem.bpmn.rules.tree import Check, Checks, Tree, children, has, is_true, names, texts
 
 BAD_SCRIPT = error(
     202,
@@ -145,14 +145,12 @@ ROLE_EXPRESSION = warning(
 )
 
 
-def _resource(tree: Tree, element: etree._Element) -> None:
-    if not element.get("name"):
-        tree.report(RESOURCE_NAME, element)
+def _has_name(rule: Rule) -> Check:
+    def check(tree: Tree, element: etree._Element) -> None:
+        if not element.get("name"):
+            tree.report(rule, element)
 
-
-def _parameter(tree: Tree, element: etree._Element) -> None:
-    if not element.get("name"):
-        tree.report(RESOURCE_PARAMETER_NAME, element)
+    return check
 
 
 def _interface(tree: Tree, element: etree._Element) -> None:
@@ -191,8 +189,8 @@ def _expression(tree: Tree, element: etree._Element) -> None:
 
 SERVICES = Checks(
     {
-        "resource": _resource,
-        "resourceParameter": _parameter,
+        "resource": _has_name(RESOURCE_NAME),
+        "resourceParameter": _has_name(RESOURCE_PARAMETER_NAME),
         "interface": _interface,
         "operation": _operation,
         "resourceRole": _role,
@@ -235,29 +233,30 @@ RECEIVE_BEGINS = error(
 )
 
 
-def _service(tree: Tree, element: etree._Element) -> None:
-    for specification in children(element, "ioSpecification"):
-        inputs = list(children(specification, "inputSet"))
-        if len(inputs) > 1 or len(list(children(specification, "outputSet"))) > 1:
-            tree.report(SERVICE_DATA, element)
+def _at_most_one(rule: Rule, *names: str) -> Check:
+    """A task's ioSpecification has no more than one element of each of the names."""
+
+    def check(tree: Tree, element: etree._Element) -> None:
+        for specification in children(element, "ioSpecification"):
+            if any(len(list(children(specification, name))) > 1 for name in names):
+                tree.report(rule, element)
+
+    return check
 
 
-def _send(tree: Tree, element: etree._Element) -> None:
-    for specification in children(element, "ioSpecification"):
-        inputs = list(children(specification, "dataInput"))
-        if len(inputs) > 1 or len(list(children(specification, "inputSet"))) > 1:
-            tree.report(SEND_DATA, element)
+_receives = _at_most_one(RECEIVE_DATA, "dataOutput", "outputSet")
 
 
 def _receive(tree: Tree, element: etree._Element) -> None:
-    for specification in children(element, "ioSpecification"):
-        outputs = list(children(specification, "dataOutput"))
-        if len(outputs) > 1 or len(list(children(specification, "outputSet"))) > 1:
-            tree.report(RECEIVE_DATA, element)
+    _receives(tree, element)
     if is_true(element, "instantiate") and tree.into(element):
         tree.report(RECEIVE_BEGINS, element)
 
 
 CHECKS = Checks(
-    {"serviceTask": _service, "sendTask": _send, "receiveTask": _receive},
+    {
+        "serviceTask": _at_most_one(SERVICE_DATA, "inputSet", "outputSet"),
+        "sendTask": _at_most_one(SEND_DATA, "dataInput", "inputSet"),
+        "receiveTask": _receive,
+    },
 )

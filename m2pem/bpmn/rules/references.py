@@ -209,18 +209,11 @@ _CHILDREN: list[tuple[str, frozenset[str], Rule]] = [
 ]
 
 
-def _attribute(attribute: str, tags: frozenset[str], rule: Rule) -> Check:
+def _names(tags: frozenset[str], rule: Rule, attribute: str = "") -> Check:
+    """An attribute of an element, or else its text, names something with one of the tags."""
+
     def check(tree: Tree, element: etree._Element) -> None:
-        name = element.get(attribute)
-        if name and tree.leads_nowhere(element, name, tags):
-            tree.report(rule, element, f"'{name}'")
-
-    return check
-
-
-def _child(tags: frozenset[str], rule: Rule) -> Check:
-    def check(tree: Tree, element: etree._Element) -> None:
-        name = (element.text or "").strip()
+        name = element.get(attribute) if attribute else (element.text or "").strip()
         if name and tree.leads_nowhere(element, name, tags):
             tree.report(rule, element, f"'{name}'")
 
@@ -236,8 +229,8 @@ def _partner(tree: Tree, element: etree._Element) -> None:
 
 CHECKS = Checks(
     {
-        **{owner: _attribute(name, tags, rule) for owner, name, tags, rule in _ATTRIBUTES},
-        **{name: _child(tags, rule) for name, tags, rule in _CHILDREN},
+        **{owner: _names(tags, rule, name) for owner, name, tags, rule in _ATTRIBUTES},
+        **{name: _names(tags, rule) for name, tags, rule in _CHILDREN},
         "partnerEntity": _partner,
         "partnerRole": _partner,
     },

@@ -3,7 +3,7 @@
 Everything is indexed at most once, and only when a rule asks for it: most files need little.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeAlias
@@ -58,6 +58,14 @@ def named(text: str) -> str:
     return text.strip().rpartition(":")[2]
 
 
+def _by_reference(elements: Iterable[etree._Element], *attributes: str) -> Flows:
+    found: dict[str, list[etree._Element]] = {}
+    for element in elements:
+        for attribute in attributes:
+            found.setdefault(named(element.get(attribute, "")), []).append(element)
+    return found
+
+
 class Tree:
     """The tree, and the findings about it."""
 
@@ -99,38 +107,30 @@ class Tree:
         return list(self.root.iter(BPMN + "sequenceFlow"))
 
     @cached_property
-    def _ends(self) -> tuple[Flows, Flows]:
-        into: dict[str, list[etree._Element]] = {}
-        out: dict[str, list[etree._Element]] = {}
-        for flow in self.flows:
-            out.setdefault(named(flow.get("sourceRef", "")), []).append(flow)
-            into.setdefault(named(flow.get("targetRef", "")), []).append(flow)
-        return into, out
+    def _into(self) -> Flows:
+        return _by_reference(self.flows, "targetRef")
+
+    @cached_property
+    def _out(self) -> Flows:
+        return _by_reference(self.flows, "sourceRef")
 
     def into(self, element: etree._Element) -> list[etree._Element]:
         """The sequence flows that name the element as their target."""
-        return self._ends[0].get(element.get("id") or _NOTHING, [])
+        return self._into.get(element.get("id") or _NOTHING, [])
 
     def out(self, element: etree._Element) -> list[etree._Element]:
         """The sequence flows that name the element as their source."""
-        return self._ends[1].get(element.get("id") or _NOTHING, [])
+        return self._out.get(element.get("id") or _NOTHING, [])
 
     @cached_property
     def boundary(self) -> Flows:
         """Boundary events by the id of what they are attached to."""
-        found: dict[str, list[etree._Element]] = {}
-        for event in self.root.iter(BPMN + "boundaryEvent"):
-            found.setdefault(named(event.get("attachedToRef", "")), []).append(event)
-        return found
+        return _by_reference(self.root.iter(BPMN + "boundaryEvent"), "attachedToRef")
 
     @cached_property
     def associations(self) -> Flows:
         """Associations by the id of either end."""
-        found: dict[str, list[etree._Element]] = {}
-        for association in self.root.iter(BPMN + "association"):
-            for attribute in ("sourceRef", "targetRef"):
-                found.setdefault(named(association.get(attribute, "")), []).append(association)
-        return found
+        return _by_reference(self.root.iter(BPMN + "association"), "sourceRef", "targetRef")
 
     # --- references -----------------------------------------------------------------------------
 

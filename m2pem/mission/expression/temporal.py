@@ -22,8 +22,6 @@ NOW = "now()"
 """The name under which an expression reads the time of the input that is decided, an ISO 8601 text.
 No data has it: to what only reads data, it is a name whose value is not known."""
 
-_TO_DATA = (str, int, float, bool, type(None), dict)
-
 
 @dataclass(frozen=True, slots=True, order=True)
 class Months:
