@@ -195,9 +195,8 @@ class _Writer:
             shape.set("isExpanded", "true" if box.expanded else "false")
         if tag(element) == "exclusiveGateway":
             shape.set("isMarkerVisible", "true")
-        bounds = Bounds(box.x, box.y, box.width, box.height)
-        _bounds(shape, bounds)
-        symbol = Shape(name, tag(element), name_of_symbol(element), bounds)
+        _bounds(shape, box)
+        symbol = Shape(name, tag(element), name_of_symbol(element), box)
         if has_label(symbol):
             label = label_of(symbol).bounds
             if symbol.kind == "boundaryEvent":

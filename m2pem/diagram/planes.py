@@ -161,12 +161,11 @@ class _File:
         traits = set(traits_of(element)) | {Trait.MARKED}
         if box.expanded or element.get("processRef"):
             traits.add(Trait.EXPANDED)
-        bounds = Bounds(box.x, box.y, box.width, box.height)
         text = name_of_symbol(element)
         if is_node(element) and not text and not tag(element).endswith("Gateway"):
             text = name
         kind = tag(element)
-        return Shape(name, kind, text, bounds, None, definitions_of(element), frozenset(traits))
+        return Shape(name, kind, text, box, None, definitions_of(element), frozenset(traits))
 
     def _painted(self, shapes: Iterable[Shape]) -> tuple[Shape, ...]:
         """What contains others comes first, what lies upon others last."""
@@ -228,6 +227,11 @@ def _number(element: Element, name: str) -> float:
 _LOOPS = {
     "standardLoopCharacteristics": Trait.LOOP,
     "multiInstanceLoopCharacteristics": Trait.PARALLEL_INSTANCES,
+}
+_DATA = {
+    "dataInput": (Trait.INPUT,),
+    "dataOutput": (Trait.OUTPUT,),
+    "dataObjectReference": (),
 }
 _TRUE = ("true", "1")
 _THROWING = ("endEvent", "intermediateThrowEvent")
@@ -304,22 +308,16 @@ def traits_of_flow(flow: Element, source: Element | None) -> frozenset[Trait]:
 
 
 def _of_data(element: Element, kind: str) -> set[Trait]:
-    if kind == "dataInput":
-        found = {Trait.INPUT}
-    elif kind == "dataOutput":
-        found = {Trait.OUTPUT}
-    elif kind not in ("dataObjectReference", "participant"):
+    if kind == "participant":
+        several = next(children(element, "participantMultiplicity"), None) is not None
+        return {Trait.PARALLEL_INSTANCES} if several else set()
+    if kind not in _DATA:
         return set()
-    else:
-        found = set()
+    found = {*_DATA[kind]}
     of = element
     if kind == "dataObjectReference":
         wanted = element.get("dataObjectRef")
         of = next((e for e in _siblings(element) if e.get("id") == wanted), element)
-    if kind == "participant":
-        return (
-            {Trait.PARALLEL_INSTANCES} if [*children(element, "participantMultiplicity")] else set()
-        )
     if flag(of, "isCollection"):
         found.add(Trait.COLLECTION)
     return found

@@ -394,7 +394,6 @@ def _markers(shape: Shape) -> list[Icon]:
     return found
 
 
-_SIZE = 12
 _HEADER = 30
 
 
@@ -403,9 +402,9 @@ def draw_pool(to: Group, shape: Shape, style: Style) -> None:
     width, height = shape.bounds.width, shape.bounds.height
     to.rectangle(0, 0, width, height, stroke=style.stroke, fill=style.fill, stroke_width=1.5)
     if Trait.EXPANDED not in shape.traits:
-        lines = wrapped(shape.name, width - 20, _SIZE)
-        tall = len(lines) * _SIZE * LINE_HEIGHT
-        to.text(lines, width / 2, (height - tall) / 2, _SIZE, fill=style.text)
+        lines = wrapped(shape.name, width - 20, SIZE)
+        tall = len(lines) * SIZE * LINE_HEIGHT
+        to.text(lines, width / 2, (height - tall) / 2, SIZE, fill=style.text)
     elif Trait.VERTICAL in shape.traits:
         to.path(f"M0 {_HEADER}H{width:g}", stroke=style.stroke, stroke_width=1.5)
         _header(to, shape, style)
@@ -425,15 +424,15 @@ def draw_lane(to: Group, shape: Shape, style: Style) -> None:
 
 def _header(to: Group, shape: Shape, style: Style) -> None:
     width, height = shape.bounds.width, shape.bounds.height
-    middle = (_HEADER - _SIZE) / 2 - 1
+    middle = (_HEADER - SIZE) / 2 - 1
     if Trait.VERTICAL in shape.traits:
-        to.text([cut(shape.name, width - 10, _SIZE)], width / 2, middle, _SIZE, fill=style.text)
+        to.text([cut(shape.name, width - 10, SIZE)], width / 2, middle, SIZE, fill=style.text)
         return
     turned = to.group()
     turned.element.set("transform", f"translate(0 {height:g}) rotate(-90)")
-    lines = wrapped(shape.name, height - 10, _SIZE, 2)
-    top = (_HEADER - len(lines) * _SIZE * LINE_HEIGHT) / 2
-    turned.text(lines, height / 2, top, _SIZE, fill=style.text)
+    lines = wrapped(shape.name, height - 10, SIZE, 2)
+    top = (_HEADER - len(lines) * SIZE * LINE_HEIGHT) / 2
+    turned.text(lines, height / 2, top, SIZE, fill=style.text)
 
 
 def draw_data(to: Group, shape: Shape, style: Style) -> None:
@@ -481,9 +480,9 @@ def draw_annotation(to: Group, shape: Shape, style: Style) -> None:
     """A text behind a bracket."""
     width, height = shape.bounds.width, shape.bounds.height
     to.path(f"M10 0H0V{height:g}H10", stroke=style.stroke, fill="none", stroke_width=1.5)
-    most = max(int((height - 6) // (_SIZE * LINE_HEIGHT)), 1)
-    lines = wrapped(shape.name, width - 10, _SIZE, most)
-    to.text(lines, 6, 5, _SIZE, fill=style.text, text_anchor="start")
+    most = max(int((height - 6) // (SIZE * LINE_HEIGHT)), 1)
+    lines = wrapped(shape.name, width - 10, SIZE, most)
+    to.text(lines, 6, 5, SIZE, fill=style.text, text_anchor="start")
 
 
 def draw_group(to: Group, shape: Shape, style: Style) -> None:

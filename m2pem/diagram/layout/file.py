@@ -1,6 +1,7 @@
 """Lays out a whole file: one process, or a collaboration's pools one below the other."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 from lxml import etree
 
@@ -9,7 +10,6 @@ from m2pem.diagram.layout.model import (
     Block,
     Box,
     Element,
-    Point,
     children,
     data_lines,
     flow_nodes,
@@ -19,6 +19,7 @@ from m2pem.diagram.layout.model import (
     tag,
 )
 from m2pem.diagram.layout.process import lay_out
+from m2pem.diagram.picture import Point
 
 _HEADER = 30
 _CLOSED = 60  # the height of a pool that shows no process
@@ -75,10 +76,10 @@ def lay_out_pools(collaboration: Element, processes: dict[str, Element]) -> Bloc
     block = Block(width=width + _HEADER)
     for pool in pools:
         inside = insides.get(name_of(pool))
-        lanes = [] if inside is None else _lanes(processes[referred_id(pool.get("processRef"))])
-        for lane in lanes:
-            assert inside is not None
-            inside.boxes[lane].width = width - inside.boxes[lane].x
+        if inside is not None:
+            for lane in model.lanes(processes[referred_id(pool.get("processRef"))]).depth:
+                box = inside.boxes[lane]
+                inside.boxes[lane] = replace(box, width=width - box.x)
         height = max(inside.height if inside is not None else 0, _CLOSED)
         block.boxes[name_of(pool)] = Box(0, block.height, block.width, height, horizontal=True)
         if inside is not None:
@@ -90,10 +91,6 @@ def lay_out_pools(collaboration: Element, processes: dict[str, Element]) -> Bloc
     return block
 
 
-def _lanes(process: Element) -> list[str]:
-    return [*model.lanes(process).depth]
-
-
 def _message(flow: Element, number: int, block: Block, pools: list[Element]) -> list[Point]:
     source, target = referred_id(flow.get("sourceRef")), referred_id(flow.get("targetRef"))
     for end in (source, target):
@@ -102,8 +99,8 @@ def _message(flow: Element, number: int, block: Block, pools: list[Element]) -> 
     a, b = block.boxes[source], block.boxes[target]
     closed = {name_of(pool) for pool in pools if tag(pool) == "participant"}
     shift = _TRACK * (number % 3 - 1)
-    x1 = (b if source in closed else a).middle[0] + shift
-    x2 = (a if target in closed else b).middle[0] + shift
+    x1 = (b if source in closed else a).centre[0] + shift
+    x2 = (a if target in closed else b).centre[0] + shift
     down = a.y < b.y
     start, end_y = (a.bottom, b.y) if down else (a.y, b.bottom)
     upper = next(
@@ -145,7 +142,7 @@ def _lines(within: Element) -> Iterator[tuple[str, str, str]]:
 
 def _middle(block: Block, name: str) -> Point | None:
     if name in block.boxes:
-        return block.boxes[name].middle
+        return block.boxes[name].centre
     points = block.lines.get(name)
     if not points:
         return None

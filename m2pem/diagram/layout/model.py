@@ -1,9 +1,11 @@
 """What of a BPMN file has a symbol or a line, and where a layout puts it."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from lxml import etree
+
+from m2pem.diagram.picture import Bounds, Point
 
 BPMN = "http://www.omg.org/spec/BPMN/20100524/MODEL"
 
@@ -122,34 +124,12 @@ def lanes(process: Element) -> LaneTree:
     return LaneTree(tuple(leaves), depth, within, of_node)
 
 
-Point = tuple[float, float]
+@dataclass(frozen=True, slots=True)
+class Box(Bounds):
+    """A symbol's place, in the diagram's units; y grows downwards."""
 
-
-@dataclass(slots=True)
-class Box:
-    """In the diagram's units; y grows downwards."""
-
-    x: float
-    y: float
-    width: float
-    height: float
-    expanded: bool | None = None
+    expanded: bool = False
     horizontal: bool = False
-
-    @property
-    def middle(self) -> Point:
-        """Its centre."""
-        return (self.x + self.width / 2, self.y + self.height / 2)
-
-    @property
-    def right(self) -> float:
-        """Its right side."""
-        return self.x + self.width
-
-    @property
-    def bottom(self) -> float:
-        """Its lower side."""
-        return self.y + self.height
 
 
 @dataclass(slots=True)
@@ -164,8 +144,6 @@ class Block:
     def put(self, other: "Block", x: float, y: float) -> None:
         """Take in all that is in `other`, moved by that much."""
         for name, box in other.boxes.items():
-            box.x += x
-            box.y += y
-            self.boxes[name] = box
+            self.boxes[name] = replace(box, x=box.x + x, y=box.y + y)
         for name, points in other.lines.items():
             self.lines[name] = [(px + x, py + y) for px, py in points]

@@ -1,5 +1,7 @@
 """Lays out one container: its grid becomes boxes, its flows become lines between them."""
 
+from collections.abc import Container
+
 from m2pem.diagram.layout import model
 from m2pem.diagram.layout.grid import Link, arrange
 from m2pem.diagram.layout.model import Block, Box, Element, LaneTree, name_of, tag
@@ -31,7 +33,7 @@ def lay_out(container: Element) -> Block:
     links = _links(container, nodes, host)
     lanes = model.lanes(container)
     grid = arrange([*nodes], links, {n: k for n, k in lanes.of_node.items() if n in nodes})
-    ties = _ties(container, {**nodes, **host, **surfaces})
+    ties = _ties(container, {**nodes, **host, **surfaces}, surfaces)
     bottom = max(grid.rows, 1)
     taken: set[int] = set()
     for surface in surfaces:
@@ -55,9 +57,8 @@ def lay_out(container: Element) -> Block:
     for name in [*nodes, *surfaces]:
         x, y = router.corner(name)
         width, height = sizes[name]
-        box = block.boxes[name] = Box(x, y, width, height)
+        block.boxes[name] = Box(x, y, width, height, expanded=name in inner)
         if name in inner:
-            box.expanded = True
             block.put(inner[name], x, y)
         attached = boundary.get(name, [])
         for number, each in enumerate(attached, 1):
@@ -65,7 +66,7 @@ def lay_out(container: Element) -> Block:
             block.boxes[name_of(each)] = Box(
                 centre - _EVENT / 2, y + height - _EVENT / 2, _EVENT, _EVENT
             )
-    block.lines |= router.lines(block.boxes, reverse=_reversed(container))
+    block.lines |= router.lines(block.boxes, reverse=_reversed(container, surfaces))
     bands = [router.band(first, last) for first, last in grid.lane_rows]
     return _in_lanes(block, lanes, bands) if lanes.leaves else block
 
@@ -114,9 +115,10 @@ def _links(container: Element, nodes: dict[str, Element], host: dict[str, str]) 
     return found
 
 
-def _ties(container: Element, here: dict[str, object]) -> dict[str, tuple[str, str]]:
+def _ties(
+    container: Element, here: Container[str], surfaces: Container[str]
+) -> dict[str, tuple[str, str]]:
     """Lines between a node and a data object or annotation of the same container."""
-    surfaces = {name_of(each) for each in model.children(container, *model.SURFACES)}
     lines = [*model.data_lines(container)]
     lines += [
         (name_of(a), model.referred_id(a.get("sourceRef")), model.referred_id(a.get("targetRef")))
@@ -129,9 +131,8 @@ def _ties(container: Element, here: dict[str, object]) -> dict[str, tuple[str, s
     return found
 
 
-def _reversed(container: Element) -> set[str]:
+def _reversed(container: Element, surfaces: Container[str]) -> set[str]:
     """The ties that lead from the data object to the node."""
-    surfaces = {name_of(each) for each in model.children(container, *model.SURFACES)}
     found = {name for name, source, _ in model.data_lines(container) if source in surfaces}
     associations = model.children(container, "association")
     return found | {

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 from m2pem.diagram.layout.grid import Grid, Link
-from m2pem.diagram.layout.model import Box, Point
+from m2pem.diagram.layout.model import Box
+from m2pem.diagram.picture import Point
 
 _TRACK = 10
 _GAP = 40  # a gap without a line
@@ -135,11 +136,11 @@ class Router:
         source, target = boxes[link.source], boxes[link.target]
         if link.below:
             y = self._y(row + 1, link.id)
-            points = [(source.middle[0], source.bottom), (source.middle[0], y)]
+            points = [(source.centre[0], source.bottom), (source.centre[0], y)]
         else:
-            y = source.middle[1]
+            y = source.centre[1]
             points = [(source.right, y)]
-        end = target.middle[1]
+        end = target.centre[1]
         if link.id in self._grid.back:
             out = self._x(column + 1, link.id)
             into = self._x(self._grid.cells[link.target][0], link.id)
@@ -159,7 +160,7 @@ class Router:
         column, row = self._grid.cells[tie.node]
         node, surface = boxes[tie.node], boxes[tie.surface]
         x = node.x + 12
-        end = surface.middle[0]
+        end = surface.centre[0]
         first = self._y(row + 1, name)
         points: list[Point] = [(x, node.bottom), (x, first)]
         if self._grid.cells[tie.surface][1] != row + 1:
