@@ -15,6 +15,7 @@ from typing import Any, TypeAlias
 from m2pem.bpmn.template_properties import (
     BEHAVIOR,
     OPERATORS,
+    PREFIX,
     PROMPT,
     STORE,
     TIMEOUT,
@@ -300,22 +301,13 @@ def _question(fleet: Fleet, decisions: Mapping[str, str], editor: Editor) -> _Te
             value=label,
             doc=f"What operators read for the answer '{value}'; empty: it is not offered.",
         )
-    template.ask(
-        "Settings",
-        STORE,
-        "store",
-        doc="The name under which the answer is stored; user.decision if absent.",
-    )
-    template.ask(
-        "Settings",
-        OPERATORS,
-        "role",
-        doc="The role of the operators who may answer; all if absent.",
-    )
-    template.ask(
-        "Settings",
-        TIMEOUT,
-        "timeout",
-        doc="The time to answer, such as PT5M; afterwards the task fails with PROMPT_TIMEOUT.",
-    )
+    for name, doc in _SETTINGS.items():
+        template.ask("Settings", name, name.removeprefix(PREFIX), doc=doc)
     return template
+
+
+_SETTINGS = {
+    STORE: "The name under which the answer is stored; user.decision if absent.",
+    OPERATORS: "The role of the operators who may answer; all if absent.",
+    TIMEOUT: "The time to answer, such as PT5M; afterwards the task fails with PROMPT_TIMEOUT.",
+}

@@ -71,10 +71,16 @@ def resources_of_mission(mission: Mission, fleet: Fleet) -> tuple[ResourceId, ..
 
 def roles_of_mission(mission: Mission) -> Iterator[Role]:
     """Yield the roles of all tasks, in the order of the tasks; a role comes once for each task."""
+    for asked in asked_by(mission):
+        yield from asked.roles
+
+
+def asked_by(mission: Mission) -> Iterator[Behavior | ServiceCall]:
+    """Yield the behaviors and service calls of all tasks, in the order of the tasks."""
     for task in mission.activities():
         for asked in (getattr(task, "behavior", None), getattr(task, "call", None)):
             if isinstance(asked, Behavior | ServiceCall):
-                yield from asked.roles
+                yield asked
 
 
 def spelled_out(team: Team) -> tuple[ResourceId, ...]:

@@ -140,16 +140,10 @@ def _meant(role: Role, fleet: Fleet) -> str:
 
 
 def _unknown(role: Role, fleet: Fleet) -> tuple[str, str]:
-    if role.kind is RoleKind.TEAM:
-        return (
-            f"{fleet.file} has no team '{role.resource}'",
-            suggest(role.resource, fleet.teams, "teams"),
-        )
-    if role.kind is RoleKind.VEHICLE:
-        return (
-            f"{fleet.file} has no vehicle '{role.resource}'",
-            suggest(role.resource, fleet.vehicles, "vehicles"),
-        )
+    if role.kind is not RoleKind.PAYLOAD:
+        known = fleet.teams if role.kind is RoleKind.TEAM else fleet.vehicles
+        message = f"{fleet.file} has no {role.kind.value} '{role.resource}'"
+        return message, suggest(role.resource, known, f"{role.kind.value}s")
     vehicle, slash, payload = role.resource.rpartition("/")
     elsewhere = [other for other in fleet.payloads if other.endswith(f"/{payload}")]
     exists = " and ".join(place(fleet, other) for other in elsewhere[:3])

@@ -10,6 +10,7 @@ from collections import Counter, defaultdict
 from collections.abc import Container, Iterator
 from dataclasses import dataclass, field
 
+from m2pem.fleet.allocation import asked_by
 from m2pem.fleet.behaviors import SHARED
 from m2pem.fleet.check import DETECTOR_SERVICE
 from m2pem.fleet.fleet import SIMULATED, Domain, Fleet, Payload, Team, Vehicle
@@ -18,7 +19,7 @@ from m2pem.geo.positions import is_local, positions
 from m2pem.mission.behavior import Behavior, BehaviorType, Need, Role, RoleKind, ServiceCall
 from m2pem.mission.catalogue import ParameterKind, ResourceId
 from m2pem.mission.concurrency import instances_at_once
-from m2pem.mission.elements import Activity, ScriptTask, SendTask, ServiceTask, SubProcess
+from m2pem.mission.elements import Activity, SubProcess
 from m2pem.mission.expression import Expression
 from m2pem.mission.expression.tree import Compare, Comparison, In, Literal, Name, walk
 from m2pem.mission.geometry import Area, Coordinate, Geometry, Point, Route
@@ -50,7 +51,7 @@ def fleet_for(mission: Mission) -> Fleet:
     condition names. A name that the mission reads from its data while it runs cannot be known here.
     """
     draft = _Draft(_origin(mission))
-    tasks = list(_tasks(mission))
+    tasks = list(asked_by(mission))
     for task in tasks:
         for role in task.roles:
             draft.add_role(role, task)
@@ -76,14 +77,6 @@ def _origin(mission: Mission) -> Origin:
     if not places or any(distance_m(ORIGIN[:2], each[:2]) <= NEAR_M for each in places):
         return ORIGIN
     return (*places[0][:2], ORIGIN[2])
-
-
-def _tasks(mission: Mission) -> Iterator[Behavior | ServiceCall]:
-    for task in mission.activities():
-        if isinstance(task, ScriptTask | ServiceTask | SendTask) and task.behavior:
-            yield task.behavior
-        elif isinstance(task, ServiceTask) and task.call:
-            yield task.call
 
 
 def _at_once(activity: Activity) -> int:
@@ -242,13 +235,10 @@ def _literals(condition: Expression | None) -> dict[str, list[str]]:
 
 
 def _is_flown(task: Behavior | ServiceCall) -> bool:
-    return isinstance(task, Behavior) and _flies(task)
-
-
-def _flies(behavior: Behavior) -> bool:
-    altitude = any(parameter.name == "altitude" for parameter in behavior.parameters)
-    commands_vehicles = behavior.type is not BehaviorType.PAYLOAD
-    return commands_vehicles and (altitude or behavior.name in _AIR_BEHAVIORS)
+    if not isinstance(task, Behavior) or task.type is BehaviorType.PAYLOAD:
+        return False
+    altitude = any(parameter.name == "altitude" for parameter in task.parameters)
+    return altitude or task.name in _AIR_BEHAVIORS
 
 
 def _names(behavior: Behavior) -> Iterator[tuple[str, ParameterKind | None]]:
