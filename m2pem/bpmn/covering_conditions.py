@@ -4,11 +4,12 @@ Each comparison is tried with values on both sides of its literal. What is no co
 literal, such as a function, may have any value. Null is tried only where a condition names it.
 """
 
+import operator
 from collections import defaultdict
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from itertools import pairwise, product
 from math import prod
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 from m2pem.bpmn.data_names import written_by
 from m2pem.mission.behavior import Assignment
@@ -222,8 +223,8 @@ def _holds(node: t.Node, case: _Case) -> bool:
             return any(_holds(each, case) for each in operands)
         case t.Not(operand):
             return not _holds(operand, case)
-        case t.Compare(operator, left, right):
-            return _compared(operator, _value(left, case), _value(right, case))
+        case t.Compare(how, left, right):
+            return _compared(how, _value(left, case), _value(right, case))
         case t.In(item=item, container=t.ListOf(items=items)):
             return any(_equal(_value(item, case), _value(each, case)) for each in items)
     return _value(node, case) is True
@@ -233,29 +234,24 @@ def _value(node: t.Node, case: _Case) -> Scalar:
     return _literal(node) if _is_literal(node) else case[node]
 
 
-def _compared(operator: t.Comparison, left: Scalar, right: Scalar) -> bool:
-    match operator:
+def _compared(how: t.Comparison, left: Scalar, right: Scalar) -> bool:
+    match how:
         case t.Comparison.EQUAL:
             return _equal(left, right)
         case t.Comparison.NOT_EQUAL:
             return not _equal(left, right)
-    if isinstance(left, str) and isinstance(right, str):
-        return _ordered(operator, left < right, left == right)
-    if isinstance(left, int | float) and isinstance(right, int | float):
-        return _ordered(operator, left < right, left == right)
+    for kind in (str, int | float):
+        if isinstance(left, kind) and isinstance(right, kind):
+            return _ORDERS[how](left, right)
     return True  # it cannot be evaluated, which is another error than the one looked for
 
 
-def _ordered(operator: t.Comparison, less: bool, equal: bool) -> bool:
-    match operator:
-        case t.Comparison.LESS:
-            return less
-        case t.Comparison.LESS_EQUAL:
-            return less or equal
-        case t.Comparison.GREATER:
-            return not (less or equal)
-        case _:
-            return not less
+_ORDERS: Mapping[t.Comparison, Callable[[Any, Any], bool]] = {
+    t.Comparison.LESS: operator.lt,
+    t.Comparison.LESS_EQUAL: operator.le,
+    t.Comparison.GREATER: operator.gt,
+    t.Comparison.GREATER_EQUAL: operator.ge,
+}
 
 
 def _equal(left: Scalar, right: Scalar) -> bool:
