@@ -4,7 +4,7 @@ goes through the objects. Import your libraries inside the functions: starting u
 """
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING
 
 import pluggy
 
@@ -24,14 +24,6 @@ if TYPE_CHECKING:
 
 hookspec = pluggy.HookspecMarker("m2pem")
 hookimpl = pluggy.HookimplMarker("m2pem")
-
-
-class Register(Protocol):
-    """Registers a factory under a name; a second one of the same name is an error."""
-
-    def __call__(self, name: str, factory: Callable[..., Any]) -> None:
-        """Register `factory` under `name`."""
-        ...
 
 
 @hookspec

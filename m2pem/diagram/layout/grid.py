@@ -3,6 +3,8 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from m2pem.mission.reachability import components
+
 
 @dataclass(frozen=True, slots=True)
 class Link:
@@ -108,18 +110,14 @@ def _columns(nodes: Sequence[str], links: Sequence[Link]) -> dict[str, int]:
 
 
 def _components(nodes: Sequence[str], links: Sequence[Link]) -> list[list[str]]:
-    group = {node: node for node in nodes}
-
-    def root(node: str) -> str:
-        while group[node] != node:
-            node = group[node]
-        return node
-
+    beside: dict[str, list[str]] = {node: [] for node in nodes}
     for link in links:
-        group[root(link.target)] = root(link.at)
-    found: dict[str, list[str]] = {}
+        beside[link.at].append(link.target)
+        beside[link.target].append(link.at)
+    number = components(beside)
+    found: dict[int, list[str]] = {}
     for node in nodes:
-        found.setdefault(root(node), []).append(node)
+        found.setdefault(number[node], []).append(node)
     return list(found.values())
 
 

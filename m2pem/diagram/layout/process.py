@@ -15,7 +15,6 @@ _DATA_SIZES = {
     "dataStoreReference": (50, 50),
     "textAnnotation": (100, 50),
 }
-PADDING = 30
 LANE_HEADER = 30
 _EMPTY_LANE = 120
 _BOUNDARY_PITCH = 46
@@ -46,7 +45,7 @@ def lay_out(container: Element) -> Block:
     inner = {name: lay_out(e) for name, e in nodes.items() if tag(e) in model.SUBPROCESSES}
     sizes = {name: _size(e, inner.get(name), boundary.get(name, [])) for name, e in nodes.items()}
     sizes |= {name: _DATA_SIZES[tag(e)] for name, e in surfaces.items()}
-    router = Router(grid, sizes, padding=PADDING)
+    router = Router(grid, sizes)
     for link in links:
         router.add(link)
     for name, (surface, node) in ties.items():

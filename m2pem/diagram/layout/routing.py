@@ -41,11 +41,8 @@ class _Tie:
 class Router:
     """Say first what lines there are, then ask where all is."""
 
-    def __init__(
-        self, grid: Grid, sizes: Mapping[str, tuple[float, float]], *, padding: float
-    ) -> None:
+    def __init__(self, grid: Grid, sizes: Mapping[str, tuple[float, float]]) -> None:
         self._grid = grid
-        self._padding = padding
         self._links: list[Link] = []
         self._ties: dict[str, _Tie] = {}
         self._columns, self._rows = _Gaps(), _Gaps()
