@@ -25,6 +25,7 @@ from m2pem.mission.elements import Element, Process, ReceiveTask
 from m2pem.mission.events import CorrelationProperty, Message, MessageEventDefinition
 from m2pem.mission.expression import Expression
 from m2pem.mission.mission import Lane, MessageFlow, Participant
+from m2pem.mission.reachability import components
 from m2pem.suggestions import suggest_or
 
 
@@ -233,15 +234,7 @@ def _groups(context: ReadingContext) -> dict[End, int]:
         if flow.source_id not in pools and flow.target_id not in pools:
             neighbors[source].append(target)
             neighbors[target].append(source)
-    groups: dict[End, int] = {}
-    for number, start in enumerate(neighbors):
-        waiting = [start]
-        while waiting:
-            end = waiting.pop()
-            if end not in groups:
-                groups[end] = number
-                waiting += neighbors[end]
-    return groups
+    return components(neighbors)
 
 
 def _assign(context: ReadingContext, use: MessageUse, message: Message | None) -> None:

@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping
 from typing import Literal
 
-from m2pem.bpmn.context import ReadingContext
+from m2pem.bpmn.context import KEY, ReadingContext
 from m2pem.bpmn.rules.behaviors import ROLE_NEED
 from m2pem.bpmn.times import wrong_time
 from m2pem.mission.behavior import Need
@@ -27,7 +27,6 @@ _NAMED = ("wait", "priority")
 """The attributes that a role which names its resource may have, too."""
 
 _COUNT = re.compile(r"(\d+)(?:\.\.(\d+))?")
-_STORE = re.compile(r"[^\W\d]\w*(\.\w+)*")
 
 
 class NeedReader:
@@ -105,7 +104,7 @@ class NeedReader:
         return priority
 
     def _name(self, attribute: str, text: str | None) -> str | None:
-        if text is not None and not _STORE.fullmatch(text.strip()):
+        if text is not None and not KEY.fullmatch(text.strip()):
             self._wrong(
                 f"{attribute}='{text}' is no name of data",
                 f"write for example {attribute}='surveyor'",

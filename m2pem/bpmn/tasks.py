@@ -91,13 +91,7 @@ def _service_task(context: ReadingContext, found: Children, task: type[Serving])
     behavior: Behavior | None = read_carried(context, found, carried) if carried else None
     call = _service_call(context, found, extensions)
     if carried and call is not None:
-        context.findings.error(
-            found.element,
-            found.id,
-            TWO_BEHAVIORS,
-            f"the task has both m2pem:behavior and the service class '{call.service}'",
-            "delete one of the two",
-        )
+        _both(context, found, f"the service class '{call.service}'", "delete one of the two")
     elif not carried and call is None and not extensions.get("service"):
         context.findings.warning(
             found.element,
@@ -107,6 +101,11 @@ def _service_task(context: ReadingContext, found: Children, task: type[Serving])
             "nothing",
         )
     return task(*context.head(found.element, found.id), call, behavior)
+
+
+def _both(context: ReadingContext, found: Children, other: str, remedy: str) -> None:
+    what = f"the task has both m2pem:behavior and {other}"
+    context.findings.error(found.element, found.id, TWO_BEHAVIORS, what, remedy)
 
 
 def _service_call(
@@ -164,13 +163,7 @@ def read_send_task(context: ReadingContext, found: Children) -> SendTask:
     behavior = read_carried(context, found, carried) if carried else None
     message = _message(context, found)
     if carried and message is not None:
-        context.findings.error(
-            found.element,
-            found.id,
-            TWO_BEHAVIORS,
-            "the task has both m2pem:behavior and a message to send",
-            "draw a task for each",
-        )
+        _both(context, found, "a message to send", "draw a task for each")
     head = context.head(found.element, found.id)
     task = SendTask(*head, message, behavior)
     if not carried:
@@ -350,13 +343,7 @@ def read_script_task(context: ReadingContext, found: Children) -> ScriptTask:
     statements: Script | None = None
     if carried:
         if has_script:
-            context.findings.error(
-                found.element,
-                found.id,
-                TWO_BEHAVIORS,
-                "the task has both m2pem:behavior and a script",
-                "delete one of the two",
-            )
+            _both(context, found, "a script", "delete one of the two")
         behavior = read_carried(context, found, carried)
     elif (foreign := foreign_script(found)) is not None:
         statements = read_foreign_script(context, found, foreign)

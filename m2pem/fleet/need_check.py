@@ -138,13 +138,7 @@ _PREFERS = "write for example prefer=\"'fast' in vehicle.tags ? 60 : 0\""
 
 
 def _wrong_type(role: Role, text: str, findings: TaskFindings, remedy: str = _REQUIRES) -> None:
-    findings.add(
-        "bad-need",
-        text,
-        remedy,
-        line=role.line,
-        role=role.name,
-    )
+    findings.add("bad-need", text, remedy, line=role.line, role=role.name)
 
 
 def _check_preference(

@@ -59,9 +59,8 @@ def _finding(
     together: list[Activity],
 ) -> Finding:
     late = together[-1]
-    findings = TaskFindings(mission.file_of(late), late)
     others = " and ".join(each.label for each in together[:-1]) or "another instance of it"
-    findings.add(
+    return TaskFindings(mission.file_of(late), late).add(
         RULE,
         f"{resource} may still do {others} at that time: it does one of them, and the other ends "
         f"with {UNAVAILABLE}",
@@ -69,4 +68,3 @@ def _finding(
         line=demands[late].behavior.line,
         severity=Severity.WARNING,
     )
-    return findings.found[0]

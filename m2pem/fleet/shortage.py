@@ -229,8 +229,7 @@ class _Check:
         resources = _united([able for task in tasks for _, able in self.demands[task].places])
         caught = all(_is_caught(task, self.mission) for task in tasks)
         outcome = "one of them ends with " + UNAVAILABLE + " in every run"
-        findings = TaskFindings(self.mission.file_of(last), last)
-        findings.add(
+        return TaskFindings(self.mission.file_of(last), last).add(
             RULE,
             f"{self._named(tasks)} begin at once, do not wait, and need more than there are of "
             f"{_listed(resources)}: {outcome}",
@@ -238,7 +237,6 @@ class _Check:
             line=self.demands[last].behavior.line,
             severity=Severity.WARNING if caught else Severity.ERROR,
         )
-        return findings.found[0]
 
     # --- tasks that may be active together --------------------------------------------------------
 
@@ -285,9 +283,8 @@ class _Check:
     def _possible(
         self, late: Activity, others: Sequence[Activity], resources: Resources
     ) -> Finding:
-        findings = TaskFindings(self.mission.file_of(late), late)
         own = self._roles(late, resources, kept=False)
-        findings.add(
+        return TaskFindings(self.mission.file_of(late), late).add(
             RULE,
             f"{own} may find none of {_listed(resources)} free, and does not wait: "
             f"{self._named(others, resources)} may have them at that time; it would end with "
@@ -296,7 +293,6 @@ class _Check:
             line=self.demands[late].behavior.line,
             severity=Severity.WARNING,
         )
-        return findings.found[0]
 
     # --- words ------------------------------------------------------------------------------------
 
