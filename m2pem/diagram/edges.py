@@ -215,16 +215,6 @@ def label_of_line(line: Line, points: Sequence[Point]) -> Label:
     return _label(line.name, (x + half + 5, y - SIZE / 2), _WIDTH)
 
 
-def draw_label(to: Group, shape: Shape, style: Style) -> Bounds:
-    """Draws a symbol's name, and says where it is."""
-    return _put(to, label_of(shape), style)
-
-
-def draw_line_label(to: Group, line: Line, points: Sequence[Point], style: Style) -> Bounds:
-    """Draws a flow's name, and says where it is."""
-    return _put(to, label_of_line(line, points), style)
-
-
 def _level_part(points: Sequence[Point]) -> tuple[Point, Point]:
     """The last part that is level and has room; of flows that begin together, those differ."""
     for start, end in reversed([*pairwise(points)]):
@@ -237,8 +227,9 @@ def _label(text: str, top: Point, width: float) -> Label:
     return Label(tuple(wrapped(text, width, SIZE)), top)
 
 
-def _put(to: Group, label: Label, style: Style) -> Bounds:
-    """Write a label with a background-coloured outline, so that lines below do not hide it."""
+def draw_label(to: Group, label: Label, style: Style) -> Bounds:
+    """Write a label with a background-coloured outline, so that lines below do not hide it, and
+    say where it is."""
     to.text(
         label.lines, *label.top, SIZE, fill=style.text, stroke=BACKGROUND,
         stroke_width=3, stroke_linejoin="round", paint_order="stroke",

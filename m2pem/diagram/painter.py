@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 
 from m2pem.diagram import symbols
-from m2pem.diagram.edges import docked, draw_label, draw_line, draw_line_label, has_label
+from m2pem.diagram.edges import docked, draw_label, draw_line, has_label, label_of, label_of_line
 from m2pem.diagram.overlays import Badges, Overlays, ids_of
 from m2pem.diagram.picture import Bounds, Line, Picture, Point, Shape, Trait
 from m2pem.diagram.style import (
@@ -114,11 +114,11 @@ class _Painter:
         names: list[Bounds] = []
         for shape in self.picture.shapes:
             if has_label(shape):
-                names.append(draw_label(self.to, shape, self._text_style(shape.id)))
+                names.append(draw_label(self.to, label_of(shape), self._text_style(shape.id)))
         for line in self.picture.lines:
             if line.name:
-                points = self.points[line.id]
-                names.append(draw_line_label(self.to, line, points, self._text_style(line.id)))
+                label = label_of_line(line, self.points[line.id])
+                names.append(draw_label(self.to, label, self._text_style(line.id)))
         Badges(self.to, names).paint(self.overlays, self.shapes, self.points)
 
     def _text_style(self, name: str) -> Style:

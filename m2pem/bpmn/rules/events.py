@@ -6,6 +6,7 @@ from m2pem.bpmn.rules.rule import Rule, error, warning
 from m2pem.bpmn.rules.tree import (
     SUBPROCESSES,
     THROWING,
+    Check,
     Checks,
     Tree,
     children,
@@ -309,10 +310,6 @@ def _start(tree: Tree, event: etree._Element) -> None:
         tree.report(START_WITHOUT_FLOW, event)
 
 
-def _end(tree: Tree, event: etree._Element) -> None:
-    _allow(tree, event)
-
-
 def _catch(tree: Tree, event: etree._Element) -> None:
     _allow(tree, event)
     if not has_trigger(tree, event, "link"):
@@ -357,7 +354,7 @@ def _container(tree: Tree, element: etree._Element) -> None:
 CHECKS = Checks(
     {
         "startEvent": _start,
-        "endEvent": _end,
+        "endEvent": _allow,
         "intermediateCatchEvent": _catch,
         "intermediateThrowEvent": _throw,
         "boundaryEvent": _boundary,
@@ -412,23 +409,18 @@ CANCEL_UNCAUGHT = warning(
 )
 
 
-def _error(tree: Tree, definition: etree._Element) -> None:
-    _code(tree, definition, "errorRef", "errorCode", THROWN_ERROR_CODE)
+def _has_code(thrown: str, rule: Rule) -> Check:
+    """What an event throws, an error or an escalation, has a code."""
 
+    def check(tree: Tree, definition: etree._Element) -> None:
+        name = definition.get(f"{thrown}Ref")
+        if not name or parent(definition).tag not in THROWING:
+            return
+        root = tree.find(definition, name)
+        if root is not None and name_of(root) == thrown and not root.get(f"{thrown}Code"):
+            tree.report(rule, definition, f"'{name}'")
 
-def _escalation(tree: Tree, definition: etree._Element) -> None:
-    _code(tree, definition, "escalationRef", "escalationCode", THROWN_ESCALATION_CODE)
-
-
-def _code(
-    tree: Tree, definition: etree._Element, reference: str, attribute: str, rule: Rule
-) -> None:
-    name = definition.get(reference)
-    if not name or parent(definition).tag not in THROWING:
-        return
-    root = tree.find(definition, name)
-    if root is not None and name_of(root) == reference[:-3] and not root.get(attribute):
-        tree.report(rule, definition, f"'{name}'")
+    return check
 
 
 def _cancel(tree: Tree, definition: etree._Element) -> None:
@@ -451,8 +443,8 @@ def _cancel(tree: Tree, definition: etree._Element) -> None:
 
 DEFINITIONS = Checks(
     {
-        "errorEventDefinition": _error,
-        "escalationEventDefinition": _escalation,
+        "errorEventDefinition": _has_code("error", THROWN_ERROR_CODE),
+        "escalationEventDefinition": _has_code("escalation", THROWN_ESCALATION_CODE),
         "cancelEventDefinition": _cancel,
     },
 )

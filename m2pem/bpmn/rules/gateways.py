@@ -8,6 +8,7 @@ from m2pem.bpmn.rules.attributes import BAD_VALUE
 from m2pem.bpmn.rules.rule import error, warning
 from m2pem.bpmn.rules.sequence_flows import CONDITION_IGNORED, CONDITION_NOT_ALLOWED
 from m2pem.bpmn.rules.tree import (
+    GATEWAYS,
     Checks,
     Tree,
     has,
@@ -19,7 +20,7 @@ from m2pem.bpmn.rules.tree import (
     triggers,
     what,
 )
-from m2pem.bpmn.xml import a, kind
+from m2pem.bpmn.xml import a, kind, local
 
 NO_CONDITIONS = warning(
     309,
@@ -104,15 +105,7 @@ def _gateway(tree: Tree, element: etree._Element) -> None:
         tree.report(NOT_MIXED, element, detail)
 
 
-CHECKS = Checks(
-    {
-        "exclusiveGateway": _gateway,
-        "inclusiveGateway": _gateway,
-        "parallelGateway": _gateway,
-        "eventBasedGateway": _gateway,
-        "complexGateway": _gateway,
-    },
-)
+CHECKS = Checks(dict.fromkeys(map(local, GATEWAYS), _gateway))
 
 
 EVENT_GATEWAY_BRANCHES = error(
