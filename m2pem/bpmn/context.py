@@ -110,6 +110,10 @@ class PendingDataFlow:
     foreign: Mappings | None = None
     """What other engines' elements pass."""
 
+    def own_key(self, identifier: str) -> str:
+        """The key of a data input, data output or property of its own; "" for others."""
+        return self.parameters.get(identifier, "")
+
 
 @dataclass(slots=True)
 class PendingLoop:

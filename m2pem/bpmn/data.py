@@ -1,6 +1,6 @@
 """Data objects, stores, properties and associations (BPMN 2.0.2, clauses 10.4.1 and 10.4.2)."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 from lxml import etree
@@ -114,9 +114,12 @@ def _parameters(found: Children) -> dict[str, str]:
 def resolve_data_flows(context: ReadingContext) -> None:
     """Work out what each data association passes."""
     for pending in context.data_flows:
-        inputs = [mapping for each in pending.inputs for mapping in _into(context, pending, each)]
+        outer, inner = context.data_key, pending.own_key
+        inputs = [
+            m for each in pending.inputs for m in _mappings(context, pending, each, outer, inner)
+        ]
         outputs = [
-            mapping for each in pending.outputs for mapping in _out_of(context, pending, each)
+            m for each in pending.outputs for m in _mappings(context, pending, each, inner, outer)
         ]
         own = pending.foreign or Mappings()
         if inputs or outputs or pending.foreign:
@@ -124,28 +127,12 @@ def resolve_data_flows(context: ReadingContext) -> None:
             object.__setattr__(pending.node, "data_flow", mappings)
 
 
-def _into(
-    context: ReadingContext, pending: PendingDataFlow, found: Association
-) -> Iterator[Mapping]:
-    own = pending.parameters.get(found.target_ref, "")
-    outer = [context.data_key(ref) for ref in found.source_refs]
-    yield from _mappings(context, pending, found, outer, own)
-
-
-def _out_of(
-    context: ReadingContext, pending: PendingDataFlow, found: Association
-) -> Iterator[Mapping]:
-    own = [pending.parameters.get(ref, "") for ref in found.source_refs]
-    outer = context.data_key(found.target_ref)
-    yield from _mappings(context, pending, found, own, outer)
-
-
 def _mappings(
     context: ReadingContext,
     pending: PendingDataFlow,
     found: Association,
-    sources: list[str],
-    target: str,
+    source_key: Callable[[str], str],
+    target_key: Callable[[str], str],
 ) -> Iterator[Mapping]:
     """An association copies its source, or what its transformation or assignments say.
 
@@ -153,6 +140,8 @@ def _mappings(
     data around it anyway. Nor does one whose name no expression can read ("Route prompt").
     """
     line = context.findings.line(found.element)
+    source = source_key(found.source_refs[0]) if found.source_refs else ""
+    target = target_key(found.target_ref)
     assigned = False
     for child in found.element:
         name = local(child.tag)
@@ -164,10 +153,8 @@ def _mappings(
         elif name == "assignment":
             assigned = True
             yield from _assignment(context, pending, child, target)
-    if assigned or not target or not sources or not sources[0]:
-        return
-    if KEY.fullmatch(sources[0]) and KEY.fullmatch(target):
-        yield Mapping(parse(sources[0], "m2pem"), target, line)
+    if not assigned and KEY.fullmatch(source) and KEY.fullmatch(target):
+        yield Mapping(parse(source, "m2pem"), target, line)
 
 
 def _assignment(

@@ -39,10 +39,10 @@ from m2pem.fleet.yaml_source import YamlSource, note_shape_findings, read_yaml
 from m2pem.geo.files import GeometryError, read_geometry
 from m2pem.geo.geometry_files import FileProblem
 from m2pem.geo.local_frame import Origin
-from m2pem.geo.positions import NO_ORIGIN, geometry_out_of_reach
+from m2pem.geo.positions import NO_ORIGIN, geometry_out_of_reach, positions
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.elements import ErrorPolicy
-from m2pem.mission.geometry import Area, Coordinate, Geometry, Point, Route
+from m2pem.mission.geometry import Geometry
 from m2pem.suggestions import suggest
 
 _ADDRESS = re.compile(r"https?://[A-Za-z0-9.:\[\]-]+([/?][!-~]*)?")
@@ -457,15 +457,5 @@ def _origin(model: FleetModel, geometries: dict[str, Geometry]) -> Origin:
     if model.origin is not None:
         return (model.origin.lat, model.origin.lon, model.origin.alt)
     for geometry in geometries.values():
-        latitude, longitude, _ = _first_position(geometry)
-        return (latitude, longitude, 0.0)
+        return (*next(positions(geometry))[:2], 0.0)
     return NO_ORIGIN
-
-
-def _first_position(geometry: Geometry) -> Coordinate:
-    if isinstance(geometry, Point):
-        return geometry.position
-    if isinstance(geometry, Route):
-        return geometry.waypoints[0]
-    assert isinstance(geometry, Area)  # a file holds no vehicle's position
-    return geometry.rings[0][0]
