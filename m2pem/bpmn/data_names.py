@@ -127,9 +127,8 @@ def _findings(mission: Mission, process: Process, store: _Store) -> Iterator[Fin
             if (read.element, name) in said:
                 continue
             said.add((read.element, name))
-            reader = mission.elements.get(
-                read.element
-            )  # a call reads what another file's process has
+            # A call reads what another file's process has.
+            reader = mission.elements.get(read.element)
             yield UNWRITTEN_NAME.finding(
                 mission.file_of(reader if isinstance(reader, FlowNode) else process),
                 read.line,

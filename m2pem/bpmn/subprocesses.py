@@ -111,8 +111,7 @@ _DATA = names("dataObject dataObjectReference dataStoreReference property")
 _LANES = BPMN + "laneSet"
 _SUBSCRIPTION = BPMN + "correlationSubscription"
 _COMPLETION = BPMN + "completionCondition"
-_DATA_FLOW = names("ioSpecification dataInputAssociation dataOutputAssociation")
-_MARKS = frozenset((*LOOPS, EXTENSIONS, *_DATA_FLOW))
+_MARKS = names("ioSpecification dataInputAssociation dataOutputAssociation") | {*LOOPS, EXTENSIONS}
 
 
 @dataclass(slots=True)

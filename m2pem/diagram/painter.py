@@ -1,6 +1,7 @@
 """Paints pictures: one plane below the other, what is marked on them, and a legend."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 from m2pem.diagram import symbols
 from m2pem.diagram.edges import docked, draw_label, draw_line, has_label, label_of, label_of_line
@@ -130,9 +131,7 @@ class _Painter:
         group = self.to.group((bounds.x, bounds.y), reason, data_element_id=shape.id)
         style = self.styles.get(shape.id, PLAIN)
         if Trait.EXPANDED in shape.traits and shape.id in self.styles:
-            style = Style(
-                style.stroke, BACKGROUND, style.text, style.weight
-            )  # its inside has colours of its own
+            style = replace(style, fill=BACKGROUND)  # its inside has colours of its own
         _drawer(shape)(group, shape, style)
 
     def _line(self, line: Line) -> None:

@@ -196,9 +196,8 @@ def table(to: Group, x: float, y: float, stroke: str, fill: str) -> None:
 
 def hand(to: Group, x: float, y: float, stroke: str, fill: str) -> None:
     """Manual task."""
-    fingers = "".join(
-        f"H{length}c1.6 0 1.6 2.4 0 2.4" for length in (7, 7.4, 6.8, 5.6)
-    )  # the tip of each is a half circle, about
+    # The tip of each finger is a half circle, about.
+    fingers = "".join(f"H{length}c1.6 0 1.6 2.4 0 2.4" for length in (7, 7.4, 6.8, 5.6))
     sign = to.group((x, y))
     sign.path(f"M-8 -1.5L-3 -6.5H1c1.6 0 1.6 2.5 0 2.5{fingers}H-8Z", stroke=stroke, fill=fill)
     for dy in (-1.6, 0.8, 3.2):

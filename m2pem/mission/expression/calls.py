@@ -132,16 +132,11 @@ def _comparing(operator: Comparison) -> Build:
     return lambda left, right: Compare(operator, left, right)
 
 
-def _lower(node: Node) -> Node:
-    return Call("lower", (node,))
+def _calling(function: str) -> Callable[[Node], Node]:
+    return lambda node: Call(function, (node,))
 
 
-def _exists(node: Node) -> Node:
-    return Call("exists", (node,))
-
-
-def _empty(node: Node) -> Node:
-    return Call("is_empty", (node,))
+_lower, _exists, _empty = map(_calling, ("lower", "exists", "is_empty"))
 
 
 def _contains(container: Node, item: Node, *more: Node) -> tuple[Node, ...]:
