@@ -91,6 +91,7 @@ class WrittenValues:
         if name in self._outside:
             return None
         values: _Values = {}
+        any_value = False
         seen: set[FlowNode] = {node}
         waiting = [node]
         while waiting:
@@ -98,19 +99,18 @@ class WrittenValues:
             before = _before(current)
             if not before and name in self._written:
                 raise UnclearError
-            if not before:
-                return None
+            any_value = any_value or not before
             for each in before - seen:
                 seen.add(each)
                 if name in self._constants[each]:
                     _add(values, *self._constants[each][name])
                 elif name in self._writes[each]:
-                    return None
+                    any_value = True
                 elif name in self._within[each]:
                     raise UnclearError
                 else:
                     waiting.append(each)
-        return tuple(values.values())
+        return None if any_value else tuple(values.values())
 
 
 def _before(node: FlowNode) -> set[FlowNode]:

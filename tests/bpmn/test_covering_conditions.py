@@ -130,6 +130,19 @@ def test_an_answer_that_may_come_from_a_part_beside_is_no_finding() -> None:
     assert incomplete(mission(beside, GO)) == []
 
 
+def test_what_is_counted_in_a_loop_and_set_nowhere_before_it_is_no_finding() -> None:
+    """The nodes before the gateway are looked at in another order at each reading."""
+    scripts = "".join(
+        f"<scriptTask id='Add{n}'><script>n = n + {n}</script></scriptTask>"
+        + flow(f"Add{n}", "Join")
+        for n in range(4)
+    )
+    into = "<exclusiveGateway id='Join'/>" + flow("S", "Join") + flow("Join", "G")
+    back = "".join(flow("G", f"Add{n}", f"n >= {n}") for n in range(4))
+    data = mission(scripts + into, "n > 9", more=back, kind="inclusiveGateway")
+    assert [incomplete(data) for _ in range(20)] == [[]] * 20
+
+
 def test_an_event_that_names_the_error_or_a_default_is_enough() -> None:
     catch = (
         '<subProcess id="On" triggeredByEvent="true"><startEvent id="Caught">'
