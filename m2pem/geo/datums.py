@@ -78,9 +78,11 @@ def heights_of(crs: CRS) -> tuple[float, ToSeaLevel]:
         if len(horizontal.axis_info) < 3:
             return 1.0, _as_it_is
         return horizontal.axis_info[2].unit_conversion_factor, mean_sea_level_m
-    axis, datum = vertical[0].axis_info[0], _datum(vertical[0])
-    unit_m = axis.unit_conversion_factor * (-1 if axis.direction == "down" else 1)
-    convert = _as_it_is if datum in _datums(_SEA_LEVEL) else _by_grid(vertical[0], unit_m)
+    # GDAL 3.10 writes a system of EPSG with its name, and sometimes with the datum of another one.
+    code = _codes().get(vertical[0].name)
+    heights = vertical[0] if code is None else CRS.from_epsg(code)
+    datum = _datum(heights)
+    convert = _as_it_is if datum in _datums(_SEA_LEVEL) else _by_grid(heights)
     if convert is None and datum in _datums(NEAR):
         convert = _as_it_is
     if convert is None:
@@ -88,7 +90,7 @@ def heights_of(crs: CRS) -> tuple[float, ToSeaLevel]:
             f"its heights are of '{vertical[0].name}', of which the distance to mean sea level is"
             " not known"
         )
-    return unit_m, convert
+    return _unit_m(vertical[0]), convert
 
 
 def unbound(crs: CRS) -> CRS:
@@ -101,6 +103,16 @@ def _datum(vertical: CRS) -> str:
     return re.sub(r"[\W_]+", "", vertical.datum.name).lower() if vertical.datum else ""
 
 
+def _unit_m(vertical: CRS) -> float:
+    axis = vertical.axis_info[0]
+    return axis.unit_conversion_factor * (-1 if axis.direction == "down" else 1)
+
+
+@cache
+def _codes() -> dict[str, int]:
+    return {CRS.from_epsg(code).name: code for code in (*_SEA_LEVEL, *NEAR)}
+
+
 @cache
 def _datums(codes: Collection[int]) -> frozenset[str]:
     return frozenset(_datum(CRS.from_epsg(code)) for code in codes)
@@ -110,8 +122,9 @@ def _as_it_is(_latitude_deg: float, _longitude_deg: float, height_m: float) -> f
     return height_m
 
 
-def _by_grid(vertical: CRS, unit_m: float) -> ToSeaLevel | None:
+def _by_grid(vertical: CRS) -> ToSeaLevel | None:
     """Return the conversion by PROJ; None: it has no grid for it here."""
+    unit_m = _unit_m(vertical)
     system = CompoundCRS(vertical.name, [CRS("EPSG:4326"), vertical])
     try:
         # Without `allow_ballpark`, PROJ gives heights back as they were where a grid is missing.

@@ -5,8 +5,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+import rasterio
 from pyproj import CRS
+from rasterio.transform import from_origin
 
 from m2pem.geo.datums import NEAR, heights_of
 
@@ -57,3 +60,21 @@ def test_where_proj_has_the_grid_it_converts(tmp_path: Path) -> None:
         [sys.executable, "-c", CONVERTS, tmp_path], check=True, capture_output=True, text=True
     )
     assert float(converted.stdout) == pytest.approx(123.97, abs=0.01)
+
+
+@pytest.mark.parametrize("code", [7415, 7405, 6349])
+def test_a_system_of_epsg_is_known_by_its_name_where_gdal_names_another_datum(code: int) -> None:
+    """GDAL 3.10.3 in rasterio 1.4.4 writes "Ibiza" for NAP, given pyproj's WKT."""
+    grid = {"width": 1, "height": 1, "count": 1, "dtype": "float32"}
+    with rasterio.MemoryFile() as file:
+        with file.open(
+            driver="GTiff",
+            crs=CRS.from_epsg(code).to_wkt(),
+            transform=from_origin(0, 1, 1, 1),
+            **grid,
+        ) as written:
+            written.write(np.zeros((1, 1, 1), "float32"))
+        with file.open() as read:
+            system = CRS.from_wkt(read.crs.to_wkt())
+    _, to_sea_level = heights_of(system)
+    assert to_sea_level(52.0, 5.0, 12.0) == 12.0
