@@ -26,6 +26,7 @@ _NAMES_A_FILE = re.compile(r"PROJ4_GRIDS|PARAMETERFILE|grids=(?!@null)", re.IGNO
 _AUTHORITY = re.compile(
     r"(?:.*def[:/]crs[:/])?(EPSG|ESRI|IAU|IGNF|OGC)(?:[:/][\w.]*)?[:/](\w+)", re.I
 )
+_SHIFT = re.compile(r'"Vertical_Shift"\s*,\s*([-+.\dEe]+)', re.IGNORECASE)
 _ANGLE = re.compile(r"deg|grad|gon|rad", re.I)
 
 
@@ -150,6 +151,9 @@ def system_of_wkt(text: str) -> ReferenceSystem:
     name = " ".join(text.partition('"')[2].partition('"')[0].split())[:80]
     if len(text) > MAX_WKT_CHARACTERS or _NAMES_A_FILE.search(text):
         raise GeometryError(f"its .prj {name!r} refers to a grid, or is too long", _EXPORT)
+    if (shift := _SHIFT.search(text)) and shift[1].strip("+-0.Ee"):
+        message = f"its .prj {name!r} shifts heights by {shift[1]}, which PROJ leaves out"
+        raise GeometryError(message, _EXPORT_HEIGHTS)
     try:
         return ReferenceSystem(CRS.from_wkt(text))
     except CRSError as error:

@@ -20,6 +20,13 @@ def geographic(datum: str, spheroid: str, name: str = "GCS_unknown") -> str:
     return f'GEOGCS["{name}",DATUM["{datum}",{spheroid}],{tail}'
 
 
+SHIFTED = (
+    CRS("EPSG:4326").to_wkt("WKT1_ESRI")
+    + ',VERTCS["NAVD_1988",VDATUM["North_American_Vertical_Datum_1988"],'
+    + 'PARAMETER["Vertical_Shift",{}],PARAMETER["Direction",1.0],UNIT["Meter",1.0]]'
+)
+
+
 def named(name: str) -> dict[str, object]:
     return {"type": "name", "properties": {"name": name}}
 
@@ -94,12 +101,17 @@ def test_a_datum_with_parameters_in_the_file_is_moved_by_them() -> None:
         ("PROJCS[", "cannot be read"),
         ("hello", "cannot be read"),
         (geographic("D_X", f'{WGS84},EXTENSION["PROJ4_GRIDS","/etc/passwd"]'), "refers to a grid"),
+        (SHIFTED.format(-2.5), "'GCS_WGS_1984' shifts heights by -2.5, which PROJ leaves out"),
     ],
 )
 def test_what_cannot_be_converted_is_refused_by_its_name(wkt: str, why: str) -> None:
     with pytest.raises(GeometryError, match=r"\w") as error:
         system_of_wkt(wkt)
     assert why in str(error.value)
+
+
+def test_a_vertical_shift_of_nothing_is_read() -> None:
+    assert system_of_wkt(SHIFTED.format("0.0")).to_wgs84([[5, 52, 12]]) == [[5, 52, 12]]
 
 
 def test_a_position_outside_the_area_of_a_transformation_is_refused() -> None:
