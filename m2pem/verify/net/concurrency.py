@@ -60,7 +60,6 @@ class Concurrency:
         self.rows = [0] * len(net.places)
         self.live: set[int] = set()
         self._marked = 0
-        self._kept = bits_of(place.index for place in net.places if place.kept)
         self._wants = [_Wants(transition) for transition in net.transitions]
         by_place: dict[int, list[Transition]] = {}
         for transition in net.transitions:
@@ -111,7 +110,7 @@ class Concurrency:
         for source, target in (*transition.moves, *transition.copies):
             if beside >> source & 1:
                 moved |= 1 << target
-                if self._kept >> source & self.rows[source] >> source & 1:  # all of them go
+                if self.rows[source] >> source & 1:  # all of them go
                     many |= 1 << target
         twice = wants.twice | moved & wants.made | many
         return self._add(wants.made | moved, beside & ~wants.reset_places, twice)

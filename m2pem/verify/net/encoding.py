@@ -29,7 +29,7 @@ class CompiledTransition:
     `erase`: of the bits that are cleared, those that go after tokens have moved; the others are
     consumed before. `reset`: of those, the places that are emptied whatever they hold. `moves`:
     masks of the first and second place, the offset of the second, whether the first is emptied, and
-    the offset of the first if all its tokens go, else -1.
+    the offset of the first.
     """
 
     test: int = 0
@@ -140,10 +140,8 @@ class Encoding:
             c.erase = c.reset
         for pairs, gone in ((transition.moves, True), (transition.copies, False)):
             for source, target in pairs:
-                all_of = -1 if gone or not self.net.places[source].kept else self.offset[source]
-                c.moves.append(
-                    (self.mask[source], self.mask[target], self.offset[target], gone, all_of)
-                )
+                masks = self.mask[source], self.mask[target]
+                c.moves.append((*masks, self.offset[target], gone, self.offset[source]))
         for place, count in transition.produce:
             if self.width[place] == 1 and count == 1:
                 c.put |= self.mask[place]
@@ -213,18 +211,18 @@ class Encoding:
             if self.width[place] == 1:
                 consumed |= self.mask[place]
         state &= ~consumed
-        for source, target, offset, gone, all_of in c.moves:
+        full = 0
+        for source, target, offset, gone, source_offset in c.moves:
             if state & source:
-                if all_of >= 0:
-                    room = (target & ~state) >> offset
-                    state += min((state & source) >> all_of, room) << offset
-                    continue
+                count, room = (state & source) >> source_offset, (target & ~state) >> offset
                 if gone:
                     state &= ~source
-                if state & target != target:
-                    state += 1 << offset
+                state += min(count, room) << offset
+                if count > room:
+                    full |= target
         state &= ~c.erase
-        full = state & c.put
+        full &= ~c.erase
+        full |= state & c.put
         state |= c.put
         for mask, offset, count, most in c.gives:
             if ((state & mask) >> offset) + count > most:

@@ -6,9 +6,9 @@ has any, each of `at_most` has no more than that many, and each variable of `gua
 values named. Firing, in this order:
 
 1. the tokens of `consume` are removed;
-2. for each pair of `moves`, a token on the first place goes to the second, and for each pair of
-   `copies`, a token on the first place puts one on the second (of a place of kept resources, each
-   token does); an empty first place is no obstacle, and a second place that is full stays as it is;
+2. for each pair of `moves`, all tokens on the first place go to the second, and for each pair of
+   `copies`, each token on the first place puts one on the second; an empty first place is no
+   obstacle, and a second place that is full stays as it is;
 3. the places of `reset` lose all their tokens;
 4. the tokens of `produce` are added;
 5. the variables of `assign` get their values.
@@ -196,6 +196,8 @@ class Action(StrEnum):
     ALLOCATED = "allocated"
     """A task gets the resources of `detail` (`m2pem.verify.net.choices`); "": it gets none, because
     too few are free."""
+    NOT_FOLLOWED = "not followed"
+    """A process would begin, beyond the instances that the net has."""
 
 
 UNASKED = "unasked"
@@ -273,11 +275,16 @@ class Exactness(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Approximation:
-    """An element whose net is not exactly what the engine does, and the difference."""
+    """An element whose net is not exactly what the engine does, and the difference.
+
+    `bound`: it makes a difference only if more tokens come to the place of that name than it has
+    room for, or if an element of that id is not followed (`Action.NOT_FOLLOWED`); "": it may.
+    """
 
     element: str
     exactness: Exactness
     what: str
+    bound: str = ""
 
 
 @dataclass(frozen=True, slots=True)

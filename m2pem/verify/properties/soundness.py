@@ -25,7 +25,7 @@ def proper_completion(searched: SearchedMission) -> Result:
     found = searched.found
     for place in found.overflows:
         each = searched.net.places[place]
-        if each.once:
+        if each.once and not each.several:
             violations.append(
                 Violation(
                     f"{searched.label(each.element)} is reached twice in one instance of its scope",
@@ -46,14 +46,15 @@ def one_token_each(searched: SearchedMission) -> Result:
     found = searched.found
     for place in found.overflows:
         each = searched.net.places[place]
-        if each.once:
+        where = searched.node_of(each.element)
+        if each.once or each.several or any(where in known.elements for known in violations):
             continue
         more = " and more and more" if place in found.beyond else ""
         violations.append(
             Violation(
-                f"{searched.label(searched.node_of(each.element))} gets a second token{more}"
+                f"{searched.label(where)} gets a second token{more}"
                 " before the first has left: tokens that were parted are not joined",
-                (searched.node_of(each.element),),
+                (where,),
                 found.overflow_runs[place],
             )
         )

@@ -38,6 +38,10 @@ _BYTES_A_WAITING_STATE = 56
 _BYTES_A_TRANSITION = 8
 """Of each transition that is enabled in a waiting state."""
 _BYTES_AN_EDGE = 16
+MANY_TOKENS = 127
+"""Tokens that are followed on a place where several are meant, as far as that is cheap."""
+MANY_STATES = 5_000
+"""The most states of a search that begins again with room for more of those."""
 AFTER_VIOLATION_STATES = 50_000
 """States that are searched after a violation in any case."""
 
@@ -88,7 +92,8 @@ class Exploration:
 
     `fired`: by transition, the first state in which it fired. `flagged`: those of them that have a
     flag. `overflows`: by place, the first state and transition at which a token came to a place
-    that had one, where one is meant. `beyond`: places that got more than `Limits.tokens`. `edges`:
+    that had one, where one is meant. `beyond`: places that got more than `Limits.tokens`. `lost`:
+    places that had no room for more tokens, which were lost: what follows is not certain. `edges`:
     successors of each state as (transition, state), if they were kept. `expanded`: how many states
     have all their successors, but for those of `cut`: there, a place has no room for a token.
     """
@@ -106,6 +111,7 @@ class Exploration:
     overflows: dict[int, tuple[int, int]] = field(default_factory=dict)
     overflow_runs: dict[int, tuple[int, ...]] = field(default_factory=dict)
     beyond: frozenset[int] = frozenset()
+    lost: frozenset[int] = frozenset()
     edge_start: "array[int] | None" = None
     edge_transition: "array[int] | None" = None
     edge_state: "array[int] | None" = None
@@ -189,10 +195,14 @@ def explore(
             if place not in overflows and not net.places[place].several:
                 overflows[place] = at
                 runs[place] = found.overflow_runs[place]
+        full += [place for place in found.overflows if search.grows_far(place, found)]
         if full and found.stopped is None:
             for place in full:
                 wider[place] = found.encoding.width[place] + 1
             continue
+        found.lost = frozenset(
+            p for p in found.overflows if net.places[p].several or not net.places[p].once
+        )
         found.beyond = frozenset(
             place
             for place in found.overflows
@@ -274,6 +284,12 @@ class _Search:
         """Whether a place that is full gets more room in another search."""
         bits = self.encoding.width[place] + 1
         return not self.net.places[place].once and (1 << bits) - 1 <= self.limits.tokens
+
+    def grows_far(self, place: int, found: Exploration) -> bool:
+        """Whether a place on which several tokens are meant gets more room: the search was small."""
+        several = self.net.places[place].several and not self.grows(place)
+        more = self.encoding.width[place] < MANY_TOKENS.bit_length()
+        return several and more and len(found.states) <= MANY_STATES
 
     def run(
         self, reduction: Reduction | None, progress: Callable[[Progress], None] | None

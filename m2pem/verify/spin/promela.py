@@ -265,12 +265,11 @@ class Writer:
             )
         for pairs, gone in ((transition.moves, True), (transition.copies, False)):
             for source, target in pairs:
-                if not gone and self.net.places[source].kept:
-                    effects.append(self._all_of(source, target))
-                    continue
-                then = f"{places[source]} = 0; " if gone else ""
-                then += self._one_more(target)
-                effects.append(f"if :: {places[source]} -> {then} :: else fi")
+                if target in self.assertions.full and target not in transition.reset:
+                    effects.append(f"assert({places[target]} <= {most[target]} - {places[source]})")
+                effects.append(self._all_of(source, target))
+                if gone:
+                    effects.append(f"{places[source]} = 0")
         if transition.reset in self._clears:
             effects.append(f"{self._clears[transition.reset]}()")
         else:
@@ -293,9 +292,6 @@ class Writer:
         other, name, most = self.places[source], self.places[p], self.most[p]
         fits = f"{name} + {other} <= {most} -> {name} = {name} + {other}"
         return f"if :: {fits} :: else -> {name} = {most} fi"
-
-    def _one_more(self, p: int) -> str:
-        return self._more(p, 1)
 
     def _more(self, p: int, n: int) -> str:
         """Add tokens, up to the number that there is room for."""

@@ -7,12 +7,12 @@ transition by transition, before it is reported.
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from m2pem.errors import InternalError
 from m2pem.verify.net.encoding import Encoding
 from m2pem.verify.net.petri_net import Action, PetriNet
-from m2pem.verify.search.explore import Limits, Progress, Stopped
+from m2pem.verify.search.explore import MANY_STATES, Limits, Progress, Stopped, explore
 from m2pem.verify.spin.programs import CheckerFolder
 from m2pem.verify.spin.promela import Assertions, Model, identifiers, text_of
 from m2pem.verify.spin.queries import QueryResult, SpinQueries, Storage
@@ -157,7 +157,9 @@ class _Search:
         """
         limits, found = self.queries.limits, self.found
         most_bits = max((limits.tokens + 1).bit_length() - 1, 1)
-        wider: dict[int, int] = {}
+        # Spin gives as much room as the built-in search: both see the same states.
+        small = replace(limits, states=MANY_STATES)
+        wider = dict(explore(self.net, small, keep_edges=False).encoding.wider)
         reported_once: set[int] = set()
         while True:
             self.encoding = found.encoding = Encoding(self.net, wider)
@@ -173,7 +175,7 @@ class _Search:
                 found.overflow_runs[place] = self._short(assertions, result) or run
             if self.net.places[place].once:
                 reported_once.add(place)
-            elif self.encoding.width[place] < most_bits:
+            elif self.encoding.width[place] < most_bits and not self.net.places[place].several:
                 wider[place] = most_bits
             else:
                 found.beyond.add(place)

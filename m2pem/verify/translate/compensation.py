@@ -13,6 +13,7 @@ boundary events and other event subprocesses catch nothing then.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 from m2pem.engine.scopes import compensation_handler, is_compensation_handler
 from m2pem.mission import elements as e
@@ -87,22 +88,32 @@ def completion_note(
 ) -> int:
     """The place that says that an activity of a scope (or an instance of it) can be compensated."""
     which = "" if number is None else f"[{number}]"
-    return context.net.place(
-        node, notes_scope(context, scope), Role.CONTROL, f":done{scope.index}{which}"
-    )
+    home, suffix = notes_scope(context, scope), f":done{scope.index}{which}"
+    if number is None and _is_counted(context, scope, node):
+        return context.net.counted(node, home, suffix)
+    return context.net.place(node, home, Role.CONTROL, suffix)
+
+
+def _is_counted(context: TranslationContext, scope: ScopeDraft, node: e.Activity) -> bool:
+    """Whether each time that an activity has completed is undone for itself."""
+    by_activity = compensated_by(context, node) is CompensatedBy.ACTIVITY
+    return by_activity and _comes_again(context, scope, node)
 
 
 def note_completion(context: TranslationContext, instance: ActivityInstance) -> Effect:
     """Note that an activity has completed."""
     if compensated_by(context, instance.node) is None:
         return Effect()
+    place = completion_note(context, instance.outer, instance.node)
+    counted = _is_counted(context, instance.outer, instance.node)
     _note_approximations(
         context,
         instance.outer,
         instance.node,
         again=_comes_again(context, instance.outer, instance.node),
+        counted=context.net.places[place].name if counted else "",
     )
-    return _note(completion_note(context, instance.outer, instance.node))
+    return Effect(produce=(place,)) if counted else _note(place)
 
 
 def note_instance_completion(
@@ -122,7 +133,12 @@ def _note(place: int) -> Effect:
 
 
 def _note_approximations(
-    context: TranslationContext, scope: ScopeDraft, node: e.Activity, *, again: bool
+    context: TranslationContext,
+    scope: ScopeDraft,
+    node: e.Activity,
+    *,
+    again: bool,
+    counted: str = "",
 ) -> None:
     around = container_of(scope)
     others = [
@@ -135,7 +151,10 @@ def _note_approximations(
             node, Exactness.MORE, "it and what else was done is undone in any order"
         )
     if again:
-        context.net.approximate(node, Exactness.BOUNDED, "done several times, it is undone once")
+        how = "more often than is counted, it is undone less often" if counted else (
+            "several times, it is undone once"
+        )
+        context.net.approximate(node, Exactness.BOUNDED, f"done {how}", counted)
 
 
 def _comes_again(context: TranslationContext, scope: ScopeDraft, node: e.Activity) -> bool:
@@ -388,7 +407,9 @@ def _compensate_points(
     busy: list[int] = []
     for number, point in enumerate(points):
         node = point.instance.node
-        claimed.append((point.note, net.place(node, scope, Role.CONTROL, f":for{what}.{number}")))
+        several = net.places[point.note].several
+        make = net.counted if several else partial(net.place, role=Role.CONTROL)
+        claimed.append((point.note, make(node, scope, suffix=f":for{what}.{number}")))
         busy.append(net.place(node, scope, Role.CONTROL, f":by{what}.{number}"))
     for point, (_, claim), mine in zip(points, claimed, busy, strict=True):
         node = point.instance.node

@@ -209,8 +209,8 @@ class TranslationContext:
         self.claims: dict[int, list[tuple[int, int]]] = {}
         self.compensating: dict[int, CompensationEffects] = {}
         self.root = self.everything
-        self.repeated = _repeated_nodes(mission)
-        self.again = _ends_reached_again(mission)
+        self.repeated = self.net.repeated = _repeated_nodes(mission)
+        self.again = _ends_reached_again(mission, self.repeated)
 
     def pool_place(self, pool: Pool) -> int:
         """Return the place with a token for each resource of a pool that is free."""
@@ -291,13 +291,17 @@ def _repeated_nodes(mission: Mission) -> frozenset[e.FlowNode]:
     return frozenset(found - reached)
 
 
-def _ends_reached_again(mission: Mission) -> frozenset[e.FlowNode]:
-    """End events that two tokens of one scope may reach."""
+def _ends_reached_again(
+    mission: Mission, repeated: frozenset[e.FlowNode]
+) -> frozenset[e.FlowNode]:
+    """End events that two tokens of one scope may reach, other than by an event that happens again:
+    what is `repeated` has to be forked itself."""
     waiting = [node for node in mission.nodes if forks(node)]
     reached: set[e.FlowNode] = set()
     while waiting:
-        for each in following(waiting.pop()):
-            if each not in reached:
+        node = waiting.pop()
+        for each in following(node):
+            if each not in reached and (node in repeated or each not in repeated):
                 reached.add(each)
                 waiting.append(each)
     return frozenset(each for each in reached if isinstance(each, e.EndEvent))
@@ -315,6 +319,8 @@ def register_catcher(
     """Register that a signal or message with that id reaches a token on `waiting`."""
     register = context.signals if what == "signal" else context.messages
     register.setdefault(ref, []).append(Catcher(waiting, caught, keeps, node.id))
+    if keeps or context.net.places[waiting].several:
+        context.net.places[caught] = replace(context.net.places[caught], several=True)
 
 
 def what_and_ref(definition: EventDefinition) -> tuple[str, str]:

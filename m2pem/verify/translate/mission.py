@@ -135,10 +135,11 @@ def _instances(context: TranslationContext, process: e.Process) -> None:
     context.net.approximate(
         process,
         Exactness.BOUNDED,
-        f"checked with up to {context.options.instances} instances at a time",
+        f"checked with up to {context.options.processes} instances at a time",
+        process.id,
     )
     scopes = []
-    for number in range(context.options.instances):
+    for number in range(context.options.processes):
         step = f"{process.id}#{number + 1}"
         scope = context.net.scope(process, context.everything, step=step, frame=(process.id, step))
         build(context, process, scope)
@@ -173,7 +174,8 @@ def _begun_by(
             more = after(context, start, scope)
         come = context.data.receive([free], scope, start) if brings else [free]
         ways += product(product(come, inside), more)
-    full = Effect(read=frozenset(on for _, on in scopes))
+    beyond = (Step(process.id, Action.NOT_FOLLOWED),)
+    full = Effect(beyond, read=frozenset(on for _, on in scopes))
     match definition:
         case SignalEventDefinition() | MessageEventDefinition():
             what, ref = what_and_ref(definition)

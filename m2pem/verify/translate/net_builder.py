@@ -173,6 +173,8 @@ class NetBuilder:
         """Entry places of elements that wait as soon as they are entered (`enter_at_once`)."""
         self.holding: list[int] = []
         """Places whose resources come from pools."""
+        self.repeated: frozenset[FlowNode] = frozenset()
+        """Nodes on which several tokens are meant: what they follow may happen again."""
         self.same_holding: dict[tuple[int, tuple[int, ...]], int] = {}
         """By a place of `holding` and other places to which its resources may go, the place of the
         same task that has the same resources and gives them back there."""
@@ -265,9 +267,17 @@ class NetBuilder:
         """Note that an element has transitions."""
         self.elements[element.id] = element.label
 
-    def approximate(self, element: Element, exactness: Exactness, what: str) -> None:
+    def approximate(
+        self, element: Element, exactness: Exactness, what: str, bound: str = ""
+    ) -> None:
         """Note where the net is not exactly what the engine does."""
-        self.approximations[Approximation(element.id, exactness, what)] = None
+        self.approximations[Approximation(element.id, exactness, what, bound)] = None
+
+    def counted(self, element: Element, scope: ScopeDraft, suffix: str) -> int:
+        """Return a place that counts, as far as it has room: what is beyond is lost."""
+        number = self.place(element, scope, Role.CONTROL, suffix, several=True)
+        self.places[number] = replace(self.places[number], once=True)
+        return number
 
     # --- the end --------------------------------------------------------------------------------
 
@@ -439,7 +449,7 @@ def arrival(net: NetBuilder, flow: SequenceFlow, scope: ScopeDraft) -> int:
 def entry_place(net: NetBuilder, node: FlowNode, scope: ScopeDraft) -> int:
     """The place of a token that has entered a node."""
     many = isinstance(node, Activity) and node.start_quantity > 1
-    return net.place(node, scope, Role.ENTERING, several=many)
+    return net.place(node, scope, Role.ENTERING, several=many or node in net.repeated)
 
 
 def enter_at_once(net: NetBuilder, initial: Sequence[int]) -> tuple[int, ...]:

@@ -17,8 +17,8 @@ class Options:
     `data`: what the run is started with. `service_writes`: names that each service writes, by
     class; one that is not listed may write any name that nothing else writes. `open_world`: every
     signal and message may come from outside, not only those that operators are expected to send.
-    `instances`: how many parallel instances of an activity, and of a process that triggers start,
-    are modelled when the mission does not state their number. `calls`: how often a process may be
+    `instances`: how many parallel instances of an activity are modelled when the mission does not
+    state their number; `processes`: the same of a process that triggers start. `calls`: how often a process may be
     called within itself. `assumed`: what is taken not to happen. `timers_in_order`: of timers that
     begin to run together, the one that is due first fires first. `catalogue`: what each resource
     offers; None: all that the mission asks for. `distinguished`: resources that requirements are
@@ -30,6 +30,7 @@ class Options:
     service_writes: Mapping[str, Sequence[str]] = field(default_factory=dict)
     open_world: bool = False
     instances: int = 2
+    processes: int = 2
     calls: int = 1
     assumed: Assumptions = NOTHING
     timers_in_order: bool = False

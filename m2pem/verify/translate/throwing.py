@@ -327,13 +327,13 @@ def _stored_messages(context: TranslationContext, message: str) -> int:
     """The place with the copies of a message that wait for a catcher: their number is
     not limited.
     """
+    place = context.net.counted(context.process, context.everything, f":{message}")
     context.net.approximate(
-        context.process, Exactness.BOUNDED, f"up to three copies of message {message} are kept"
+        context.process,
+        Exactness.BOUNDED,
+        f"not all copies of message {message} that are kept are counted",
+        context.net.places[place].name,
     )
-    place = context.net.place(
-        context.process, context.everything, Role.CONTROL, f":{message}", several=True
-    )
-    context.net.places[place] = replace(context.net.places[place], once=True)
     return place
 
 
