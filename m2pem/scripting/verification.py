@@ -88,7 +88,7 @@ class VerificationResult:
         about = f"{found.mission.file}, process {found.net.process}; {covered(found.coverage)}"
         rows = [
             (answer.verdict.value, answer.property, f"{answer.text} {answer.covered}".strip())
-            if answer.verdict is not Verdict.VIOLATED or found.counts(answer)
+            if not answer.violations or found.counts(answer)
             else ("warning", answer.property, answer.text)
             for answer in found.results
         ]
@@ -99,8 +99,13 @@ class VerificationResult:
 
     def _violation(self, violation: DescribedViolation) -> list[str]:
         found = self.findings
-        kind = "violated" if found.counts(violation.answer) else "warning"
+        doubt = violation.found.doubt
+        kind = (Verdict.MAY_BE_VIOLATED if doubt else Verdict.VIOLATED).value
+        if not found.counts(violation.answer):
+            kind = "warning"
         parts = [headline(kind, f"{violation.answer.property}: {violation.found.message}")]
+        if doubt:
+            parts.append(paragraph(f"It may be a false alarm: {doubt}."))
         if violation.run_steps or violation.loop:
             try:
                 parts += [picture(svg) for svg in pictures(found, violation).values()]

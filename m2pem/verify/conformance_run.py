@@ -1,17 +1,18 @@
 """Conformance run: the engine executes a counterexample step by step.
 
-    run = ConformanceRun(mission, fleet, process, data)
-    for step in steps:                # steps of a report as data (m2pem.verify.report.data)
+    run = ConformanceRun(mission, fleet, process, data, steps=steps)
+    for step in steps:                # steps of a report as data (m2pem.verify.report.run_steps)
         run.play(step)
     run.undone                        # sequence flows that the net took and the engine did not
 
 Each step that comes from outside becomes an input of the engine. The internal steps are not played:
-the run compares them with what the engine does by itself. Where a run waits for a condition,
-`data_for` finds data that makes the condition true or false.
+the run compares them with what the engine does by itself. Where the mission leaves open what
+happens, the engine does what the run does: a gateway without conditions takes the flows of the run,
+and `data_for` finds data for conditions on what nothing in the mission writes.
 """
 
-from collections import Counter
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections import Counter, deque
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from itertools import combinations, islice, product
 from typing import Any
 
@@ -21,12 +22,21 @@ from m2pem.engine.arming import definition_of
 from m2pem.engine.data import reader
 from m2pem.engine.keeping import may_use
 from m2pem.engine.run import MissionRun, Step
-from m2pem.engine.state import AllocationRequest, BehaviorPhase, RunStatus, Token, Wait
+from m2pem.engine.state import (
+    AllocationRequest,
+    BehaviorPhase,
+    RunState,
+    RunStatus,
+    Scope,
+    Token,
+    Wait,
+)
 from m2pem.engine.steps import Steps
 from m2pem.errors import ExpressionError
 from m2pem.fleet.fleet import Fleet
 from m2pem.fleet.space import without_space
 from m2pem.mission.catalogue import BehaviorState, ResourceId
+from m2pem.mission.elements import ExclusiveGateway, FlowNode, InclusiveGateway, SequenceFlow
 from m2pem.mission.expression import Expression
 from m2pem.mission.losses import LINK_LOST, UNAVAILABLE
 from m2pem.mission.mission import Mission
@@ -35,6 +45,7 @@ from m2pem.verify.net import choices
 from m2pem.verify.net.petri_net import REASSIGNED, Action, Trigger
 from m2pem.verify.translate.domains import constants, representatives
 from m2pem.verify.translate.pools import candidates_of
+from m2pem.verify.translate.sequence_flows import is_free_choice
 from m2pem.verify.translate.space import SpacePlan, space_plan
 from m2pem.verify.translate.ways import KnownWays
 
@@ -43,6 +54,7 @@ _START_US = 1_767_225_600 * _SECOND_US  # 2026-01-01, as of rehearsals
 _MOST_TIMERS = 1_000
 """Most other timers that may fire before the timer of a step."""
 _BY = "counterexample"
+_BATCH = 10_000
 
 
 class NotPlayableError(Exception):
@@ -52,9 +64,53 @@ class NotPlayableError(Exception):
 
 
 class _StepsWithOpenConditions(Steps):
-    """Steps of a run into which data of unknown origin may still be written."""
+    """Steps of a run into which data of unknown origin may still be written.
 
-    __slots__ = ()
+    `choices`: by element, the sequence flows by which its next tokens leave, where neither the
+    mission nor its data decides; `made`: names of the data that was written for that.
+    """
+
+    __slots__ = ("choices", "made")
+
+    def __init__(
+        self, state: RunState, fleet: Fleet | None, choices: Mapping[str, deque[tuple[str, ...]]]
+    ) -> None:
+        super().__init__(state, fleet, _BATCH)
+        self.choices = choices
+        self.made: set[str] = set()
+
+    def emit(self, record: r.Record) -> None:
+        super().emit(record)
+        if isinstance(record, r.FlowTaken):
+            flow = self.mission.elements[record.flow]
+            assert isinstance(flow, SequenceFlow)
+            if chosen := self.choices.get(flow.target.id):
+                self._decide(flow.target, self.state.scopes[record.scope], chosen[0])
+
+    def proceed(self, token: Token, flows: Iterable[SequenceFlow]) -> None:
+        """Leave by the flows of the run, where the mission leaves that open."""
+        node = token.node
+        chosen = self.choices.get(node.id)
+        if chosen:
+            taken = chosen.popleft()
+            if isinstance(node, ExclusiveGateway | InclusiveGateway) and is_free_choice(node):
+                flows = [flow for flow in node.outgoing if flow.id in taken]
+        super().proceed(token, flows)
+
+    def _decide(self, node: FlowNode, scope: Scope, taken: tuple[str, ...]) -> None:
+        """Write data that nothing in the mission writes, so that a token leaves by these flows."""
+        wanted: list[tuple[Expression, bool]] = []
+        for flow in node.outgoing:
+            if flow.condition is not None and flow is not getattr(node, "default", None):
+                wanted.append((flow.condition, flow.id in taken))
+                if flow.id in taken and isinstance(node, ExclusiveGateway):
+                    break
+        read = reader(scope)
+        names = {name for condition, _ in wanted for name in condition.names}
+        known = {name for name in names - self.made if read(name) is not None}
+        if data := data_for(wanted, read, known):
+            self.made.update(data)
+            self.write_in(scope, node, dict(data))
 
     def _fail_if_stuck(self) -> None:
         """A run that waits for a condition is not stuck: the condition may become true."""
@@ -68,9 +124,14 @@ class _Run(MissionRun):
     The net lets a condition on such data become true at any time.
     """
 
-    def __init__(self, mission: Mission, fleet: Fleet | None) -> None:
+    def __init__(
+        self,
+        mission: Mission,
+        fleet: Fleet | None,
+        choices: Mapping[str, deque[tuple[str, ...]]],
+    ) -> None:
         super().__init__(mission, fleet, "r1")
-        self._x = _StepsWithOpenConditions(self.state, fleet, 10_000)
+        self._x = _StepsWithOpenConditions(self.state, fleet, choices)
 
     def write(self, wait: Wait, data: dict[str, Value], now_us: int) -> Step:
         """Write data where an element waits for a condition that reads it."""
@@ -91,14 +152,15 @@ class ConformanceRun:
         process: str,
         data: Mapping[str, Value] | None = None,
         ways: KnownWays | None = None,
+        steps: Sequence[Mapping[str, Any]] = (),
     ) -> None:
-        """`ways`: those with which the net was made."""
+        """`ways`: those with which the net was made. `steps`: those that are going to be played."""
         self._space: SpacePlan | None = None
         if fleet is not None:
             candidates = candidates_of(mission, fleet, None)
             self._space = space_plan(mission, mission.process(process), fleet, candidates, ways)
             fleet = without_space(fleet) if self._space is None else self._space.fleet
-        self.run = _Run(mission, fleet)
+        self.run = _Run(mission, fleet, _choices(mission, steps))
         self.steps: list[Step] = []
         self._now_us = _START_US
         self._reports: Counter[str] = Counter()
@@ -216,7 +278,8 @@ class ConformanceRun:
             self._give(i.ServiceFailed(token.service, code))
         elif token.behavior:
             state = BehaviorState.FAILED if code else BehaviorState.SUCCEEDED
-            self._report(token.behavior, state, LINK_LOST if code == REASSIGNED else code)
+            code_or_loss = LINK_LOST if code == REASSIGNED else code
+            self._report(token.behavior, state, code_or_loss, {} if code else writes)
             if code != REASSIGNED and (found := self.run.state.tokens.get(token.id)) is not None:
                 self._refuse_rest(found)
         else:
@@ -227,9 +290,16 @@ class ConformanceRun:
         if token.allocation and token.lost_work is not None:
             self._give(i.ResourcesNotFree(token.allocation, "too few are free", {}, UNAVAILABLE))
 
-    def _report(self, behavior: str, state: BehaviorState, code: str = "") -> None:
+    def _report(
+        self,
+        behavior: str,
+        state: BehaviorState,
+        code: str = "",
+        outputs: Mapping[str, Value] | None = None,
+    ) -> None:
         self._reports[behavior] += 1
-        self._give(i.BehaviorReported(behavior, self._reports[behavior], state, code))
+        number, written = self._reports[behavior], dict(outputs or {})
+        self._give(i.BehaviorReported(behavior, number, state, code, outputs=written))
 
     def _time_is_up(self, element: str) -> None:
         request = self._request(element)
@@ -255,7 +325,7 @@ class ConformanceRun:
             for truth in [*before, True]:
                 read = reader(wait.token or wait.scope)
                 known = {key for name in data for key in _endings(name)}
-                values = data_for(definition_of(wait).condition, truth, read, known)
+                values = data_for([(definition_of(wait).condition, truth)], read, known)
                 if values is None:
                     raise NotPlayableError(f"no data was found for the condition of {element}")
                 steps = self._after(self.run.write(wait, dict(values), self._now_us))
@@ -299,6 +369,28 @@ class ConformanceRun:
         raise NotPlayableError(f"{element} does not work in the engine now: its tokens are {where}")
 
 
+def _choices(
+    mission: Mission, steps: Sequence[Mapping[str, Any]]
+) -> dict[str, deque[tuple[str, ...]]]:
+    """Return by which flows the tokens of each element leave, one after the other; by none, where
+    it has none that is true."""
+    found: dict[str, deque[tuple[str, ...]]] = {}
+    for step in steps:
+        before = ""
+        for action in step["actions"]:
+            element = mission.elements.get(action["element"])
+            if action["action"] == Action.TAKEN and isinstance(element, SequenceFlow):
+                source, taken = element.source.id, found.setdefault(element.source.id, deque())
+                rest = taken.pop() if before == source else ()
+                taken.append((*rest, element.id))
+                before = source
+                continue
+            before = ""
+            if action["action"] == Action.THROWN and action["detail"] == "NO_FLOW":
+                found.setdefault(action["element"], deque()).append(())
+    return found
+
+
 def _endings(name: str) -> set[str]:
     """A name with the calls that it is in before it, and without each of them."""
     parts = name.split(".")
@@ -311,29 +403,34 @@ _ORDINARY: tuple[Value, ...] = (True, False, 1, 0, -1, 2, None, "something", [])
 
 
 def data_for(
-    condition: Expression, truth: bool, read: ReadValue, known: Collection[str] = ()
+    wanted: Sequence[tuple[Expression, bool]], read: ReadValue, known: Collection[str] = ()
 ) -> Mapping[str, Value] | None:
-    """The fewest values to write for a condition to have a truth; None: none were found.
+    """The fewest values to write for conditions to have their truths; None: none were found.
 
     `read`: the data that there is. `known`: names that keep their values.
     """
-    free = sorted(name for name in condition.names if name not in known)
-    for data in islice(_changes(condition, free), _MOST_TRIES):
+    names = {name for condition, _ in wanted for name in condition.names}
+    compared: dict[str, set[tuple[str, Value]]] = {}
+    for condition, _ in wanted:
+        for name, values in constants(condition).items():
+            compared.setdefault(name, set()).update(values)
+    for data in islice(_changes(compared, sorted(names - set(known))), _MOST_TRIES):
 
         def with_changes(name: str, data: Mapping[str, Value] = data) -> Value:
             return data[name] if name in data else read(name)
 
         try:
-            if condition.holds(with_changes) is truth:
+            if all(condition.holds(with_changes) is truth for condition, truth in wanted):
                 return data
         except ExpressionError:
             continue
     return None
 
 
-def _changes(condition: Expression, names: list[str]) -> Iterator[dict[str, Value]]:
+def _changes(
+    compared: Mapping[str, Collection[tuple[str, Value]]], names: list[str]
+) -> Iterator[dict[str, Value]]:
     """Every choice of values, those that change the fewest names first."""
-    compared = constants(condition)
     tried: dict[str, list[Value]] = {}
     for name in names:
         alike = representatives(compared[name]) if name in compared else []

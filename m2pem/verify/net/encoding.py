@@ -78,6 +78,7 @@ class Encoding:
             self.initial |= count << self.offset[place_index]
         for variable in net.variables:
             self.initial |= 1 << (self.value_bit[variable.index] + variable.initial)
+        self._counted = self.places_mask(p.index for p in net.places if p.counts_moves)
         self._reset_masks: dict[tuple[int, ...], int] = {}
         self.transitions = [self._compile(transition) for transition in net.transitions]
 
@@ -221,8 +222,7 @@ class Encoding:
                 if count > room:
                     full |= target
         state &= ~c.erase
-        full &= ~c.erase
-        full |= state & c.put
+        full = full & self._counted & ~c.erase | state & c.put
         state |= c.put
         for mask, offset, count, most in c.gives:
             if ((state & mask) >> offset) + count > most:

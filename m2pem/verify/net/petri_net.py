@@ -151,6 +151,11 @@ class Place:
     """Each token is one of these vehicles, which is in the shared spaces `inside`."""
     inside: tuple[str, ...] = ()
 
+    @property
+    def counts_moves(self) -> bool:
+        """Whether a token that is moved or copied to it, and does not fit, is lost."""
+        return self.several or self.role is Role.TRIGGERED
+
 
 @dataclass(frozen=True, slots=True)
 class Variable:

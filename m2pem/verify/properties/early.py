@@ -22,7 +22,7 @@ from m2pem.verify.properties.events import (
     is_caught,
     prompts_have_decisions,
 )
-from m2pem.verify.properties.results import Result, SearchedMission, Verdict
+from m2pem.verify.properties.results import Confirm, Result, SearchedMission, Verdict
 from m2pem.verify.properties.soundness import (
     following_from_deadlock,
     no_dead_element,
@@ -61,8 +61,15 @@ class EarlyResults:
     `decided` gets each result once, when it is certain; later there may be more violations in it.
     """
 
-    def __init__(self, mission: Mission, net: PetriNet, decided: Decided | None = None) -> None:
+    def __init__(
+        self,
+        mission: Mission,
+        net: PetriNet,
+        decided: Decided | None = None,
+        confirm: Confirm | None = None,
+    ) -> None:
         self.results: dict[str, Result] = {}
+        self._confirm = confirm
         self._mission, self._net, self._decided = mission, net, decided
         self._unreached = set(to_be_reached(mission, net))
         self._found: Exploration | None = None
@@ -77,18 +84,21 @@ class EarlyResults:
 
     def begin(self, unsearched: Exploration) -> None:
         """Decide what needs no search."""
-        searched = SearchedMission(self._mission, self._net, unsearched)
+        searched = self._searched(unsearched)
         self.settle(each(searched) for each in _OF_THE_NET)
 
     def look(self, found: Exploration) -> bool:
         """See `Watch`."""
-        searched = SearchedMission(self._mission, self._net, found)
+        searched = self._searched(found)
         for each in dict.fromkeys(self._due(searched)):  # each once
             result = each(searched)
             self.settle([result])
             if each is no_deadlock and result.violations:
                 self.settle(following_from_deadlock(searched, result.violations[0]))
         return self.violated
+
+    def _searched(self, found: Exploration) -> SearchedMission:
+        return SearchedMission(self._mission, self._net, found, confirm=self._confirm)
 
     def _due(self, searched: SearchedMission) -> Iterator[Property]:
         """The properties that something new among what was found may decide."""
@@ -119,18 +129,20 @@ class EarlyResults:
     def settle(self, results: Iterable[Result]) -> None:
         """Keep and say those results that are certain, unless they were before."""
         for result in results:
-            if result.verdict is Verdict.UNDECIDED or result.property in self.results:
+            if result.verdict not in (Verdict.HOLDS, Verdict.VIOLATED):
+                continue
+            if result.property in self.results:
                 continue
             self.results[result.property] = result
             if self._decided is not None:
                 self._decided(result)
 
     def merged(self, result: Result) -> Result:
-        """Return a result at the end of a search; if it is undecided, what was certain before.
+        """Return a result at the end of a search; if it is not certain, what was certain before.
 
         A search with more room that was ended may not come as far as the one before it.
         """
-        if result.verdict is Verdict.UNDECIDED:
+        if result.verdict not in (Verdict.HOLDS, Verdict.VIOLATED):
             return self.results.get(result.property, result)
         return result
 
@@ -142,10 +154,16 @@ class EarlyInterruptions:
     """
 
     def __init__(
-        self, mission: Mission, net: PetriNet, resources: dict[int, str], *, violated: bool
+        self,
+        mission: Mission,
+        net: PetriNet,
+        resources: dict[int, str],
+        *,
+        violated: bool,
+        confirm: Confirm | None = None,
     ) -> None:
         self._mission, self._net, self._resources = mission, net, resources
-        self._violated = violated
+        self._violated, self._confirm = violated, confirm
 
     def look(self, found: Exploration) -> bool:
         """See `Watch`."""
@@ -155,6 +173,6 @@ class EarlyInterruptions:
         if not any(found.states[state] & marked for state in found.terminals):
             return False
         searched = SearchedMission(
-            self._mission, self._net, found, watched=found, resources=self._resources
+            self._mission, self._net, found, found, self._resources, self._confirm
         )
         return interrupted_commanded_again(searched).verdict is Verdict.VIOLATED

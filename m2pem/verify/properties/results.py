@@ -2,20 +2,24 @@
 from.
 """
 
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from itertools import islice
 
 from m2pem.mission.mission import Mission
 from m2pem.verify.assumptions import NOTHING, Assumptions
-from m2pem.verify.net.petri_net import Flag, PetriNet, Role
+from m2pem.verify.net.petri_net import Action, Approximation, Exactness, Flag, PetriNet, Role
 from m2pem.verify.search.explore import Exploration
 
 
 class Verdict(StrEnum):
-    """Three-valued: an incomplete search that has seen no violation has proved nothing."""
+    """An incomplete search that has seen no violation has proved nothing; a violation that the
+    engine was not seen to do may be a false alarm."""
 
     HOLDS = "holds"
     VIOLATED = "violated"
+    MAY_BE_VIOLATED = "may be violated"
     UNDECIDED = "undecided"
 
 
@@ -32,6 +36,8 @@ class Violation:
     elements: tuple[str, ...] = ()
     run: tuple[int, ...] = ()
     cycle: tuple[int, ...] = ()
+    doubt: str = ""
+    """Why it may be a false alarm; "": it is certain."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,8 +54,8 @@ class Result:
     violations: tuple[Violation, ...] = ()
     warning: bool = False
     covered: str = ""
-    """Undecided: what was searched, or why there is no answer. Holds: in what sense, if there is
-    more to say.
+    """Undecided: what was searched, or why there is no answer. May be violated: why that is not
+    certain. Holds: in what sense, if there is more to say.
     """
     required: bool = False
     author: str = ""
@@ -68,6 +74,47 @@ class Result:
 MOST_VIOLATIONS = 10
 """Most violations of one property: the shortest runs to each place where it shows."""
 
+Confirm = Callable[[PetriNet, Sequence[int]], str]
+"""Where the engine does not follow a run of a net; "": it does."""
+
+
+def bounded(net: PetriNet, found: Exploration) -> tuple[Approximation, ...]:
+    """Return the approximations of a net that made a difference in a search, or may have made it.
+
+    If any of them is a bound, what no run of the net does may happen all the same.
+    """
+    reached = {net.places[place].name for place in found.lost}
+    for number in found.fired:
+        for step in net.transitions[number].steps:
+            if step.action is Action.NOT_FOLLOWED:
+                reached.add(step.element)
+    return tuple(each for each in net.approximations if not each.bound or each.bound in reached)
+
+
+BEYOND = "what happens beyond a bound of the search is not known"
+UNEXPLAINED = "the search is at fault, as it found what the engine does not do; please report that"
+"""The reason for doubts where the net is exact."""
+
+
+def judged(
+    violations: Iterable[Violation],
+    net: PetriNet,
+    approximations: Sequence[Approximation],
+    confirm: Confirm | None,
+) -> tuple[Violation, ...]:
+    """Return violations, the certain ones first, each with its doubt. `approximations`: those that
+    may explain false alarms."""
+    known = []
+    for each in islice(violations, MOST_VIOLATIONS):
+        doubt = each.doubt
+        if not doubt and confirm is not None and (each.run or each.cycle):
+            doubt = confirm(net, (*each.run, *each.cycle))
+            if doubt:
+                why = "" if approximations else f"; {UNEXPLAINED}"
+                doubt = f"the engine does not follow its run: {doubt}{why}"
+        known.append(replace(each, doubt=doubt))
+    return tuple(sorted(known, key=lambda each: bool(each.doubt)))
+
 
 @dataclass(slots=True)
 class SearchedMission:
@@ -82,6 +129,14 @@ class SearchedMission:
     found: Exploration
     watched: Exploration | None = None
     resources: dict[int, str] = field(default_factory=dict)
+    confirm: Confirm | None = None
+    """None: no run is executed."""
+
+    @property
+    def is_bounded(self) -> bool:
+        """Whether something may happen in the mission that no run of the net does."""
+        bounds = bounded(self.net, self.found)
+        return any(each.exactness is Exactness.BOUNDED for each in bounds)
 
     def label(self, element: str) -> str:
         """The name of an element for people."""
@@ -142,11 +197,12 @@ class SearchedMission:
 
         `static`: no search was needed. `note`: in what sense it holds.
         """
-        if violations:
-            return Result(
-                name, text, Verdict.VIOLATED, tuple(violations[:MOST_VIOLATIONS]), warning
-            )
         found = found or self.found
+        if violations:
+            known = judged(violations, found.net, bounded(self.net, self.found), self.confirm)
+            doubt = known[0].doubt
+            verdict = Verdict.MAY_BE_VIOLATED if doubt else Verdict.VIOLATED
+            return Result(name, text, verdict, known, warning, doubt)
         if static or found.complete:
             return Result(name, text, Verdict.HOLDS, (), warning, note)
         covered = f"{len(found.states):,} states, stopped by {found.stopped}"

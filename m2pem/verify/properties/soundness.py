@@ -1,6 +1,7 @@
 """Soundness: does the mission always complete, properly, and without dead elements?"""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from m2pem.mission import elements as e
 from m2pem.mission.events import CompensateEventDefinition
@@ -15,7 +16,7 @@ from m2pem.verify.net.petri_net import (
     Role,
     Trigger,
 )
-from m2pem.verify.properties.results import Result, SearchedMission, Violation
+from m2pem.verify.properties.results import BEYOND, Result, SearchedMission, Verdict, Violation
 from m2pem.verify.search.fairness import FairCycles
 
 
@@ -180,7 +181,25 @@ def can_complete(searched: SearchedMission) -> Result:
         state = _shown(searched, lost)
         stuck = searched.where(state)
         violations.append(_no_end(searched, stuck, tuple(searched.found.run_to(state))))
+    violations = _of_ends(searched, violations)
     return searched.result("can-complete", CAN_COMPLETE, violations)
+
+
+def _of_all_runs(searched: SearchedMission, violations: list[Violation]) -> list[Violation]:
+    """Say of violations that no run ends after them whether that is certain beyond a bound."""
+    doubt = BEYOND if searched.is_bounded else ""
+    return [replace(each, doubt=doubt) for each in violations]
+
+
+def _of_ends(searched: SearchedMission, violations: list[Violation]) -> list[Violation]:
+    """The same, of what a run violates as well that gets stuck: if the engine does, it is certain.
+    """
+    stuck = no_deadlock(searched) if violations else None
+    if stuck is None or stuck.verdict is not Verdict.VIOLATED:
+        return _of_all_runs(searched, violations)
+    if searched.result("", "", violations[:1]).verdict is Verdict.VIOLATED:
+        return violations
+    return [_no_end(searched, each.elements, each.run) for each in stuck.violations[:1]]
 
 
 def _no_end(searched: SearchedMission, where: tuple[str, ...], run: tuple[int, ...]) -> Violation:
@@ -220,6 +239,7 @@ def completes_if_fair(searched: SearchedMission) -> Result:
         violations = [_never_ends(searched, _shown(searched, lost))]
     elif not violations and found.reduced and found.complete and rounds.any:
         note = IN_EACH_STATE
+    violations = _of_ends(searched, violations)
     return searched.result("completes-if-fair", FAIR, violations, note=note)
 
 
@@ -282,6 +302,7 @@ def no_livelock(searched: SearchedMission) -> Result:
             )
         )
         break
+    violations = _of_all_runs(searched, violations)
     return searched.result("no-livelock", "Nothing goes on for ever without a way out.", violations)
 
 
@@ -319,12 +340,17 @@ def no_dead_element(searched: SearchedMission) -> Result:
     }
     wanted = to_be_reached(searched.mission, net)
     everything = bool(wanted) and wanted.keys() <= reached
-    if not found.complete:  # what no transition reaches is dead all the same
-        reached = {step.element for each in net.transitions for step in each.steps}
+    # What no transition reaches is dead, whatever was searched.
+    possible = {step.element for each in net.transitions for step in each.steps}
+    doubt = BEYOND if searched.is_bounded else ""
     violations = [
-        Violation(f"{searched.label(element)} is never reached", (element,))
+        Violation(
+            f"{searched.label(element)} is never reached",
+            (element,),
+            doubt=doubt if element in possible else "",
+        )
         for element in wanted
-        if element not in reached
+        if element not in (reached if found.complete else possible)
     ]
     text = "Every element is reached in some run."
     return searched.result("no-dead-element", text, violations, static=everything)

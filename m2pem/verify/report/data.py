@@ -4,14 +4,12 @@ The shape is that of docs/verification.schema.json. `version` counts up when som
 there changes its meaning or goes; what is added needs no new version.
 """
 
-from collections.abc import Sequence
 from hashlib import sha256
 from typing import Any
 
 from m2pem.verify.properties.results import Result
 from m2pem.verify.report.conditions import condition_of
 from m2pem.verify.report.findings import DescribedViolation, Findings
-from m2pem.verify.report.run_steps import RunStep, Token
 
 VERSION = 1
 
@@ -80,34 +78,10 @@ def _violation(violation: DescribedViolation) -> dict[str, Any]:
         "warning": violation.answer.warning,
         "required": violation.answer.required,
         "text": violation.found.message,
+        "doubt": violation.found.doubt,
         "elements": [*violation.found.elements],
         "missing": [*violation.missing],
-        "steps": [_step(run_step) for run_step in violation.run_steps],
-        "loop": [_step(run_step) for run_step in violation.loop],
-        "tokens": _tokens(violation.tokens),
+        "steps": [each.as_data() for each in violation.run_steps],
+        "loop": [each.as_data() for each in violation.loop],
+        "tokens": [each.as_data() for each in violation.tokens],
     }
-
-
-def _step(run_step: RunStep) -> dict[str, Any]:
-    return {
-        "step": run_step.number,
-        "text": run_step.text,
-        "element": run_step.element,
-        "passes": [*run_step.passes],
-        "trigger": run_step.trigger or None,
-        "detail": run_step.detail,
-        "actions": [
-            {"element": each.element, "action": each.action.value, "detail": each.detail}
-            for each in run_step.actions
-        ],
-        "tokens": _tokens(run_step.tokens),
-        "data": dict(run_step.data),
-        "writes": dict(run_step.writes),
-        "rules": [*run_step.transitions],
-    }
-
-
-def _tokens(tokens: Sequence[Token]) -> list[dict[str, Any]]:
-    return [
-        {"element": each.element, "count": each.count, "waits": bool(each.flow)} for each in tokens
-    ]

@@ -94,7 +94,12 @@ class Findings:
     @property
     def exit_status(self) -> int:
         """The exit status of the command line."""
-        return {Verdict.HOLDS: 0, Verdict.VIOLATED: 1, Verdict.UNDECIDED: 3}[self.verdict]
+        return {
+            Verdict.HOLDS: 0,
+            Verdict.VIOLATED: 1,
+            Verdict.UNDECIDED: 3,
+            Verdict.MAY_BE_VIOLATED: 4,
+        }[self.verdict]
 
 
 def findings_of(

@@ -26,7 +26,7 @@ def _lines(findings: Findings, pictures: Mapping[int, Sequence[str]]) -> Iterato
     yield "|---|---|---|"
     for answer in findings.results:
         verdict = answer.verdict.value
-        if answer.verdict is Verdict.VIOLATED and not findings.counts(answer):
+        if answer.violations and not findings.counts(answer):
             verdict = "warning"
         said = [answer.text, *([f"({answer.covered})"] if answer.covered else [])]
         condition = condition_of(findings, answer)
@@ -46,10 +46,15 @@ def _lines(findings: Findings, pictures: Mapping[int, Sequence[str]]) -> Iterato
 
 
 def _violation(violation: DescribedViolation, pictures: Sequence[str]) -> Iterator[str]:
-    kind = "warning" if violation.answer.warning else "violated"
+    doubt = violation.found.doubt
+    kind = (Verdict.MAY_BE_VIOLATED if doubt else Verdict.VIOLATED).value
+    if violation.answer.warning:
+        kind = "warning"
     yield f"## {violation.answer.property}: {kind}"
     yield ""
     yield _plain(_sentence(violation.found.message))
+    if doubt:
+        yield _plain(_sentence(f"may be a false alarm: {doubt}"))
     if violation.found.elements:
         yield ""
         yield f"At {', '.join(f'`{each}`' for each in violation.found.elements)}."

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from m2pem.mission import elements as e
 from m2pem.mission.behavior import Behavior
@@ -96,6 +97,7 @@ def _letters(text: str) -> str:
 COMMANDS = "commands"
 """Detail of the step in which a task's behavior is requested, after the task was entered."""
 _NUMBERED = re.compile(r"(#\d+|\[\d+\])$")
+_ROOM_BITS = 8
 _SAME = -1
 """Index of a part that belongs to the transition before it."""
 _PASSED = (Action.TAKEN,)
@@ -108,6 +110,10 @@ class Token:
     element: str
     count: int
     flow: str = ""
+
+    def as_data(self) -> dict[str, Any]:
+        """Return it as JSON values."""
+        return {"element": self.element, "count": self.count, "waits": bool(self.flow)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,6 +139,25 @@ class RunStep:
     data: Mapping[str, Value]
     writes: Mapping[str, Value]
 
+    def as_data(self) -> dict[str, Any]:
+        """Return it as JSON values."""
+        return {
+            "step": self.number,
+            "text": self.text,
+            "element": self.element,
+            "passes": [*self.passes],
+            "trigger": self.trigger or None,
+            "detail": self.detail,
+            "actions": [
+                {"element": each.element, "action": each.action.value, "detail": each.detail}
+                for each in self.actions
+            ],
+            "tokens": [each.as_data() for each in self.tokens],
+            "data": dict(self.data),
+            "writes": dict(self.writes),
+            "rules": [*self.transitions],
+        }
+
 
 def describe_run(
     net: PetriNet,
@@ -141,13 +166,14 @@ def describe_run(
     *,
     begin: int = 0,
     at: int | None = None,
+    encoding: Encoding | None = None,
 ) -> tuple[tuple[RunStep, ...], int]:
     """Describe a run, and return the state in which it ends too.
 
     `begin`: how many steps were described before; `at`: the state that those led to, None for the
-    first.
+    first. `encoding`: that of `encoding_of`, if it was made before.
     """
-    encoding = encoding_of(net)
+    encoding = encoding or encoding_of(net)
     state = encoding.initial if at is None else at
     run_step: list[RunStep] = []
     waiting: list[Transition] = []
@@ -227,7 +253,7 @@ def encoding_of(net: PetriNet) -> Encoding:
     """An encoding with room for several tokens on every place, so that every run can
     be followed.
     """
-    return Encoding(net, {place.index: 3 for place in net.places})
+    return Encoding(net, {place.index: _ROOM_BITS for place in net.places})
 
 
 def tokens_of(encoding: Encoding, state: int) -> tuple[Token, ...]:
@@ -396,7 +422,9 @@ def _internal(first: Step, actions: Sequence[Step], element_names: ElementNames)
             return f"{name} is reached"
         case Action.COMPLETED if isinstance(node, e.StartEvent):
             return f"{name}: on to {_targets(element_names, taken)}"
-        case Action.COMPLETED if isinstance(node, e.IntermediateThrowEvent) and len(actions) > 1:
+        case Action.COMPLETED if isinstance(node, e.IntermediateThrowEvent) and any(
+            step.action is Action.THROWN for step in actions
+        ):
             return ""
         case Action.COMPLETED:
             return f"{name} is over"

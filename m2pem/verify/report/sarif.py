@@ -1,7 +1,8 @@
 """The report as SARIF 2.1.0, the format of static analysis results that CI services show.
 
 A rule is a property of every mission or a requirement of the author. A violation is a result, with
-its run as a code flow; a property that is undecided is a result of kind `open`.
+its run as a code flow, of kind `review` if it may be a false alarm; a property that is undecided is
+a result of kind `open`.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -94,6 +95,9 @@ def _violation(
         "locations": _locations(findings.mission, where[:1] or [findings.net.process]),
         "partialFingerprints": {"elements/v1": _fingerprint([answer.property, *where])},
     }
+    if found.doubt:  # a person has to look at it
+        text = f"{found.message}; may be a false alarm: {found.doubt}"
+        result |= {"kind": "review", "level": "none", "message": {"text": text}}
     if others := _locations(findings.mission, where[1:]):
         result["relatedLocations"] = others
     if violation.run_steps or violation.loop:

@@ -20,7 +20,7 @@ Paint = Callable[[str, str], str]
 
 WARNING = "warning"
 """The word for a violation of what is only a warning."""
-_COLOUR = {"holds": "green", "violated": "red", WARNING: "yellow", "undecided": "yellow"}
+_COLOUR = {"holds": "green", "violated": "red"}
 _MOST_STEPS = 40
 """Most steps of a run that are printed; the beginning of a longer one is left out."""
 
@@ -42,7 +42,10 @@ def as_text(
     warnings = [v for v in findings.violations if v.answer.warning and not findings.strict]
     if warnings:
         lines.append("")
-        lines += [f"{paint('warning', 'yellow')}: {_shown(v.found.message)}" for v in warnings]
+        lines += [
+            f"{paint('warning', 'yellow')}: {_shown(v.found.message)}{_shown(_doubt(v, ' (', ')'))}"
+            for v in warnings
+        ]
     lines.append("")
     lines += [f"note: {_shown(each)}" for each in (*findings.coverage.notes, *_rough(findings))]
     lines.append(_summary(findings, paint))
@@ -71,7 +74,7 @@ def _properties(findings: Findings, paint: Paint, printed: Collection[str]) -> I
 
 def word_of(answer: Result, *, strict: bool) -> str:
     """Return the verdict, or "warning". `strict`: warnings are violations."""
-    if answer.warning and not strict and answer.verdict is Verdict.VIOLATED:
+    if answer.warning and not strict and answer.violations:
         return WARNING
     return answer.verdict.value
 
@@ -85,7 +88,7 @@ def result_lines(
     depends.
     """
     word = word_of(answer, strict=strict)
-    colour = _COLOUR[word]
+    colour = _COLOUR.get(word, "yellow")
     extent = f" ({answer.covered})" if answer.covered else ""
     run_step = _shown(f"{answer.property:<{width}}  {answer.text}{extent}")
     yield f"{paint(f'{word:<9}', colour)}  {run_step}"
@@ -95,8 +98,16 @@ def result_lines(
         yield f"{'':<{width + 13}}for: {_shown(answer.author)}"
 
 
+def _doubt(violation: DescribedViolation, before: str, after: str = "") -> str:
+    doubt = violation.found.doubt
+    return f"{before}may be a false alarm: {doubt}{after}" if doubt else ""
+
+
 def _violation(violation: DescribedViolation, paint: Paint) -> Iterator[str]:
-    yield f"{paint(violation.answer.property, 'red')}: {_shown(violation.found.message)}"
+    colour = "yellow" if violation.found.doubt else "red"
+    yield f"{paint(violation.answer.property, colour)}: {_shown(violation.found.message)}"
+    if violation.found.doubt:
+        yield f"  {_shown(_doubt(violation, ''))}"
     if violation.found.elements:
         yield f"  at {_shown(', '.join(violation.found.elements))}"
     if violation.run_steps or violation.loop:
@@ -131,12 +142,10 @@ def covered(coverage: Coverage) -> str:
 
 def _summary(findings: Findings, paint: Paint) -> str:
     verdict = findings.verdict
-    colour = {"holds": "green", "violated": "red", "undecided": "yellow"}[verdict.value]
+    colour = _COLOUR.get(verdict.value, "yellow")
     said = {
         Verdict.HOLDS: "everything holds" + (" as assumed" if assumes(findings) else ""),
-        Verdict.VIOLATED: "violated",
-        Verdict.UNDECIDED: "undecided",
-    }[verdict]
+    }.get(verdict, verdict.value)
     process = findings.net.process
     summary = f"{_shown(findings.mission.file)}: {process}: {paint(said, colour)}"
     text = f"{summary}; {covered(findings.coverage)}"

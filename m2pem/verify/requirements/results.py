@@ -6,10 +6,11 @@ from dataclasses import dataclass, replace
 from m2pem.fleet.fleet import Fleet
 from m2pem.mission.mission import Mission
 from m2pem.verify.check import SHARE_REDUCED, Report, full_states, share, size_limit_of
+from m2pem.verify.confirmation import Confirmation
 from m2pem.verify.ltl import model_check, propositions
 from m2pem.verify.ltl.formula import Active, Completed, needs_runs
 from m2pem.verify.net.petri_net import PetriNet
-from m2pem.verify.properties.results import Result, Verdict, Violation
+from m2pem.verify.properties.results import Confirm, Result, Verdict, Violation, judged
 from m2pem.verify.requirements.check import (
     Answer,
     check_requirement,
@@ -118,6 +119,8 @@ def with_requirements(
     if not requirements:
         return report
     limits = limits or Limits(tokens=3)
+    options = replace(options or Options(), processes=report.processes)
+    confirm = Confirmation(mission, fleet, process, options).doubt
     try:
         size_limit = size_limit_of(limits)
         net = net_for(
@@ -127,7 +130,7 @@ def with_requirements(
         why = f"too large to search: {error}"
         answers = (Answer(each, model_check.Result.UNDECIDED, why=why) for each in requirements)
         return replace(
-            report, results=(*report.results, *(_result(each, mission) for each in answers))
+            report, results=(*report.results, *(_result(each, mission, None, None) for each in answers))
         )
     watch = _Violated() if report.found.stopped is Stopped.VIOLATION else None
     queries = _Asking(mission, fleet, net, limits, progress, watch)
@@ -142,12 +145,13 @@ def with_requirements(
             decided(results[-1])
         if stopped or queries.interrupted:
             why = f"not begun, after {Stopped.INTERRUPTED}"
-            results.append(_result(Answer(each, model_check.Result.UNDECIDED, why=why), mission))
+            answer = Answer(each, model_check.Result.UNDECIDED, why=why)
+            results.append(_result(answer, mission, net, None))
             continue
         if report.engine != "spin":
             answer = queries.answer(each)
             stopped = answer.why.endswith(Stopped.INTERRUPTED)
-            results.append(_result(answer, mission))
+            results.append(_result(answer, mission, net, confirm))
             continue
         if spins is None:
             spins = search_with_spin(
@@ -164,21 +168,30 @@ def with_requirements(
             instead.append(each.id)
             answer = queries.answer(each)
         stopped = spins.stopped is Stopped.INTERRUPTED or answer.why.endswith(Stopped.INTERRUPTED)
-        results.append(_result(answer, mission))
+        results.append(_result(answer, mission, net, confirm))
     notes = report.notes
     if instead:
         notes = (*notes, f"Spin cannot answer {', '.join(instead)}: the built-in search did")
     return replace(report, results=(*report.results, *results), asked=net, notes=notes)
 
 
-def _result(answer: Answer, mission: Mission) -> Result:
-    requirement = answer.requirement
+def _result(
+    answer: Answer, mission: Mission, net: PetriNet | None, confirm: Confirm | None
+) -> Result:
+    requirement, verdict = answer.requirement, Verdict(answer.result.value)
+    violations: tuple[Violation, ...] = ()
+    covered = answer.why
+    if verdict is Verdict.VIOLATED:
+        assert net is not None
+        violations = judged([_violation(answer, mission)], net, net.approximations, confirm)
+        if covered := violations[0].doubt:
+            verdict = Verdict.MAY_BE_VIOLATED
     return Result(
         requirement.id,
         requirement.english,
-        Verdict(answer.result.value),
-        (_violation(answer, mission),) if answer.result is model_check.Result.VIOLATED else (),
-        covered=answer.why,
+        verdict,
+        violations,
+        covered=covered,
         required=True,
         author=requirement.text,
     )

@@ -13,18 +13,18 @@ from m2pem.errors import InternalError
 from m2pem.fleet.default_fleet import fleet_for
 from m2pem.fleet.fleet import Fleet
 from m2pem.mission.mission import Mission
-from m2pem.verify.check import Report, size_limit_of, too_large
+from m2pem.verify.check import Report, size_limit_of, too_large, translated
 from m2pem.verify.check import search as search_built_in
+from m2pem.verify.confirmation import Confirmation
 from m2pem.verify.net.petri_net import PetriNet
-from m2pem.verify.net.simplify import simplify
 from m2pem.verify.properties import ALL, SearchedMission
 from m2pem.verify.properties.commands import watch_interruptions
-from m2pem.verify.properties.results import Result, Verdict
+from m2pem.verify.properties.results import Result, Verdict, bounded
 from m2pem.verify.properties.soundness import can_complete, completes_if_fair, no_livelock
 from m2pem.verify.search.explore import Exploration, Limits, Progress, Stopped
 from m2pem.verify.spin.queries import Storage
 from m2pem.verify.spin.search import SpinExploration, WantedRuns, search
-from m2pem.verify.translate import Options, TooLargeError, translate
+from m2pem.verify.translate import Options, TooLargeError
 
 BEYOND_SPIN = (can_complete, completes_if_fair, no_livelock)
 """Properties about what can be reached from each state."""
@@ -51,12 +51,12 @@ def check_with_spin(
     fleet = fleet or fleet_for(mission)
     try:
         size_limit = size_limit_of(limits)
-        net = translate(mission, fleet, process=process, options=options, size_limit=size_limit)
-        net = simplify(net, size_limit=size_limit)
+        net, options = translated(mission, fleet, process, options or Options(), size_limit, limits)
     except TooLargeError as error:
         return replace(too_large(mission, error, process), engine="spin")
     found = search(net, limits, storage=storage, progress=progress)
-    searched = SearchedMission(mission, net, as_exploration(found))
+    confirm = Confirmation(mission, fleet, process, options).doubt
+    searched = SearchedMission(mission, net, as_exploration(found), confirm=confirm)
     watched = watch_interruptions(net, fleet.vehicles)
     if watched is not None and found.stopped is not Stopped.INTERRUPTED:
         searched.resources = watched[1]
@@ -64,7 +64,9 @@ def check_with_spin(
         searched.watched = as_exploration(
             search(watched[0], limits, wanted=wanted, storage=storage, progress=progress)
         )
-    other = SearchedMission(mission, net, _also(net, found, limits, progress))
+    beside = _also(net, found, limits, progress)
+    other = SearchedMission(mission, net, beside, confirm=confirm)
+    searched.found.lost = beside.lost
     results = tuple(
         _beyond(each(other), found) if each in BEYOND_SPIN else _covered(each(searched), found)
         for each in ALL
@@ -72,12 +74,13 @@ def check_with_spin(
     beyond = ", ".join(each(other).property for each in BEYOND_SPIN)
     answered = "answered" if found.stopped is not Stopped.INTERRUPTED else "was not begun"
     return Report(
-        net,
+        replace(net, approximations=bounded(net, searched.found)),
         searched.found,
         results,
         watched[0] if watched is not None else None,
         engine="spin",
         states=found.states,
+        processes=options.processes,
         notes=(f"Spin cannot be asked {beyond}: the built-in search {answered}",),
     )
 

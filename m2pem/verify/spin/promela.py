@@ -265,7 +265,8 @@ class Writer:
             )
         for pairs, gone in ((transition.moves, True), (transition.copies, False)):
             for source, target in pairs:
-                if target in self.assertions.full and target not in transition.reset:
+                counts = self.net.places[target].counts_moves and target not in transition.reset
+                if counts and target in self.assertions.full:
                     effects.append(f"assert({places[target]} <= {most[target]} - {places[source]})")
                 effects.append(self._all_of(source, target))
                 if gone:

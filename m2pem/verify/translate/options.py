@@ -10,6 +10,10 @@ from m2pem.verify.assumptions import NOTHING, Assumptions
 from m2pem.verify.translate.ways import KnownWays
 
 
+PROCESSES = 2
+"""Instances of a process that triggers begin, unless more of them begin at a time."""
+
+
 @dataclass(frozen=True, slots=True)
 class Options:
     """Assumptions of a translation.
@@ -30,7 +34,7 @@ class Options:
     service_writes: Mapping[str, Sequence[str]] = field(default_factory=dict)
     open_world: bool = False
     instances: int = 2
-    processes: int = 2
+    processes: int = PROCESSES
     calls: int = 1
     assumed: Assumptions = NOTHING
     timers_in_order: bool = False
