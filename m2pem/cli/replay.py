@@ -154,6 +154,8 @@ async def _verify(
 
 
 VERSIONS = (1,)
+NEVER_COMPLETES = frozenset({"no-deadlock", "can-complete", "completes-if-fair", "no-livelock"})
+"""Properties of which no run that completes is a counterexample."""
 
 
 def replay_counterexample(
@@ -176,20 +178,24 @@ def replay_counterexample(
     mission = _mission(file, report, mission_file)
     fleet = fleet_of(fleet_file or DEFAULT_FLEET, mission)
     ways = known_ways(fleet, mission)
-    player = ConformanceRun(mission, fleet, report["process"], report["data"], ways)
+    steps = [*violation["steps"], *violation["loop"]]
+    player = ConformanceRun(mission, fleet, report["process"], report["data"], ways, steps)
     lines = LineFormatter(lambda _: mission, colour=wants_colour(sys.stdout))
     _say(output, f"{violation['property']}: {violation['text']}")
     _show(player.steps, lines, output)
     problem = ""
-    for step in [*violation["steps"], *violation["loop"]]:
+    for step in steps:
         _say(output, f"step {step['step']}: {step['text']}")
         try:
             _show(player.play(step), lines, output)
         except NotPlayableError as error:
             problem = str(error)
             break
+    problem = problem or violation.get("doubt", "")
     if not problem and player.undone:
         problem = f"the engine did not take {', '.join(player.undone)}"
+    if not problem and violation["property"] in NEVER_COMPLETES and player.completed:
+        problem = "its run has completed"
     if problem:
         click.echo(f"the engine does not follow: {problem}", err=True)
         return 1

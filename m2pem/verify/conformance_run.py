@@ -199,6 +199,11 @@ class ConformanceRun:
         return sorted((self._expected - taken).keys())
 
     @property
+    def completed(self) -> bool:
+        """Whether the run of the engine has completed."""
+        return self.run.state.outcome is r.RunOutcome.COMPLETED
+
+    @property
     def where(self) -> list[str]:
         """Elements with a token now."""
         return sorted(token.node.id for token in self.run.state.tokens.values())

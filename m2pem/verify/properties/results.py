@@ -9,6 +9,7 @@ from itertools import islice
 
 from m2pem.mission.mission import Mission
 from m2pem.verify.assumptions import NOTHING, Assumptions
+from m2pem.verify.net.encoding import Encoding
 from m2pem.verify.net.petri_net import Action, Approximation, Exactness, Flag, PetriNet, Role
 from m2pem.verify.search.explore import Exploration
 
@@ -91,6 +92,16 @@ def bounded(net: PetriNet, found: Exploration) -> tuple[Approximation, ...]:
     return tuple(each for each in net.approximations if not each.bound or each.bound in reached)
 
 
+def _loses(encoding: Encoding, run: Sequence[int]) -> bool:
+    """Whether tokens that are counted have no room in a run, but for its last transition."""
+    state, places = encoding.initial, encoding.net.places
+    for number in run[:-1]:
+        state, full = encoding.fire(number, state)
+        if full and any(places[p].several or not places[p].once for p in encoding.places_in(full)):
+            return True
+    return False
+
+
 BEYOND = "what happens beyond a bound of the search is not known"
 UNEXPLAINED = "the search is at fault, as it found what the engine does not do; please report that"
 """The reason for doubts where the net is exact."""
@@ -98,20 +109,20 @@ UNEXPLAINED = "the search is at fault, as it found what the engine does not do; 
 
 def judged(
     violations: Iterable[Violation],
-    net: PetriNet,
+    encoding: Encoding,
     approximations: Sequence[Approximation],
     confirm: Confirm | None,
 ) -> tuple[Violation, ...]:
-    """Return violations, the certain ones first, each with its doubt. `approximations`: those that
-    may explain false alarms."""
+    """Return violations, the certain ones first, each with its doubt. `encoding`: with which they
+    were found; `approximations`: those that may explain false alarms."""
     known = []
     for each in islice(violations, MOST_VIOLATIONS):
-        doubt = each.doubt
-        if not doubt and confirm is not None and (each.run or each.cycle):
-            doubt = confirm(net, (*each.run, *each.cycle))
-            if doubt:
+        doubt, run = each.doubt, (*each.run, *each.cycle)
+        if not doubt and confirm is not None and run:
+            doubt = BEYOND if _loses(encoding, run) else ""
+            if not doubt and (where := confirm(encoding.net, run)):
                 why = "" if approximations else f"; {UNEXPLAINED}"
-                doubt = f"the engine does not follow its run: {doubt}{why}"
+                doubt = f"the engine does not follow its run: {where}{why}"
         known.append(replace(each, doubt=doubt))
     return tuple(sorted(known, key=lambda each: bool(each.doubt)))
 
@@ -199,7 +210,7 @@ class SearchedMission:
         """
         found = found or self.found
         if violations:
-            known = judged(violations, found.net, bounded(self.net, self.found), self.confirm)
+            known = judged(violations, found.encoding, bounded(self.net, self.found), self.confirm)
             doubt = known[0].doubt
             verdict = Verdict.MAY_BE_VIOLATED if doubt else Verdict.VIOLATED
             return Result(name, text, verdict, known, warning, doubt)

@@ -11,6 +11,7 @@ from m2pem.verify.ltl import model_check, propositions
 from m2pem.verify.ltl.formula import Active, Completed, needs_runs
 from m2pem.verify.net.petri_net import PetriNet
 from m2pem.verify.properties.results import Confirm, Result, Verdict, Violation, judged
+from m2pem.verify.report.run_steps import encoding_of
 from m2pem.verify.requirements.check import (
     Answer,
     check_requirement,
@@ -183,7 +184,8 @@ def _result(
     covered = answer.why
     if verdict is Verdict.VIOLATED:
         assert net is not None
-        violations = judged([_violation(answer, mission)], net, net.approximations, confirm)
+        room = encoding_of(net)
+        violations = judged([_violation(answer, mission)], room, net.approximations, confirm)
         if covered := violations[0].doubt:
             verdict = Verdict.MAY_BE_VIOLATED
     return Result(

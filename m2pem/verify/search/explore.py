@@ -195,10 +195,9 @@ def explore(
             if place not in overflows and not net.places[place].several:
                 overflows[place] = at
                 runs[place] = found.overflow_runs[place]
-        full += [place for place in found.overflows if search.grows_far(place, found)]
-        if full and found.stopped is None:
-            for place in full:
-                wider[place] = found.encoding.width[place] + 1
+        far = {place: bits for place in found.overflows if (bits := search.grows_far(place, found))}
+        if (full or far) and found.stopped is None:
+            wider |= {place: found.encoding.width[place] + 1 for place in full} | far
             continue
         found.lost = frozenset(
             p for p in found.overflows if net.places[p].several or not net.places[p].once
@@ -285,11 +284,14 @@ class _Search:
         bits = self.encoding.width[place] + 1
         return not self.net.places[place].once and (1 << bits) - 1 <= self.limits.tokens
 
-    def grows_far(self, place: int, found: Exploration) -> bool:
-        """Whether a place on which several tokens are meant gets more room: the search was small."""
-        several = self.net.places[place].several and not self.grows(place)
-        more = self.encoding.width[place] < MANY_TOKENS.bit_length()
-        return several and more and len(found.states) <= MANY_STATES
+    def grows_far(self, place: int, found: Exploration) -> int:
+        """The bits that a place on which several tokens are meant gets, if the search was small;
+        0: no more."""
+        width, states = self.encoding.width[place], len(found.states)
+        if not self.net.places[place].several or self.grows(place) or states > MANY_STATES:
+            return 0
+        bits = min(MANY_TOKENS.bit_length(), width + (8 * MANY_STATES // states).bit_length() - 1)
+        return bits if bits > width else 0
 
     def run(
         self, reduction: Reduction | None, progress: Callable[[Progress], None] | None

@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from m2pem.errors import ExpressionError
+from m2pem.mission import elements as e
 from m2pem.mission.loops import InstanceBehavior, MultiInstance, StandardLoop
 from m2pem.verify.net.petri_net import Action, Exactness, Flag, Role, Step
 from m2pem.verify.translate.compensation import (
@@ -13,11 +14,15 @@ from m2pem.verify.translate.compensation import (
 from m2pem.verify.translate.context import (
     ActivityInstance,
     TranslationContext,
+    behavior_of,
     held_by_instance,
 )
 from m2pem.verify.translate.data import ERROR, Truth
 from m2pem.verify.translate.net_builder import Effect, product
 from m2pem.verify.translate.throwing import throw_error
+
+_ONE_STEP = (e.Task, e.SendTask, e.ReceiveTask, e.ScriptTask)
+"""Activities that add few states, however often they are repeated."""
 
 Work = Callable[[TranslationContext, ActivityInstance], list[Effect]]
 
@@ -196,7 +201,10 @@ def _sequential(
     node = whole.node
     again = Effect(consume=(sequence.ended,), produce=(sequence.begins,))
     stop = Effect(consume=(sequence.ended,))
-    counted = count is not None and count <= context.options.most_instances
+    most = context.options.most_instances
+    if type(node) in _ONE_STEP and behavior_of(node) is None:
+        most = context.options.most_in_turn
+    counted = count is not None and count <= most
     rounds: list[int] = []
     if counted:
         assert count is not None

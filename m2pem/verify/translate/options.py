@@ -46,6 +46,8 @@ class Options:
     ways: KnownWays | None = None
     most_instances: int = 8
     """Most instances of a number that the mission states; above, `instances` are checked."""
+    most_in_turn: int = 128
+    """The same of tasks that do their work in one step, one after the other."""
 
     @property
     def failures(self) -> bool:
