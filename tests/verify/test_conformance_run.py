@@ -137,7 +137,7 @@ def test_as_few_names_as_can_be_are_written() -> None:
     text = mission(CATCH.format("a > b and not c"))
     condition = next(iter(text.elements["c"].definitions)).condition  # type: ignore[attr-defined]
     store = {"a": 1, "b": 5, "c": False}
-    assert set(data_for(condition, True, store.get) or {}) in ({"a"}, {"b"})
-    assert data_for(condition, False, store.get) == {}
-    assert set(data_for(condition, True, store.get, known={"a"}) or {}) == {"b"}
-    assert data_for(condition, True, {**store, "c": True}.get, known={"c"}) is None
+    assert set(data_for([(condition, True)], store.get) or {}) in ({"a"}, {"b"})
+    assert data_for([(condition, False)], store.get) == {}
+    assert set(data_for([(condition, True)], store.get, known={"a"}) or {}) == {"b"}
+    assert data_for([(condition, True)], {**store, "c": True}.get, known={"c"}) is None

@@ -84,7 +84,10 @@ def bounded(net: PetriNet, found: Exploration) -> tuple[Approximation, ...]:
 
     If any of them is a bound, what no run of the net does may happen all the same.
     """
-    reached = {net.places[place].name for place in found.lost}
+    lost = [net.places[place] for place in found.lost]
+    reached = {each.name for each in lost}
+    for place in lost:
+        reached |= {part.partition("#")[0] for part in net.scopes[place.scope].path}
     for number in found.fired:
         for step in net.transitions[number].steps:
             if step.action is Action.NOT_FOLLOWED:
@@ -103,7 +106,10 @@ def _loses(encoding: Encoding, run: Sequence[int]) -> bool:
 
 
 BEYOND = "what happens beyond a bound of the search is not known"
-UNEXPLAINED = "the search is at fault, as it found what the engine does not do; please report that"
+UNEXPLAINED = (
+    "the search takes the steps of one moment in any order; if their order does not explain that, "
+    "the search is at fault: please report it"
+)
 """The reason for doubts where the net is exact."""
 
 

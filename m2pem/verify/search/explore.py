@@ -195,9 +195,15 @@ def explore(
             if place not in overflows and not net.places[place].several:
                 overflows[place] = at
                 runs[place] = found.overflow_runs[place]
-        far = {place: bits for place in found.overflows if (bits := search.grows_far(place, found))}
+        far = [place for place in found.overflows if search.grows_far(place)]
+        more = max(8 * MANY_STATES // len(found.states), 1).bit_length() - 1 if far else 0
+        if len(found.states) > MANY_STATES or more < len(far):
+            far = []
         if (full or far) and found.stopped is None:
-            wider |= {place: found.encoding.width[place] + 1 for place in full} | far
+            wider |= {place: found.encoding.width[place] + 1 for place in full}
+            for place in far:
+                most = found.encoding.width[place] + more // len(far)
+                wider[place] = min(MANY_TOKENS.bit_length(), most)
             continue
         found.lost = frozenset(
             p for p in found.overflows if net.places[p].several or not net.places[p].once
@@ -284,14 +290,10 @@ class _Search:
         bits = self.encoding.width[place] + 1
         return not self.net.places[place].once and (1 << bits) - 1 <= self.limits.tokens
 
-    def grows_far(self, place: int, found: Exploration) -> int:
-        """The bits that a place on which several tokens are meant gets, if the search was small;
-        0: no more."""
-        width, states = self.encoding.width[place], len(found.states)
-        if not self.net.places[place].several or self.grows(place) or states > MANY_STATES:
-            return 0
-        bits = min(MANY_TOKENS.bit_length(), width + (8 * MANY_STATES // states).bit_length() - 1)
-        return bits if bits > width else 0
+    def grows_far(self, place: int) -> bool:
+        """Whether a place on which several tokens are meant gets more room after a small search."""
+        more = self.encoding.width[place] < MANY_TOKENS.bit_length()
+        return self.net.places[place].several and not self.grows(place) and more
 
     def run(
         self, reduction: Reduction | None, progress: Callable[[Progress], None] | None

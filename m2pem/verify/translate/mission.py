@@ -36,6 +36,7 @@ from m2pem.verify.translate.parallel_multiple import AWAITED, all_must_come, tri
 from m2pem.verify.translate.participants import (
     alive,
     begin_together,
+    instance_is_token,
     participants,
     triggers_of,
     without_entries,
@@ -132,6 +133,9 @@ def _instances(context: TranslationContext, process: e.Process) -> None:
     starts = [start for entry in process.entries for start in triggers_of(entry)]
     if not starts:
         return
+    if instance_is_token(process):
+        _counted_instances(context, process, starts)
+        return
     context.net.approximate(
         process,
         Exactness.BOUNDED,
@@ -147,6 +151,28 @@ def _instances(context: TranslationContext, process: e.Process) -> None:
     for start in starts:
         for definition in awaited(start):
             _begun_by(context, process, start, definition, scopes)
+
+
+def _counted_instances(
+    context: TranslationContext, process: e.Process, starts: list[e.FlowNode]
+) -> None:
+    """Translate a process whose instances are one token each: once, with any number of tokens."""
+    scope = context.net.scope(
+        process, context.everything, step=f"{process.id}#1", frame=(process.id,)
+    )
+    scope.several = scope.counted = True
+    context.net.approximate(
+        process, Exactness.BOUNDED, "not all its instances are counted", process.id
+    )
+    build(context, process, scope)
+    for start in starts:
+        for definition in awaited(start):
+            begun = Effect(
+                steps=(Step(start.id, Action.TRIGGERED),),
+                produce=(entry_place(context.net, start, scope),),
+            )
+            ways = context.data.receive([begun], scope, start)
+            context.begins.setdefault(what_and_ref(definition), []).append(ways)
 
 
 def _begun_by(

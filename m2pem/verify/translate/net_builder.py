@@ -133,6 +133,8 @@ class ScopeDraft:
     """The `ActivityInstance` whose inside it is, if it is one."""
     several: bool = False
     """Several tokens on one place in it are no finding."""
+    counted: bool = False
+    """The same; those that do not fit are lost."""
     open: int | None = None
     """The place that has a token while its event subprocesses can begin."""
 
@@ -200,7 +202,8 @@ class NetBuilder:
             path,
             frame if frame is not None else (parent.frame if parent else ()),
             parent.depth_of_calls if parent is not None else (),
-            several=parent.several if parent is not None else False,
+            several=parent is not None and parent.several,
+            counted=parent is not None and parent.counted,
         )
         self.scopes.append(made)
         if parent is not None:
@@ -238,6 +241,7 @@ class NetBuilder:
                 several or scope.several,
                 resources,
                 behavior,
+                scope.counted,
                 returns=returns,
                 holder=holder,
             )

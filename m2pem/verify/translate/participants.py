@@ -6,6 +6,11 @@ trigger (BPMN 2.0.2, 13.5.1). BPMN does not say who begins a pool whose start ev
 """
 
 from m2pem.mission import elements as e
+from m2pem.mission.events import (
+    MessageEventDefinition,
+    SignalEventDefinition,
+    TimerEventDefinition,
+)
 from m2pem.mission.mission import Mission
 from m2pem.verify.net.petri_net import Action, Role, Step
 from m2pem.verify.translate.context import TranslationContext
@@ -47,6 +52,45 @@ def triggers_of(entry: e.FlowNode) -> list[e.FlowNode]:
 def untriggered(process: e.Process) -> list[e.FlowNode]:
     """The entries of a process that get a token when it begins."""
     return [each for each in process.entries if not triggers_of(each)]
+
+
+_PASSING = (e.StartEvent, e.EndEvent, e.IntermediateCatchEvent, e.IntermediateThrowEvent)
+_WORKING = (e.Task, e.SendTask, e.ReceiveTask)
+
+
+def instance_is_token(process: e.Process) -> bool:
+    """Whether an instance is one token that nothing else in the instance meets, interrupts or
+    reads: it begins by a signal or message, and passes events, tasks and exclusive gateways."""
+    return (
+        all(map(_is_alone, process.nodes))
+        and not process.event_subprocesses
+        and all(flow.condition is None for flow in process.flows)
+        and all(isinstance(each, e.StartEvent) and each.definitions for each in process.entries)
+    )
+
+
+def _is_alone(node: e.FlowNode) -> bool:
+    if isinstance(node, e.ExclusiveGateway):
+        return True
+    if len(node.outgoing) > 1:
+        return False
+    if type(node) in _PASSING:
+        assert isinstance(node, e.Event)
+        known = (SignalEventDefinition, MessageEventDefinition)
+        catches = isinstance(node, e.IntermediateCatchEvent)
+        return len(node.definitions) <= 1 and all(
+            isinstance(each, known) or (catches and isinstance(each, TimerEventDefinition))
+            for each in node.definitions
+        )
+    return type(node) in _WORKING and not _does_more(node)
+
+
+def _does_more(node: e.FlowNode) -> bool:
+    assert isinstance(node, e.Activity)
+    several = node.start_quantity > 1 or node.completion_quantity > 1 or node.loop is not None
+    by_resource = isinstance(node, e.SendTask) and node.behavior is not None
+    begins = isinstance(node, e.ReceiveTask) and node.instantiate
+    return bool(several or by_resource or begins or node.boundary or node.for_compensation)
 
 
 def begin_together(context: TranslationContext, process: e.Process) -> tuple[int, ...]:
