@@ -118,13 +118,16 @@ def judged(
     encoding: Encoding,
     approximations: Sequence[Approximation],
     confirm: Confirm | None,
+    *,
+    begins: bool = False,
 ) -> tuple[Violation, ...]:
     """Return violations, the certain ones first, each with its doubt. `encoding`: with which they
-    were found; `approximations`: those that may explain false alarms."""
+    were found; `approximations`: those that may explain false alarms. `begins`: a violation without
+    a run is one of the state in which the mission begins."""
     known = []
     for each in islice(violations, MOST_VIOLATIONS):
         doubt, run = each.doubt, (*each.run, *each.cycle)
-        if not doubt and confirm is not None and run:
+        if not doubt and confirm is not None and (run or begins):
             doubt = BEYOND if _loses(encoding, run) else ""
             if not doubt and (where := confirm(encoding.net, run)):
                 why = "" if approximations else f"; {UNEXPLAINED}"
@@ -153,7 +156,7 @@ class SearchedMission:
     def is_bounded(self) -> bool:
         """Whether something may happen in the mission that no run of the net does."""
         bounds = bounded(self.net, self.found)
-        return any(each.exactness is Exactness.BOUNDED for each in bounds)
+        return bool(self.found.lost) or any(each.exactness is Exactness.BOUNDED for each in bounds)
 
     def label(self, element: str) -> str:
         """The name of an element for people."""
@@ -209,14 +212,18 @@ class SearchedMission:
         static: bool = False,
         found: Exploration | None = None,
         note: str = "",
+        begins: bool = False,
     ) -> Result:
         """Violated if there are violations; else it holds, if all was seen.
 
-        `static`: no search was needed. `note`: in what sense it holds.
+        `static`: no search was needed. `note`: in what sense it holds. `begins`: see `judged`.
         """
         found = found or self.found
         if violations:
-            known = judged(violations, found.encoding, bounded(self.net, self.found), self.confirm)
+            approximations = bounded(self.net, self.found)
+            known = judged(
+                violations, found.encoding, approximations, self.confirm, begins=begins
+            )
             doubt = known[0].doubt
             verdict = Verdict.MAY_BE_VIOLATED if doubt else Verdict.VIOLATED
             return Result(name, text, verdict, known, warning, doubt)

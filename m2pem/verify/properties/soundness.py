@@ -75,7 +75,8 @@ IN_EACH_STATE = (
 
 def no_deadlock(searched: SearchedMission) -> Result:
     """Something can always happen, until the run is over."""
-    return searched.result("no-deadlock", "No token is stuck for ever.", _stuck(searched))
+    text = "No token is stuck for ever."
+    return searched.result("no-deadlock", text, _stuck(searched), begins=True)
 
 
 def _stuck(searched: SearchedMission) -> list[Violation]:
@@ -182,7 +183,7 @@ def can_complete(searched: SearchedMission) -> Result:
         stuck = searched.where(state)
         violations.append(_no_end(searched, stuck, tuple(searched.found.run_to(state))))
     violations = _of_ends(searched, violations)
-    return searched.result("can-complete", CAN_COMPLETE, violations)
+    return searched.result("can-complete", CAN_COMPLETE, violations, begins=True)
 
 
 def _of_all_runs(searched: SearchedMission, violations: list[Violation]) -> list[Violation]:
@@ -197,7 +198,7 @@ def _of_ends(searched: SearchedMission, violations: list[Violation]) -> list[Vio
     stuck = no_deadlock(searched) if violations else None
     if stuck is None or stuck.verdict is not Verdict.VIOLATED:
         return _of_all_runs(searched, violations)
-    if searched.result("", "", violations[:1]).verdict is Verdict.VIOLATED:
+    if searched.result("", "", violations[:1], begins=True).verdict is Verdict.VIOLATED:
         return violations
     return [_no_end(searched, each.elements, each.run) for each in stuck.violations[:1]]
 
@@ -214,9 +215,12 @@ def following_from_deadlock(searched: SearchedMission, stuck: Violation) -> tupl
     """Return what a deadlock violates as well: `can-complete` and `completes-if-fair`."""
     return (
         searched.result(
-            "can-complete", CAN_COMPLETE, [_no_end(searched, stuck.elements, stuck.run)]
+            "can-complete",
+            CAN_COMPLETE,
+            [_no_end(searched, stuck.elements, stuck.run)],
+            begins=True,
         ),
-        searched.result("completes-if-fair", FAIR, [stuck]),
+        searched.result("completes-if-fair", FAIR, [stuck], begins=True),
     )
 
 
@@ -240,7 +244,7 @@ def completes_if_fair(searched: SearchedMission) -> Result:
     elif not violations and found.reduced and found.complete and rounds.any:
         note = IN_EACH_STATE
     violations = _of_ends(searched, violations)
-    return searched.result("completes-if-fair", FAIR, violations, note=note)
+    return searched.result("completes-if-fair", FAIR, violations, note=note, begins=True)
 
 
 def _fair_cycle(searched: SearchedMission, rounds: FairCycles) -> list[Violation]:

@@ -40,7 +40,7 @@ _BYTES_A_TRANSITION = 8
 _BYTES_AN_EDGE = 16
 MANY_TOKENS = 127
 """Tokens that are followed on a place where several are meant, as far as that is cheap."""
-MANY_STATES = 5_000
+MANY_STATES = 20_000
 """The most states of a search that begins again with room for more of those."""
 AFTER_VIOLATION_STATES = 50_000
 """States that are searched after a violation in any case."""
@@ -196,7 +196,7 @@ def explore(
                 overflows[place] = at
                 runs[place] = found.overflow_runs[place]
         far = [place for place in found.overflows if search.grows_far(place)]
-        more = max(8 * MANY_STATES // len(found.states), 1).bit_length() - 1 if far else 0
+        more = max(4 * MANY_STATES // len(found.states), 1).bit_length() - 1 if far else 0
         if len(found.states) > MANY_STATES or more < len(far):
             far = []
         if (full or far) and found.stopped is None:
