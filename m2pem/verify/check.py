@@ -138,7 +138,7 @@ def check(
     results = tuple(early.merged(each(searched)) for each in ALL)
     early.settle(results)
     return Report(
-        replace(net, approximations=bounded(net, found)),
+        replace(net, approximations=bounded(found)),
         found,
         results,
         watched[0] if watched is not None else None,

@@ -79,11 +79,12 @@ Confirm = Callable[[PetriNet, Sequence[int]], str]
 """Where the engine does not follow a run of a net; "": it does."""
 
 
-def bounded(net: PetriNet, found: Exploration) -> tuple[Approximation, ...]:
+def bounded(found: Exploration) -> tuple[Approximation, ...]:
     """Return the approximations of a net that made a difference in a search, or may have made it.
 
     If any of them is a bound, what no run of the net does may happen all the same.
     """
+    net = found.net
     lost = [net.places[place] for place in found.lost]
     reached = {each.name for each in lost}
     for place in lost:
@@ -155,7 +156,7 @@ class SearchedMission:
     @property
     def is_bounded(self) -> bool:
         """Whether something may happen in the mission that no run of the net does."""
-        bounds = bounded(self.net, self.found)
+        bounds = bounded(self.found)
         return bool(self.found.lost) or any(each.exactness is Exactness.BOUNDED for each in bounds)
 
     def label(self, element: str) -> str:
@@ -220,10 +221,8 @@ class SearchedMission:
         """
         found = found or self.found
         if violations:
-            approximations = bounded(self.net, self.found)
-            known = judged(
-                violations, found.encoding, approximations, self.confirm, begins=begins
-            )
+            approximations = bounded(self.found)
+            known = judged(violations, found.encoding, approximations, self.confirm, begins=begins)
             doubt = known[0].doubt
             verdict = Verdict.MAY_BE_VIOLATED if doubt else Verdict.VIOLATED
             return Result(name, text, verdict, known, warning, doubt)

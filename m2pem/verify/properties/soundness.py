@@ -193,8 +193,7 @@ def _of_all_runs(searched: SearchedMission, violations: list[Violation]) -> list
 
 
 def _of_ends(searched: SearchedMission, violations: list[Violation]) -> list[Violation]:
-    """The same, of what a run violates as well that gets stuck: if the engine does, it is certain.
-    """
+    """The same, of what a run violates as well that gets stuck: certain, if the engine does."""
     stuck = no_deadlock(searched) if violations else None
     if stuck is None or stuck.verdict is not Verdict.VIOLATED:
         return _of_all_runs(searched, violations)

@@ -130,9 +130,8 @@ def with_requirements(
     except TooLargeError as error:
         why = f"too large to search: {error}"
         answers = (Answer(each, model_check.Result.UNDECIDED, why=why) for each in requirements)
-        return replace(
-            report, results=(*report.results, *(_result(each, mission, None, None) for each in answers))
-        )
+        undecided = (_result(each, mission, None, None) for each in answers)
+        return replace(report, results=(*report.results, *undecided))
     watch = _Violated() if report.found.stopped is Stopped.VIOLATION else None
     queries = _Asking(mission, fleet, net, limits, progress, watch)
     spins: SpinExploration | None = None

@@ -74,7 +74,7 @@ def check_with_spin(
     beyond = ", ".join(each(other).property for each in BEYOND_SPIN)
     answered = "answered" if found.stopped is not Stopped.INTERRUPTED else "was not begun"
     return Report(
-        replace(net, approximations=bounded(net, searched.found)),
+        replace(net, approximations=bounded(searched.found)),
         searched.found,
         results,
         watched[0] if watched is not None else None,

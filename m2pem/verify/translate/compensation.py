@@ -151,8 +151,10 @@ def _note_approximations(
             node, Exactness.MORE, "it and what else was done is undone in any order"
         )
     if again:
-        how = "more often than is counted, it is undone less often" if counted else (
-            "several times, it is undone once"
+        how = (
+            "more often than is counted, it is undone less often"
+            if counted
+            else ("several times, it is undone once")
         )
         context.net.approximate(node, Exactness.BOUNDED, f"done {how}", counted)
 

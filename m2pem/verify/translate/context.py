@@ -291,9 +291,7 @@ def _repeated_nodes(mission: Mission) -> frozenset[e.FlowNode]:
     return frozenset(found - reached)
 
 
-def _ends_reached_again(
-    mission: Mission, repeated: frozenset[e.FlowNode]
-) -> frozenset[e.FlowNode]:
+def _ends_reached_again(mission: Mission, repeated: frozenset[e.FlowNode]) -> frozenset[e.FlowNode]:
     """End events that two tokens of one scope may reach, other than by an event that happens again:
     what is `repeated` has to be forked itself."""
     waiting = [node for node in mission.nodes if forks(node)]

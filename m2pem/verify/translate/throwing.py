@@ -1,7 +1,6 @@
 """Throwing errors, escalations, signals and messages: what catches them, and what follows."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 from typing import TypeVar
 
 from m2pem.mission import elements as e
@@ -12,7 +11,7 @@ from m2pem.mission.events import (
     error_code,
     escalation_code,
 )
-from m2pem.verify.net.petri_net import Action, Exactness, Flag, Kind, Role, Step
+from m2pem.verify.net.petri_net import Action, Exactness, Flag, Kind, Step
 from m2pem.verify.translate.compensation import compensated_by, cut_short, forget_completions
 from m2pem.verify.translate.context import ActivityInstance, CompensatedBy, TranslationContext
 from m2pem.verify.translate.net_builder import Effect, ScopeDraft, entry_place
