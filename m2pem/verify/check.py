@@ -9,7 +9,7 @@ from m2pem.fleet.fleet import Fleet
 from m2pem.mission.mission import Mission
 from m2pem.verify.assumptions import NOTHING, Assumptions
 from m2pem.verify.confirmation import Confirmation
-from m2pem.verify.net.petri_net import Action, PetriNet, Place, Role, Scope, Transition
+from m2pem.verify.net.petri_net import PetriNet, Place, Role, Scope
 from m2pem.verify.net.simplify import simplify
 from m2pem.verify.net.size_limit import MOST_TRANSITIONS
 from m2pem.verify.properties import ALL, SearchedMission
@@ -21,7 +21,6 @@ from m2pem.verify.properties.commands import (
 from m2pem.verify.properties.early import EarlyInterruptions, EarlyResults
 from m2pem.verify.properties.results import Result, Verdict, bounded
 from m2pem.verify.search.explore import (
-    MANY_STATES,
     Exploration,
     Limits,
     Progress,
@@ -31,7 +30,6 @@ from m2pem.verify.search.explore import (
 )
 from m2pem.verify.search.stubborn_sets import StubbornSets
 from m2pem.verify.translate import Options, SizeLimit, TooLargeError, translate
-from m2pem.verify.translate.options import PROCESSES
 
 FULL_STATES = 100_000
 """States up to which a search uses no reduction: that gives the shortest runs."""
@@ -41,11 +39,6 @@ SHARE_REDUCED = 0.04
 """A state takes about 25 times as long with a reduction as without."""
 _BYTES_A_TRANSITION = 2_500
 """Approximate memory of a transition, from its translation until the search is over."""
-MOST_PROCESSES = 128
-"""Most instances at a time of a process that triggers begin."""
-FEW_SECONDS = 2.0
-MANY_TRANSITIONS = 10_000
-"""Up to which more of them are translated, and searched in so many seconds."""
 _FEWER_BEYOND = 100
 """Transitions beyond which fewer states are searched without reduction: each takes longer."""
 
@@ -57,8 +50,7 @@ class Report:
     `states`: how many states were seen; `found` may hold fewer, if another engine saw the rest.
     `notes`: remarks on the answers. `watched`: the net that also notes which vehicles are
     interrupted; `asked`: the net that requirements were checked on. `assumed`: what the whole check
-    assumes; `without`: the same check where nothing is assumed. `processes`: how many instances of
-    a process that triggers begin were followed.
+    assumes; `without`: the same check where nothing is assumed.
     """
 
     net: PetriNet
@@ -71,7 +63,6 @@ class Report:
     asked: PetriNet | None = None
     assumed: Assumptions = NOTHING
     without: "Report | None" = None
-    processes: int = PROCESSES
 
     def transitions_of(self, result: Result) -> PetriNet:
         """The net whose transitions the runs of a result number."""
@@ -119,10 +110,11 @@ def check(
     fleet = fleet or fleet_for(mission)
     try:
         size_limit = size_limit_of(limits)
-        net, options = translated(mission, fleet, process, options or Options(), size_limit, limits)
+        net = translate(mission, fleet, process=process, options=options, size_limit=size_limit)
+        net = simplify(net, size_limit=size_limit)
     except TooLargeError as error:
         return too_large(mission, error, process)
-    confirm = Confirmation(mission, fleet, process, options).doubt
+    confirm = Confirmation(mission, fleet, process, options or Options()).doubt
     early = EarlyResults(mission, net, decided, confirm)
     early.begin(unsearched(net))
     found = search(net, _rest(limits, began), progress, early)
@@ -143,45 +135,7 @@ def check(
         results,
         watched[0] if watched is not None else None,
         states=len(found.states),
-        processes=options.processes,
     )
-
-
-def translated(
-    mission: Mission,
-    fleet: Fleet,
-    process: str | None,
-    options: Options,
-    size_limit: SizeLimit,
-    limits: Limits,
-) -> tuple[PetriNet, Options]:
-    """Return the net of a mission, and the options that it was made with: it has as many instances
-    of each process as begin in it, as far as that is cheap.
-
-    Raises:
-        KeyError: the mission has no such process.
-        TooLargeError: it is larger than `size_limit` allows.
-    """
-    net = translate(mission, fleet, process=process, options=options, size_limit=size_limit)
-    net = simplify(net, size_limit=size_limit)
-    small = replace(limits, states=MANY_STATES, seconds=FEW_SECONDS, after_violation=None)
-    while options.processes < MOST_PROCESSES and any(map(_is_beyond, net.transitions)):
-        found = explore(net, small, reduction=StubbornSets(net))
-        reached = any(_is_beyond(net.transitions[number]) for number in found.fired)
-        if found.stopped is not None or not reached:
-            break
-        more = replace(options, processes=options.processes * 4)
-        least = SizeLimit(time.monotonic() + FEW_SECONDS, MANY_TRANSITIONS)
-        try:
-            larger = translate(mission, fleet, process=process, options=more, size_limit=least)
-            net, options = simplify(larger, size_limit=least), more
-        except TooLargeError:
-            break
-    return net, options
-
-
-def _is_beyond(transition: Transition) -> bool:
-    return any(step.action is Action.NOT_FOLLOWED for step in transition.steps)
 
 
 def size_limit_of(limits: Limits) -> SizeLimit:

@@ -112,7 +112,7 @@ def interrupted_commanded_again(searched: SearchedMission) -> Result:
     violations: list[Violation] = []
     for resource, state in first.items():
         run = tuple(found.run_to(state))
-        stopped = _interruption(searched, found, run, resource)
+        stopped = _interruption(searched, run, resource)
         violations.append(
             Violation(
                 f"{resource} is interrupted by {searched.labels(stopped[:1])} and not commanded"
@@ -125,12 +125,11 @@ def interrupted_commanded_again(searched: SearchedMission) -> Result:
 
 
 def _interruption(
-    searched: SearchedMission, found: "object", run: tuple[int, ...], resource: str
+    searched: SearchedMission, run: tuple[int, ...], resource: str
 ) -> tuple[str, ...]:
     """The element that interrupted last, and the task that it interrupted."""
     watched = searched.watched
     assert watched is not None
-    del found
     places = {p for p, r in searched.resources.items() if r == resource}
     for transition in reversed(run):
         each = watched.net.transitions[transition]

@@ -120,8 +120,7 @@ def with_requirements(
     if not requirements:
         return report
     limits = limits or Limits(tokens=3)
-    options = replace(options or Options(), processes=report.processes)
-    confirm = Confirmation(mission, fleet, process, options).doubt
+    confirm = Confirmation(mission, fleet, process, options or Options()).doubt
     try:
         size_limit = size_limit_of(limits)
         net = net_for(

@@ -13,10 +13,11 @@ from m2pem.errors import InternalError
 from m2pem.fleet.default_fleet import fleet_for
 from m2pem.fleet.fleet import Fleet
 from m2pem.mission.mission import Mission
-from m2pem.verify.check import Report, size_limit_of, too_large, translated
+from m2pem.verify.check import Report, size_limit_of, too_large
 from m2pem.verify.check import search as search_built_in
 from m2pem.verify.confirmation import Confirmation
 from m2pem.verify.net.petri_net import PetriNet
+from m2pem.verify.net.simplify import simplify
 from m2pem.verify.properties import ALL, SearchedMission
 from m2pem.verify.properties.commands import watch_interruptions
 from m2pem.verify.properties.results import Result, Verdict, bounded
@@ -24,7 +25,7 @@ from m2pem.verify.properties.soundness import can_complete, completes_if_fair, n
 from m2pem.verify.search.explore import Exploration, Limits, Progress, Stopped
 from m2pem.verify.spin.queries import Storage
 from m2pem.verify.spin.search import SpinExploration, WantedRuns, search
-from m2pem.verify.translate import Options, TooLargeError
+from m2pem.verify.translate import Options, TooLargeError, translate
 
 BEYOND_SPIN = (can_complete, completes_if_fair, no_livelock)
 """Properties about what can be reached from each state."""
@@ -51,11 +52,12 @@ def check_with_spin(
     fleet = fleet or fleet_for(mission)
     try:
         size_limit = size_limit_of(limits)
-        net, options = translated(mission, fleet, process, options or Options(), size_limit, limits)
+        net = translate(mission, fleet, process=process, options=options, size_limit=size_limit)
+        net = simplify(net, size_limit=size_limit)
     except TooLargeError as error:
         return replace(too_large(mission, error, process), engine="spin")
     found = search(net, limits, storage=storage, progress=progress)
-    confirm = Confirmation(mission, fleet, process, options).doubt
+    confirm = Confirmation(mission, fleet, process, options or Options()).doubt
     searched = SearchedMission(mission, net, as_exploration(found), confirm=confirm)
     watched = watch_interruptions(net, fleet.vehicles)
     if watched is not None and found.stopped is not Stopped.INTERRUPTED:
@@ -80,7 +82,6 @@ def check_with_spin(
         watched[0] if watched is not None else None,
         engine="spin",
         states=found.states,
-        processes=options.processes,
         notes=(f"Spin cannot be asked {beyond}: the built-in search {answered}",),
     )
 

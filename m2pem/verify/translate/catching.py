@@ -188,27 +188,10 @@ def _again(
     context.net.approximate(
         event, Exactness.BOUNDED, "it comes again only when what it began has ended"
     )
-    region = handled(event)
-    found: set[int] = set()
-    both = comes.then(Effect(inhibit=_Late(context, instance.outer, region, found)))
+    places = (entry_place(context.net, node, instance.outer) for node in handled(event))
+    both = comes.then(Effect(inhibit=frozenset(places)))
     assert both is not None
     return both
-
-
-class _Late(frozenset[int]):
-    """Places of some nodes, computed when all nodes are translated."""
-
-    __slots__ = ()
-
-    def __new__(
-        cls,
-        context: TranslationContext,
-        scope: ScopeDraft,
-        nodes: frozenset[e.FlowNode],
-        found: set[int],
-    ) -> "_Late":
-        del found
-        return super().__new__(cls, {entry_place(context.net, node, scope) for node in nodes})
 
 
 def handled(event: e.BoundaryEvent) -> frozenset[e.FlowNode]:

@@ -139,11 +139,11 @@ def _instances(context: TranslationContext, process: e.Process) -> None:
     context.net.approximate(
         process,
         Exactness.BOUNDED,
-        f"checked with up to {context.options.processes} instances at a time",
+        f"checked with up to {context.options.instances} instances at a time",
         process.id,
     )
     scopes = []
-    for number in range(context.options.processes):
+    for number in range(context.options.instances):
         step = f"{process.id}#{number + 1}"
         scope = context.net.scope(process, context.everything, step=step, frame=(process.id, step))
         build(context, process, scope)

@@ -9,9 +9,6 @@ from m2pem.mission.values import Value
 from m2pem.verify.assumptions import NOTHING, Assumptions
 from m2pem.verify.translate.ways import KnownWays
 
-PROCESSES = 2
-"""Instances of a process that triggers begin, unless more of them begin at a time."""
-
 
 @dataclass(frozen=True, slots=True)
 class Options:
@@ -20,12 +17,12 @@ class Options:
     `data`: what the run is started with. `service_writes`: names that each service writes, by
     class; one that is not listed may write any name that nothing else writes. `open_world`: every
     signal and message may come from outside, not only those that operators are expected to send.
-    `instances`: how many parallel instances of an activity are modelled when the mission does not
-    state their number; `processes`: the same of a process that triggers start. `calls`: how often a
-    process may be called within itself. `assumed`: what is taken not to happen. `timers_in_order`:
-    of timers that begin to run together, the one that is due first fires first. `catalogue`: what
-    each resource offers; None: all that the mission asks for. `distinguished`: resources that
-    requirements are about. `all_pools`: the pools of a collaboration that nothing triggers begin with the run.
+    `instances`: how many parallel instances of an activity, and of a process that triggers start,
+    are modelled when the mission does not state their number. `calls`: how often a process may be
+    called within itself. `assumed`: what is taken not to happen. `timers_in_order`: of timers that
+    begin to run together, the one that is due first fires first. `catalogue`: what each resource
+    offers; None: all that the mission asks for. `distinguished`: resources that requirements are
+    about. `all_pools`: the pools of a collaboration that nothing triggers begin with the run.
     `ways`: where vehicles go, so that shared space is followed; None: it is taken to be free.
     """
 
@@ -33,7 +30,6 @@ class Options:
     service_writes: Mapping[str, Sequence[str]] = field(default_factory=dict)
     open_world: bool = False
     instances: int = 2
-    processes: int = PROCESSES
     calls: int = 1
     assumed: Assumptions = NOTHING
     timers_in_order: bool = False

@@ -54,43 +54,37 @@ def untriggered(process: e.Process) -> list[e.FlowNode]:
     return [each for each in process.entries if not triggers_of(each)]
 
 
-_PASSING = (e.StartEvent, e.EndEvent, e.IntermediateCatchEvent, e.IntermediateThrowEvent)
-_WORKING = (e.Task, e.SendTask, e.ReceiveTask)
+_TRIGGERS = (SignalEventDefinition, MessageEventDefinition, TimerEventDefinition)
+_EVENTS = (e.StartEvent, e.EndEvent, e.IntermediateCatchEvent, e.IntermediateThrowEvent)
+_TASKS = (e.Task, e.SendTask, e.ReceiveTask, e.UserTask)
 
 
 def instance_is_token(process: e.Process) -> bool:
     """Whether an instance is one token that nothing else in the instance meets, interrupts or
     reads: it begins by a signal or message, and passes events, tasks and exclusive gateways."""
+    starts = [each for each in process.entries if isinstance(each, e.StartEvent)]
     return (
-        all(map(_is_alone, process.nodes))
-        and not process.event_subprocesses
+        not process.event_subprocesses
+        and all(map(_is_alone, process.nodes))
         and all(flow.condition is None for flow in process.flows)
-        and all(isinstance(each, e.StartEvent) and each.definitions for each in process.entries)
+        and len(starts) == len(process.entries)
+        and all(
+            isinstance(d, _TRIGGERS[:2]) for each in starts for d in each.definitions or (None,)
+        )
     )
 
 
 def _is_alone(node: e.FlowNode) -> bool:
     if isinstance(node, e.ExclusiveGateway):
         return True
-    if len(node.outgoing) > 1:
+    if isinstance(node, e.Event):
+        known = all(isinstance(each, _TRIGGERS) for each in node.definitions)
+        return type(node) in _EVENTS and known and len(node.definitions) < 2 > len(node.outgoing)
+    if not isinstance(node, e.Activity) or type(node) not in _TASKS or len(node.outgoing) > 1:
         return False
-    if type(node) in _PASSING:
-        assert isinstance(node, e.Event)
-        known = (SignalEventDefinition, MessageEventDefinition)
-        catches = isinstance(node, e.IntermediateCatchEvent)
-        return len(node.definitions) <= 1 and all(
-            isinstance(each, known) or (catches and isinstance(each, TimerEventDefinition))
-            for each in node.definitions
-        )
-    return type(node) in _WORKING and not _does_more(node)
-
-
-def _does_more(node: e.FlowNode) -> bool:
-    assert isinstance(node, e.Activity)
-    several = node.start_quantity > 1 or node.completion_quantity > 1 or node.loop is not None
-    by_resource = isinstance(node, e.SendTask) and node.behavior is not None
+    more = node.loop or node.boundary or node.for_compensation or getattr(node, "behavior", None)
     begins = isinstance(node, e.ReceiveTask) and node.instantiate
-    return bool(several or by_resource or begins or node.boundary or node.for_compensation)
+    return not more and not begins and node.start_quantity == node.completion_quantity == 1
 
 
 def begin_together(context: TranslationContext, process: e.Process) -> tuple[int, ...]:
