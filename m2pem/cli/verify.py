@@ -145,8 +145,9 @@ def verify(
     """Prove properties and requirements of a mission, or show a run that violates them.
 
     Ends with 0 if all holds, with 1 if something is violated, with 2 if the mission, the fleet or
-    the requirements cannot be used, and with 3 if something is undecided. Ctrl-C ends the search:
-    the command reports the part that it has searched.
+    the requirements cannot be used, with 3 if something is undecided, and with 4 if something may
+    be violated: the engine did not follow its run. Ctrl-C ends the search: the command reports the
+    part that it has searched.
     """
     _refuse_what_does_not_go_together(engine, storage, emit, reports)
     from m2pem.executive.loading import load_source

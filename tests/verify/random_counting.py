@@ -115,11 +115,11 @@ class Draft:
         says = [event("intermediateThrowEvent", self.name(), self.message())]
         return self.dice.choice(([], says, waits, [*waits, *says]))
 
-    def undone(self, depth: int) -> list[str]:
-        """A subprocess in which a task is done once or twice, and then undone."""
+    def undone(self, depth: int, twice: str = "", message: str = "") -> list[str]:
+        """A subprocess in which a task is done once or twice, and then undone, which sends."""
+        twice, message = twice or self.dice.choice(("true", "false")), message or self.message()
         merge, task, split, off, undo, sends = (self.name() for _ in range(6))
         again, throw, start, end = (self.name() for _ in range(4))
-        twice = self.dice.choice(("true", "false"))
         flag, host = f"f{self.number}", f' attachedToRef="{task}"'
         inside = (
             f'<startEvent id="{start}"/><scriptTask id="{again}"><script>{flag} = {twice}</script>'
@@ -128,7 +128,7 @@ class Draft:
             f'<scriptTask id="{off}"><script>{flag} = false</script></scriptTask>'
             f'{event("intermediateThrowEvent", throw, "compensate")}<endEvent id="{end}"/>'
             f"{event('boundaryEvent', undo, 'compensate', host)}"
-            f'<sendTask id="{sends}" isForCompensation="true" messageRef="{self.message()[8:]}"/>'
+            f'<sendTask id="{sends}" isForCompensation="true" messageRef="{message[8:]}"/>'
             f'<sequenceFlow id="{split}_{off}" sourceRef="{split}" targetRef="{off}">'
             f"<conditionExpression>{flag}</conditionExpression></sequenceFlow>"
             f'<sequenceFlow id="{split}_{throw}" sourceRef="{split}" targetRef="{throw}"/>'
