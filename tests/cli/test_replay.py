@@ -9,7 +9,9 @@ from m2pem import load_mission
 from m2pem.mission.mission import version_of_files
 from tests.cli.conftest import Invoke
 from tests.command_line import ANSWERS, MISSION, CommandLine
+from tests.engine.notation import xml
 from tests.executive.conftest import flow, mission
+from tests.verify.test_confirmation import COUNTS as COUNTS_FAR
 
 
 @pytest.fixture
@@ -192,3 +194,14 @@ def test_a_run_that_did_not_wait_for_thousands_of_steps_is_verified(
 
 def test_verify_and_state_exclude_each_other(invoke: Invoke) -> None:
     assert invoke("replay", "r1", "--verify", "--state")[0] == 2
+
+
+def test_replay_says_of_a_run_that_the_engine_does_not_follow_it(
+    invoke: Invoke, tmp_path: Path
+) -> None:
+    file, report = tmp_path / "counts.bpmn", tmp_path / "counts.json"
+    file.write_text(xml(COUNTS_FAR), encoding="utf-8")
+    assert invoke("verify", file, "--report", report)[0] == 4
+    status, _, error = invoke("replay", "--counterexample", report)
+    assert status == 1
+    assert "the engine does not follow" in error

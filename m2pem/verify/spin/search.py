@@ -157,9 +157,11 @@ class _Search:
         """
         limits, found = self.queries.limits, self.found
         most_bits = max((limits.tokens + 1).bit_length() - 1, 1)
-        # Spin gives as much room as the built-in search: both see the same states.
-        small = replace(limits, states=MANY_STATES)
-        wider = dict(explore(self.net, small, keep_edges=False).encoding.wider)
+        # Where several tokens are meant, there is as much room as in the built-in search: both see
+        # the same states.
+        places, small = self.net.places, replace(limits, states=MANY_STATES)
+        wide = explore(self.net, small, keep_edges=False).encoding.wider
+        wider = {place: bits for place, bits in wide.items() if places[place].several}
         reported_once: set[int] = set()
         while True:
             self.encoding = found.encoding = Encoding(self.net, wider)
