@@ -125,7 +125,7 @@ def places(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> N
         (nets, 10),
         (sound_nets, 12),
         (failing_nets, 12),
-        (transitions, 25),
+        (transitions, 45),
         (missions, 10),
         (needs, 3),
         (keepings, 4),
