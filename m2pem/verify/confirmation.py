@@ -74,7 +74,7 @@ class Confirmation:
                 player.play(step)
             except NotPlayableError as error:
                 return f"step {step['step']}: {error}"
-        if followed.ends_like(state, player.run.state):
+        if followed.ends_like(state, player.run.state, waits=not player.run.wants_continue):
             return ""
         return f"at the end, {_said(player.run.state)}"
 
@@ -113,19 +113,20 @@ class _Followed:
                 tokens[each.element] += count
         return not ends and tokens == tokens_of_run(run)
 
-    def ends_like(self, state: int, run: RunState) -> bool:
-        """Whether internal steps lead from a state to that of the engine."""
+    def ends_like(self, state: int, run: RunState, *, waits: bool) -> bool:
+        """Whether internal steps lead from a state to that of the engine; if that never waits,
+        whether they never end."""
         encoding = self.encoding
         seen, waiting = {state}, [state]
         while waiting and len(seen) <= MOST_STATES:
             here = waiting.pop()
             enabled = self._enabled(here, Kind.INTERNAL) or self._enabled(here, Kind.JOIN)
-            if not enabled and self.agrees(here, run):
-                return True
+            if not enabled and (not waits or self.agrees(here, run)):
+                return waits
             after = {encoding.fire(number, here)[0] for number in enabled} - seen
             seen |= after
             waiting += after
-        return False
+        return not waits
 
 
 def tokens_of_run(run: RunState) -> Tokens:
