@@ -93,7 +93,7 @@ class Exploration:
     `fired`: by transition, the first state in which it fired. `flagged`: those of them that have a
     flag. `overflows`: by place, the first state and transition at which a token came to a place
     that had one, where one is meant. `beyond`: places that got more than `Limits.tokens`. `lost`:
-    places that had no room for more tokens, which were lost: what follows is not certain. `edges`:
+    places, where several are meant, that lost tokens: what follows is not certain. `edges`:
     successors of each state as (transition, state), if they were kept. `expanded`: how many states
     have all their successors, but for those of `cut`: there, a place has no room for a token.
     """
@@ -205,9 +205,7 @@ def explore(
                 most = found.encoding.width[place] + more // len(far)
                 wider[place] = min(MANY_TOKENS.bit_length(), most)
             continue
-        found.lost = frozenset(
-            p for p in found.overflows if net.places[p].several or not net.places[p].once
-        )
+        found.lost = frozenset(place for place in found.overflows if net.places[place].several)
         found.beyond = frozenset(
             place
             for place in found.overflows
