@@ -1,5 +1,7 @@
 """Messages go to one receiver, and are kept until a receiver waits."""
 
+import pytest
+
 from m2pem.engine.inputs import MessageReceived
 from tests.engine.kit import Play
 from tests.engine.snapshot import snapshot
@@ -32,6 +34,26 @@ def test_a_message_is_kept_with_its_data_until_a_receiver_waits() -> None:
     play.trace()
     assert play.answer().at == "last"
     assert play.trace("write")[1:] == ["write x = 1", "write x = 2", "write y = 3"]
+
+
+@pytest.mark.parametrize("sequential", ["true", "false"])
+@pytest.mark.parametrize("kept", [0, 1, 2, 3])
+def test_each_instance_of_a_receive_task_takes_a_message(sequential: str, kept: int) -> None:
+    play = Play(f"""
+        <startEvent id="start"/> <userTask id="u"/>
+        <receiveTask id="get" messageRef="m">
+          <each isSequential="{sequential}">3</each>
+        </receiveTask>
+        start -> u -> get
+    """).start()
+    for _ in range(kept):
+        play.message("m")
+    play.answer()
+    for _ in range(kept, 3):
+        assert not play.ended
+        play.message("m")
+    assert play.ended == "completed"
+    assert play.run.state.kept_messages == {}
 
 
 def test_a_message_that_the_mission_sends_is_kept_too() -> None:

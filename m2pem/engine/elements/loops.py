@@ -163,8 +163,9 @@ def _end_instance(x: Execution, token: Token, outcome: TokenOutcome) -> Token | 
         if enough:
             end_tokens(x, scope, TokenOutcome.INTERRUPTED)
             return _finish(x, scope, outer, loop)
-    if scope.loop.started < scope.loop.total and loop.sequential:
-        _enter_instance(x, scope)
+    if scope.loop.started < scope.loop.total:
+        if loop.sequential:  # those of a parallel activity begin by themselves
+            _enter_instance(x, scope)
     elif not scope.tokens:
         return _finish(x, scope, outer, loop)
     return None
