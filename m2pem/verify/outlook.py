@@ -410,7 +410,7 @@ def _key(state: RunState, now_us: int) -> Key:
         state.status,
         tuple(_scope(state, scope, now_us) for scope in roots),
         _encoded(state.shared.data),
-        _encoded({ref: [m.data for m in kept] for ref, kept in _receivable(state)}),
+        _encoded({ref: [(m.data, m.keys) for m in kept] for ref, kept in _receivable(state)}),
         tuple(state.taken),
         tuple(sorted((b.name, b.element, b.phase) for b in state.behaviors.values())),
     )

@@ -5,12 +5,13 @@ from typing import Any
 
 import pytest
 
+from m2pem.bpmn import parse_mission
 from m2pem.engine import inputs as i
 from m2pem.fleet.default_fleet import fleet_for
 from m2pem.mission.elements import ErrorPolicy
 from m2pem.verify.outlook import Outlook, OutlookLimits, Verdict, outlook
 from tests.engine.kit import FAILED, Play
-from tests.engine.notation import mission
+from tests.engine.notation import mission, xml
 
 JOINED = """
     <startEvent id="start"/> <endEvent id="end"/> <endEvent id="away"/> <task id="home"/>
@@ -181,3 +182,30 @@ UNRECEIVED = """
 
 def test_messages_that_nothing_receives_are_no_new_states() -> None:
     assert seen(stopped(UNRECEIVED), "skip") == Outlook(Verdict.COMPLETES)
+
+
+KEPT_BY_KEY = """
+    <process id="P" isExecutable="true">
+      <startEvent id="start"/> <scriptTask id="go">do goto uav1</scriptTask>
+      <userTask id="ask">ask yes no</userTask> <exclusiveGateway id="gate"/>
+      <scriptTask id="right">n = 1</scriptTask> <scriptTask id="wrong">n = 2</scriptTask>
+      <intermediateThrowEvent id="send">message M</intermediateThrowEvent>
+      <scriptTask id="forget">n = 1; user.decision = ''</scriptTask>
+      <scriptTask id="on">do goto uav1</scriptTask>
+      <receiveTask id="get" messageRef="M"/> <endEvent id="end"/>
+      start -> go -> ask -> gate
+      gate -> right if user.decision == 'yes'
+      gate -> wrong if user.decision == 'no'
+      right -> send
+      wrong -> send
+      send -> forget -> on -> get -> end
+    </process>
+"""
+
+
+def test_states_that_differ_only_in_the_key_of_a_kept_message_are_two() -> None:
+    text = xml(KEPT_BY_KEY).replace('<message id="M"', '<message id="M" m2pem:correlationKey="n"')
+    parsed = parse_mission(text.encode(), "t.bpmn")
+    fleet = replace(fleet_for(parsed), on_error=ErrorPolicy.INCIDENT)
+    found = seen(Play(parsed, fleet=fleet).start().report("go", FAILED), "skip")
+    assert found == Outlook(Verdict.UNKNOWN, "what messages from outside bring is not known")
