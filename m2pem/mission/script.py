@@ -16,11 +16,7 @@ from m2pem.mission.expression.vocabulary import is_reserved
 _THROW = re.compile(r"throw\s+error\s+(\S+)")
 _CODE = re.compile(r"[\w.:-]+")
 _FORM = "write 'name = expression' or 'throw error CODE'"
-_BEFORE_COMMENT = re.compile(
-    r"""(?: [^#'"] | '(?:[^'\\]|\\.?)*+(?:'|\Z) | "(?:[^"\\]|\\.?)*+(?:"|\Z) )*+""",
-    re.DOTALL | re.VERBOSE,
-)
-"""Texts in quotes, in which a backslash may be before a quote, and what is neither one nor `#`."""
+_QUOTES = "'\""
 
 
 class _StatementError(Exception):
@@ -64,5 +60,20 @@ def _statement(text: str, line: int) -> Assignment | ThrowError:
 
 def _without_comment(line: str) -> str:
     """The line up to a `#` that is not inside a quoted text."""
-    found = _BEFORE_COMMENT.match(line)
-    return found[0] if found else ""
+    if "#" not in line:
+        return line
+    quote = ""
+    position = 0
+    while position < len(line):
+        character = line[position]
+        if quote:
+            if character == "\\":
+                position += 1
+            elif character == quote:
+                quote = ""
+        elif character in _QUOTES:
+            quote = character
+        elif character == "#":
+            return line[:position]
+        position += 1
+    return line
