@@ -239,7 +239,7 @@ def test_what_is_not_known_of_ways_is_said_and_both_are_followed() -> None:
     assert "whether its way enters bridge is not known" in said["A", Exactness.MORE]
     assert ("W", Exactness.MORE) not in said
     assert said["MAIN", Exactness.BOUNDED].startswith("where ugv2 is at first is not known")
-    assert verdict(report, "can-complete") is Verdict.VIOLATED  # A may end on the bridge
+    assert verdict(report, "can-complete") is Verdict.MAY_BE_VIOLATED  # A may end on the bridge
 
 
 # --- the engine, the executive and Spin -----------------------------------------------------------
