@@ -32,7 +32,7 @@ EXCEPTIONS = {
     ("tests/verify/test_interrupted_search.py", "_loop"): "as above",
     ("tests/test_site.py", "_LAZY"): "a name that can be loaded and is missing in `__all__` is "
     "in this table only",
-    ("plugins/arbiters/mavlink/tests/test_mavlink_sitl_planes.py", "_controllers"): "a landing is "
+    ("plugins/arbiters/mavlink/tests/test_mavlink_sitl_planes.py", "_units"): "a landing is "
     "stored on a real plane by the driver under test, as MAVSDK shares its port with no other link",
 }
 """By file and name: why nothing public reaches the same."""

@@ -56,7 +56,7 @@ def test_a_plane_flies_a_route_circles_and_lands(tmp_path: Path, driver: str) ->
         clock = SystemClock(float(sitl.SPEED))
         arbiter = MavlinkArbiter({PLANE: connection}, context(clock))
         async with Flown(arbiter, clock) as bench:
-            vehicle = arbiter._controllers[PLANE].vehicle
+            vehicle = arbiter._units[PLANE].vehicle
             assert await vehicle.identified(READY_WITHIN_S)
             await vehicle.driver.upload(LANDING)
             await bench.do(1, "takeoff", altitude=60.0)
