@@ -324,8 +324,8 @@ class _Explorer:
                 signal = state.mission.signals.get(ref)
                 return f"signal {signal.name if signal else ref} comes"
             case i.ResolveIncident(incident, choice):
-                done = "skipped" if choice is i.IncidentChoice.SKIP else "tried again"
-                return f"{self._label(state.incidents[incident].token.node.id)} is {done}"
+                how = "skipped" if choice is i.IncidentChoice.SKIP else "tried again"
+                return f"{self._label(state.incidents[incident].token.node.id)} is {how}"
             case _:
                 return "a timer ends"
 
