@@ -271,6 +271,17 @@ def test_what_cannot_be_armed_opens_no_second_incident_and_hides_no_other_event(
     assert play.signal("s").ended == "completed"
 
 
+def test_what_a_wrong_timer_of_a_revision_has_ended_is_not_armed() -> None:
+    wrong = """
+        <boundaryEvent id="late" attachedToRef="job">timer ${x * nothing}</boundaryEvent>
+        <boundaryEvent id="wrong" attachedToRef="job">error EXPRESSION</boundaryEvent>
+        late -> end
+        wrong -> end
+    </process>"""
+    new = beside_job("signal go").replace("</process>", wrong, 1)
+    assert played(boxed()).report("before").revise(new).ended == "completed"
+
+
 def test_of_a_boundary_event_and_an_event_subprocess_the_subprocess_has_waited_longer() -> None:
     start = '<startEvent id="go">message m</startEvent>'
     inside = f'<subProcess id="sub" triggeredByEvent="true">{start}</subProcess>'

@@ -73,8 +73,7 @@ def _carry_out(x: Steps, plan: RevisionPlan, item: Revise) -> None:
     for token in restarted:
         if x.is_active(token):
             activate_later(x, token)
-    for number in plan.rechecked:
-        x.queue.append(state.scopes[number])
+    x.queue.extend(state.scopes[each] for each in plan.rechecked if each in state.scopes)
     for scope in state.scopes.values():
         _look_at_joins(x, scope)
     x.joins_to_check.update(state.scopes)
@@ -107,8 +106,9 @@ def _arm(x: Execution, armings: Iterable[Arming]) -> None:
         # An error in one of them moves a token on, or stops it until a retry arms all of them; one
         # that is stopped already stays.
         stopped = isinstance(holder, Token) and bool(holder.incident)
+        there = x.state.tokens if isinstance(holder, Token) else x.state.scopes
         for each in those:
-            gone = isinstance(holder, Token) and x.state.tokens.get(holder.id) is not holder
+            gone = there.get(holder.id) is not holder
             node = x.mission.elements[each.element]
             assert isinstance(node, FlowNode)
             if gone or not (arm_events(x, holder, [node], since_us=each.since_us) or stopped):
