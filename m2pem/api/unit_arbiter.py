@@ -1,4 +1,4 @@
-"""A base class of arbiters that command each resource by an object of its own, its unit."""
+"""A base class of arbiters that have one object for each resource, its unit, which commands it."""
 
 from abc import ABC, abstractmethod
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence

@@ -58,7 +58,8 @@ class ScheduledRuns:
         return loaded, process
 
     async def unapproved(self, plan: SchedulePlan) -> str:
-        """Who must approve the mission of an entry before it may start; "": nobody.
+        """Who must approve the mission of an entry before it may start; "": no approval is
+        needed.
 
         Raises:
             JournalError: the journal cannot be read.

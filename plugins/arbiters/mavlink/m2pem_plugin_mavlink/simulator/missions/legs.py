@@ -136,7 +136,7 @@ class LoiterToAltitude(Leg):
 
 
 class Px4Takeoff(LoiterToAltitude):
-    """Climb if it stands on the ground, and go to the item's place; its first parameter is no
+    """Climb if it is on the ground, and go to the item's place; its first parameter is no
     time."""
 
     def __init__(self, autopilot: AutopilotInterface, item: Item) -> None:
