@@ -501,6 +501,7 @@ class Rehearsal:
             or self._answers.to_send > 0
             or self._answers.resolving > 0
             or self._scripted.ending > 0
+            or executive.supervisor.dispatcher.calls_waiting > 0
             or any(
                 behavior.phase is BehaviorPhase.CANCELLING for behavior in state.behaviors.values()
             )
