@@ -60,7 +60,7 @@ def _march(
         return way_to(parameters, buffered_hull([places[0][:2], *_stop(lead)], reach_m), spans[0])
     moved = [place[:2] for place in shifted(places, left_m)]
     volume = along(parameters, moved, spans, parameters.bend_m)
-    if back_m <= Polyline(moved).length_m:
+    if back_m <= Polyline(place[:2] for place in places).length_m:
         return volume
     # Its place is before the route's beginning: it goes there at once, or by way of the route.
     end = trimmed([(*place, 0.0) for place in moved], back_m)[-1][:2]

@@ -117,7 +117,8 @@ class Teams:
 
         def refusal(checked: BehaviorRequest) -> str:
             try:
-                made.append(self._situation.scheme(checked, begun=False))
+                begun = request.id in self._remains
+                made.append(self._situation.scheme(checked, begun=begun))
             except TeamRefusedError as error:
                 return str(error)
             return ""

@@ -5,9 +5,10 @@ from collections.abc import Sequence
 from itertools import combinations
 
 from m2pem.fleet.parameters import read_offsets
-from m2pem.geo.polyline import EastNorthUp, Polyline, shifted, trimmed
+from m2pem.geo.polyline import EastNorthUp, Polyline, Segment, shifted, trimmed
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.geometry import Route
+from m2pem.teams.clearance import NEAREST_SHARE, Clearance, Nearest, Way, nearest
 from m2pem.teams.paths import SPACING_M, MemberPath, beside, slot
 from m2pem.teams.plan import Leg, March, Marcher, Plan, PlanningContext, TeamRefusedError
 
@@ -19,6 +20,9 @@ HEADROOM_SHARE = 0.4
 
 _SAME_PLACE_M = 0.01
 
+_FARTHER_BACK_SHARE = 2.0
+"""Share of the spacing: so much farther back than in the formation may a member end."""
+
 
 def march(context: PlanningContext, default_shape: str) -> Plan:
     """Move together in a shape; without a route, form up on the lead."""
@@ -29,12 +33,17 @@ def march(context: PlanningContext, default_shape: str) -> Plan:
         shape, spacing = "", min(math.dist(a, b) for a, b in combinations(places, 2))
     if route is None:
         return Plan(_forming_up(context, places, chained=False))
-    ways = _ways(context, route, places)
+    ways = _ways(context, route, places, spacing)
     marchers = tuple(
-        Marcher(way.member, way.path, way.back_m, way.left_m, context.motion(way.member))
+        Marcher(
+            way.member,
+            way.path(context.begin(way.member)),
+            way.back_m,
+            way.left_m,
+            context.motion(way.member),
+        )
         for way in ways
     )
-    _refuse_wrong_order(marchers, spacing)
     speed = _march_speed(context, marchers, spacing)
     legs = tuple(way.leg(context, speed, None) for way in ways)
     return Plan(legs, March(marchers, spacing, speed, closes=shape == "column"))
@@ -47,7 +56,7 @@ def one_by_one(context: PlanningContext) -> Plan:
     places = _places(context, shape, spacing)
     if route is None:
         return Plan(_forming_up(context, places, chained=True))
-    ways = _ways(context, route, places)
+    ways = _ways(context, route, places, spacing)
     befores: list[ResourceId | None] = [None, *(way.member for way in ways)]
     speed_m_s = context.parameters.speed_m_s
     return Plan(
@@ -55,7 +64,13 @@ def one_by_one(context: PlanningContext) -> Plan:
     )
 
 
-def lane_mates(a: Marcher, b: Marcher, spacing_m: float) -> bool:
+_REMEDY = (
+    "draw a wider turn, or the way back beside the way there; or set a smaller spacing; or command "
+    "the members one after the other"
+)
+
+
+def lane_mates(a: "Marcher | _Way", b: "Marcher | _Way", spacing_m: float) -> bool:
     """Whether two members are in one lane."""
     return abs(a.left_m - b.left_m) < spacing_m / 2
 
@@ -64,29 +79,36 @@ class _Way:
     """A member's route: the team's, shifted sideways and shortened by its distance behind."""
 
     def __init__(
-        self,
-        context: PlanningContext,
-        member: ResourceId,
-        route: Sequence[EastNorthUp],
-        place: tuple[float, float],
+        self, member: ResourceId, route: Sequence[EastNorthUp], place: tuple[float, float]
     ) -> None:
         self.member = member
         self.back_m, self.left_m = place
-        marks = list(Polyline(place[:2] for place in route).marks_m)
-        moved = shifted(route, self.left_m)
-        kept = trimmed(moved, self.back_m)
-        end_mark = marks[-1] - self.back_m
-        if end_mark < 0:  # its place is before the route: it need not see the route's start
-            kept = kept[-1:]
-        self.places = kept
-        marks = [*marks[: len(kept) - 1], end_mark]
-        begin = context.poses[member].place
-        if not context.begun:
+        self._route = route
+        self._route_marks_m = Polyline(each[:2] for each in route).marks_m
+        self._end_at(self._route_marks_m[-1] - self.back_m)
+
+    def _end_at(self, mark_m: float) -> None:
+        if mark_m > 0:
+            cut = trimmed(self._route, self._route_marks_m[-1] - mark_m)
+            self.places = shifted(cut, self.left_m)
+        else:  # its place is before the route: it need not see the route's start
+            first = Segment.between(self._route[0][:2], self._route[1][:2])
+            self.places = [beside(first.start, first.yaw_rad, -mark_m, self.left_m)]
+        self._marks = [*self._route_marks_m[: len(self.places) - 1], mark_m]
+
+    def path(self, begin: tuple[float, float] | None = None) -> MemberPath:
+        """Its path, without the way from `begin` to the route if there is none."""
+        kept, marks = self.places, self._marks
+        if begin is not None:
             first = math.dist(begin, kept[0][:2])
             kept, marks = [(*begin, 0.0), *kept], [marks[0] - first, *marks]
         elif len(kept) == 1:
             kept, marks = [*kept, *kept], [*marks, *marks]
-        self.path = MemberPath(kept, marks)
+        return MemberPath(kept, marks)
+
+    def shorten(self, by_m: float) -> None:
+        """Let it end so much earlier, or a little more."""
+        self._end_at(self._marks[-1] - by_m - _SAME_PLACE_M)
 
     def leg(
         self, context: PlanningContext, speed_m_s: float | None, after: ResourceId | None
@@ -125,7 +147,7 @@ def _places(context: PlanningContext, shape: str, spacing_m: float) -> list[tupl
     return places[: max(2, len(context.members))]
 
 
-def _refuse_wrong_order(marchers: Sequence[Marcher], spacing_m: float) -> None:
+def _refuse_wrong_order(marchers: "Sequence[_Way]", spacing_m: float) -> None:
     """Raise unless, in each lane, members ahead come first: each keeps clear of those before it."""
     for index, marcher in enumerate(marchers):
         for other in marchers[:index]:
@@ -137,7 +159,10 @@ def _refuse_wrong_order(marchers: Sequence[Marcher], spacing_m: float) -> None:
 
 
 def _ways(
-    context: PlanningContext, route: Route, offsets: Sequence[tuple[float, float]]
+    context: PlanningContext,
+    route: Route,
+    offsets: Sequence[tuple[float, float]],
+    spacing_m: float,
 ) -> list[_Way]:
     if route.altitude_frames and context.parameters.altitude_m is None:
         raise TeamRefusedError(
@@ -145,10 +170,60 @@ def _ways(
             "a formation cannot keep: set 'altitude'"
         )
     places = [(*context.level(each), each[2] or 0.0) for each in _apart(context, route)]
-    return [
-        _Way(context, member, places, offset)
+    ways = [
+        _Way(member, places, offset)
         for member, offset in zip(context.members, offsets, strict=False)
     ]
+    _refuse_wrong_order(ways, spacing_m)
+    _keep_ends_apart(context, ways, spacing_m)
+    return ways
+
+
+def _keep_ends_apart(context: PlanningContext, ways: Sequence[_Way], spacing_m: float) -> None:
+    """Let members end earlier that would come too near to those at their ends.
+
+    Raises:
+        TeamRefusedError: one of them would not get to the end of the route, or near it.
+    """
+    nearest_m = NEAREST_SHARE * spacing_m
+    short_m = max(context.motion(way.member).short_m(context.speed()) for way in ways)
+    formation = [Way(way.path(), way.back_m) for way in ways]
+    farther_m = [0.0 for _ in ways]
+    while True:
+        paths = [Way(way.path(context.begin(way.member)), way.back_m) for way in ways]
+        clearance = Clearance(paths, nearest_m)
+        ends_m = [path.line.length_m for path in paths]
+        shorter = False
+        for index, at_m in enumerate(clearance.reached_m(ends_m, short_m)):
+            way, by_m = ways[index], ends_m[index] - at_m
+            farther_m[index] += by_m
+            too_far = farther_m[index] > _FARTHER_BACK_SHARE * spacing_m
+            if not context.begun and too_far:
+                raise TeamRefusedError(
+                    f"parameter 'route': {_turn(context, nearest(formation))}, and {way.member} "
+                    f"cannot wait until it is free: {_REMEDY}"
+                )
+            if by_m and not too_far:
+                way.shorten(by_m)
+                shorter = True
+        if not shorter:
+            break
+    if not context.begun and (barred := clearance.in_the_way()) is not None:
+        member, other = (ways[index].member for index in barred)
+        raise TeamRefusedError(
+            f"parameter 'route': {other} would come within {nearest_m:.1f} m of {member} before "
+            "that can set off: let it begin elsewhere, or draw the route elsewhere"
+        )
+
+
+def _turn(context: PlanningContext, near: Nearest) -> str:
+    """Say where a formation brings two members nearest to each other."""
+    latitude_deg, longitude_deg, _ = context.coordinate(near.place, None)
+    first, second = (context.members[each] for each in near.members)
+    return (
+        f"at [{latitude_deg:.6f}, {longitude_deg:.6f}] it turns by {near.turn_deg:.0f} degrees, "
+        f"where {first} and {second} would come within {near.distance_m:.1f} m of each other"
+    )
 
 
 def _apart(context: PlanningContext, route: Route) -> list[tuple[float, float, float | None]]:

@@ -1,7 +1,8 @@
 """Keeps the members of a march in their places by limiting their speeds.
 
 A member that is ahead of its place waits. All members wait when one falls back too far. No member
-comes too near to the member ahead in its lane, even if that one stops at once.
+comes too near to the member ahead in its lane, even if that one stops at once; and none to any other
+in the plane, if that one brakes as vehicles do: one after the other passes a sharp turn.
 Pure: the caller passes the poses; the controller uses no clock.
 """
 
@@ -11,14 +12,24 @@ from dataclasses import dataclass
 
 from m2pem.api.telemetry import TeamMemberState
 from m2pem.mission.catalogue import ResourceId
+from m2pem.teams.clearance import NEAREST_SHARE, Clearance, Way
 from m2pem.teams.columns import GAP_SHARE, lane_mates
-from m2pem.teams.plan import March, Marcher, MemberPose
+from m2pem.teams.plan import (
+    REACTION_S,
+    REACTION_SHARE,
+    START_SHARE,
+    March,
+    Marcher,
+    MemberPose,
+)
 
 _SLACK_S = 1.5
+_HARD_BRAKING = 2.0
+"""Vehicles brake at most so many times as hard as they do at least."""
+
 _LOOK_AHEAD_M = 50.0
 _CRAWL_SHARE = 0.1
-_START_SHARE = 0.2
-"""Shares of the march's speed: a member stops below the first, and starts again at the second."""
+"""Share of the march's speed: a member stops below it, and starts again at `START_SHARE`."""
 
 _RESTART_SHARE = 0.1
 """Share of the spacing: a member without variable speed restarts when its gap is that much wider
@@ -27,10 +38,16 @@ than needed."""
 
 @dataclass(slots=True, eq=False)
 class _Track:
-    """A member's progress in metres: `along_m` on its own path, `mark_m` on the team's route."""
+    """A member's progress in metres: `along_m` on its own path, `mark_m` on the team's route.
+
+    `stops_m`: the least distance along its path at which it may come to a stop; `room_m`: how far
+    it may go on without coming too near to another one, as far as all is well.
+    """
 
     marcher: Marcher
     back_m: float
+    stops_m: float = 0.0
+    room_m: float = math.inf
     along_m: float | None = None
     mark_m: float = -math.inf
     off_m: float | None = None
@@ -50,6 +67,9 @@ class FormationController:
         self._tracks = {
             marcher.member: _Track(marcher, marcher.back_m) for marcher in march.marchers
         }
+        ways = [Way(each.path, each.back_m) for each in march.marchers]
+        self._clearance = Clearance(ways, NEAREST_SHARE * march.spacing_m)
+        self._numbers = [marcher.member for marcher in march.marchers]
         self._slack_m = max(march.spacing_m / 2, _SLACK_S * march.speed_m_s)
 
     @property
@@ -87,11 +107,13 @@ class FormationController:
         known = [track for track in self._tracks.values() if track.mark_m > -math.inf]
         if not known:
             return {}
+        for track in known:
+            self._measure_room(track)
         wanted: dict[ResourceId, float] = {}
         for index, track in enumerate(known):
             if not track.arrived:
                 others = [each for each in known if each is not track and not each.arrived]
-                waits_m = max((_lag_m(other, track) for other in others), default=0.0)
+                waits_m = max((self._delay_m(other, track) for other in others), default=0.0)
                 speed = self._speed(track, known[:index], waits_m)
                 track.stands = speed == 0.0
                 wanted[track.marcher.member] = speed
@@ -121,21 +143,44 @@ class FormationController:
         path = track.marcher.path
         if arrived:
             track.arrived, track.mark_m = True, path.end_mark_m
+            track.along_m = track.stops_m = path.line.length_m
         elif stand is not None:
             found_m = path.find(stand.place, track.along_m, _LOOK_AHEAD_M, stand.yaw_rad)
             track.along_m, track.mark_m = found_m, path.mark_m(found_m)
             track.off_m = path.off_m(stand.place, found_m)
+            braking_m_s2 = _HARD_BRAKING * track.marcher.motion.braking_m_s2
+            track.stops_m = found_m + stand.speed_m_s**2 / (2 * braking_m_s2)
+
+    def _measure_room(self, track: _Track) -> None:
+        def stops_m(number: int) -> float | None:
+            other = self._tracks.get(self._numbers[number])
+            return None if other is None else other.stops_m
+
+        number = self._numbers.index(track.marcher.member)
+        limit_m = self._clearance.limit_m(number, stops_m)
+        ends = limit_m >= track.marcher.path.line.length_m
+        track.room_m = math.inf if ends else limit_m - (track.along_m or 0.0)
+
+    def _delay_m(self, track: _Track, other: _Track) -> float:
+        """How far a member that can go on has fallen behind another one."""
+        blocked = track.room_m <= track.marcher.motion.short_m(self._march.speed_m_s)
+        return min(_lag_m(track, other), 0.0 if blocked else math.inf)
 
     def _speed(self, track: _Track, before: list[_Track], waits_m: float) -> float:
         """`waits_m`: how far the slowest other member has fallen back behind this one."""
         march_m_s, slack = self._march.speed_m_s, self._slack_m
         lag_m = _lag_m(track, before[0]) if before else 0.0
+        if lag_m < 0:  # it does not wait for one that cannot go on
+            lag_m = -self._delay_m(before[0], track)
         free_m = self._free_m(track, before)
         motion = track.marcher.motion
         if track.marcher.member not in self._steady:
             speed = min(march_m_s * (1 + lag_m / slack), march_m_s * (2 - waits_m / slack))
-            return self._graded(track, min(speed, motion.safe_m_s(free_m)))
+            room_m_s = motion.safe_m_s(track.room_m, REACTION_S * REACTION_SHARE)
+            return self._graded(track, min(speed, motion.safe_m_s(free_m), room_m_s))
         needed_m = motion.stopping_m(march_m_s)
+        all_well_m = motion.stopping_m(march_m_s, REACTION_S * REACTION_SHARE) / _HARD_BRAKING
+        free_m = min(free_m, track.room_m - all_well_m + needed_m)
         if track.stands:
             wide = free_m >= needed_m + _RESTART_SHARE * self._march.spacing_m
             goes = wide and lag_m >= -slack / 2 and waits_m <= slack
@@ -153,7 +198,7 @@ class FormationController:
         return min(gaps, default=math.inf) - self.floor_m
 
     def _graded(self, track: _Track, speed_m_s: float) -> float:
-        share = _START_SHARE if track.stands else _CRAWL_SHARE
+        share = START_SHARE if track.stands else _CRAWL_SHARE
         speed = min(speed_m_s, self._march.speed_m_s)
         return 0.0 if speed < share * self._march.speed_m_s else speed
 
@@ -165,3 +210,4 @@ def _lag_m(track: _Track, other: _Track) -> float:
     """
     place_m = other.mark_m + other.back_m - track.back_m
     return min(place_m, track.marcher.path.end_mark_m) - track.mark_m
+

@@ -1,6 +1,7 @@
 """The places of members in a formation, and each member's path along the team's route."""
 
 import math
+from bisect import bisect_left
 from collections.abc import Sequence
 
 from m2pem.geo.local_frame import EastNorth
@@ -48,20 +49,21 @@ _WRONG_WAY_M = 10.0
 
 
 class MemberPath:
-    """A member's places in a row. `marks`: how far each is along the team's route, in metres.
+    """A member's places in a row. `marks_m`: how far each is along the team's route.
+    `line`: the places, without their heights.
 
     On a bend the outer of two paths is longer, but both have the same marks at its ends: members
     that are abreast have the same mark.
     """
 
     def __init__(self, places: Sequence[EastNorthUp], marks: Sequence[float]) -> None:
-        self._line = Polyline((east, north) for east, north, _ in places)
-        self._marks = tuple(marks)
+        self.line = Polyline((east, north) for east, north, _ in places)
+        self.marks_m = tuple(marks)
 
     @property
     def end_mark_m(self) -> float:
         """The mark of its end."""
-        return self._marks[-1]
+        return self.marks_m[-1]
 
     def find(
         self,
@@ -77,27 +79,35 @@ class MemberPath:
         east, counter-clockwise) then distinguishes the way there from the way back.
         """
         if near_m is not None:
-            feet = self._line.feet(place, near_m - _BEHIND_M, near_m + ahead_m)
+            feet = self.line.feet(place, near_m - _BEHIND_M, near_m + ahead_m)
             off_m, found_m = min(
                 ((off_m, along_m) for along_m, off_m, _ in feet), default=(math.inf, 0.0)
             )
             if off_m <= _STRAY_M:
                 return found_m
-        feet = self._line.feet(place)
+        feet = self.line.feet(place)
         seems = ((off_m + _wrong_way_m(leg, yaw_rad), along_m) for along_m, off_m, leg in feet)
         return min(seems, default=(0.0, 0.0))[1]
 
     def mark_m(self, along_m: float) -> float:
         """How far along the team's route that is."""
-        index = self._line.segment_at(along_m)
-        begin_m, length_m = self._line.marks_m[index], self._line.segments[index].length_m
+        index = self.line.segment_at(along_m)
+        begin_m, length_m = self.line.marks_m[index], self.line.segments[index].length_m
         part = (along_m - begin_m) / length_m if length_m else 1.0
-        a, b = self._marks[index], self._marks[index + 1]
+        a, b = self.marks_m[index], self.marks_m[index + 1]
         return a + (b - a) * min(1.0, max(0.0, part))
+
+    def along_m(self, mark_m: float) -> float:
+        """How far along this path the place with that mark is."""
+        index = bisect_left(self.marks_m, mark_m, 1, len(self.marks_m) - 1)
+        a, b = self.marks_m[index - 1 : index + 1]
+        part = (mark_m - a) / (b - a) if b > a else 1.0
+        begin_m, end_m = self.line.marks_m[index - 1 : index + 1]
+        return begin_m + (end_m - begin_m) * min(1.0, max(0.0, part))
 
     def off_m(self, place: EastNorth, along_m: float) -> float:
         """How far a place is from that one of the path."""
-        return math.dist(place, self._line.at(along_m))
+        return math.dist(place, self.line.at(along_m))
 
 
 def _wrong_way_m(leg: Segment, yaw_rad: float | None) -> float:

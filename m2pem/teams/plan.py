@@ -17,6 +17,13 @@ REACTION_S = 1.0
 """Time from a change of telemetry until the vehicle brakes: telemetry, control, command."""
 
 
+REACTION_SHARE = 0.5
+"""Share of `REACTION_S` within which a vehicle brakes that nothing disturbs."""
+
+START_SHARE = 0.2
+"""Share of the march's speed: slower than that no member starts."""
+
+
 @dataclass(frozen=True, slots=True)
 class Motion:
     """`nominal_m_s`: the default speed of a march. `braking_m_s2`: the minimum deceleration of a
@@ -25,15 +32,19 @@ class Motion:
     nominal_m_s: float
     braking_m_s2: float
 
-    def stopping_m(self, speed_m_s: float) -> float:
+    def stopping_m(self, speed_m_s: float, reaction_s: float = REACTION_S) -> float:
         """Return the distance that the vehicle needs to stop from that speed."""
-        return speed_m_s * REACTION_S + speed_m_s**2 / (2 * self.braking_m_s2)
+        return speed_m_s * reaction_s + speed_m_s**2 / (2 * self.braking_m_s2)
 
-    def safe_m_s(self, distance_m: float) -> float:
+    def short_m(self, march_m_s: float) -> float:
+        """Return how far before the place where it must stop the vehicle may come to a stop."""
+        return self.stopping_m(START_SHARE * march_m_s, REACTION_S * REACTION_SHARE)
+
+    def safe_m_s(self, distance_m: float, reaction_s: float = REACTION_S) -> float:
         """Return the maximum speed from which it stops within the distance; 0 if that is <= 0."""
         if distance_m <= 0:
             return 0.0
-        lag = self.braking_m_s2 * REACTION_S
+        lag = self.braking_m_s2 * reaction_s
         return math.sqrt(lag**2 + 2 * self.braking_m_s2 * distance_m) - lag
 
 
@@ -113,10 +124,11 @@ class Plan:
 @dataclass(frozen=True, slots=True)
 class MemberPose:
     """A vehicle's pose: `place` is east and north in metres in the team's local frame; `yaw_rad`
-    from east, counter-clockwise; None: not known."""
+    from east, counter-clockwise; None: not known. `speed_m_s`: 0 if it is not known."""
 
     place: tuple[float, float]
     yaw_rad: float | None = None
+    speed_m_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,6 +183,10 @@ class PlanningContext:
     def coordinate(self, place: EastNorthUp | EastNorth, up_m: float | None) -> Coordinate:
         """Return a place of the local frame as a coordinate with that altitude."""
         return (*self.frame.to_latlon(place[:2]), up_m)
+
+    def begin(self, member: ResourceId) -> EastNorth | None:
+        """Return where a member comes from; None: it is on the route."""
+        return None if self.begun else self.poses[member].place
 
     def motion(self, member: ResourceId) -> Motion:
         """Return the speed and the braking of a member."""

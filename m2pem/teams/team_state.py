@@ -1,5 +1,6 @@
 """The members' poses and capabilities, and the plan of a team behavior from them."""
 
+import math
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -151,4 +152,4 @@ def pose_of(frame: LocalFrame, state: VehicleState) -> MemberPose:
     if state.position is None:
         raise ValueError(f"the position of {state.resource} is not known")
     place = frame.to_local(state.position.latlon)
-    return MemberPose(place, state.yaw_rad)
+    return MemberPose(place, state.yaw_rad, math.hypot(*(state.velocity_enu_m_s or ())[:2]))
