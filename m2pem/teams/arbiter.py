@@ -284,7 +284,7 @@ class Teams:
             members,
             scheme.frame,
             self._context.clock,
-            lambda member: self._situation.look(member, scheme.frame),
+            lambda member: self._situation.present(member, scheme.frame),
             report_state,
             lambda reference: self._ledger.refer(request.id, reference.text()),
             show,

@@ -10,15 +10,12 @@ from m2pem.api.clock import Clock
 from m2pem.api.telemetry import TeamMemberState
 from m2pem.geo.local_frame import EastNorth, LocalFrame
 from m2pem.mission.catalogue import BehaviorState, ResourceId
-from m2pem.teams.formation_controller import FormationController
+from m2pem.teams.formation_controller import PERIOD_S, FormationController
 from m2pem.teams.member import Member
 from m2pem.teams.partition import Partition
 from m2pem.teams.plan import MemberPose, Plan
 from m2pem.teams.restart import Reference
 from m2pem.units import US_PER_S
-
-PERIOD_S = 0.25
-"""Period of the formation controller."""
 
 IDLE_PERIOD_S = 1.0
 STIRS_WITHIN_S = 120.0
@@ -79,6 +76,7 @@ class TeamBehavior:
         self._ended_meanwhile: list[BehaviorReport] = []
         self._ending: tuple[BehaviorState, str, str] | None = None
         self._ending_due_us = 0
+        self._led_around: dict[ResourceId, str] = {}
         self._stayed_s = 0.0
         self._stirred_us = clock.now_us()
         self._over = False
@@ -231,6 +229,8 @@ class TeamBehavior:
             return
         if self._ending is not None or member.lost:
             return
+        if not self._shares.carries(member.part.removeprefix(f"{self.id}.")):
+            return  # it begins anew
         code = report.code or ("LINK_LOST" if report.state is BehaviorState.LOST else "FAILED")
         reason = report.reason or f"its part ended {report.state.value}"
         if report.state is BehaviorState.REJECTED or code == "TAKEN_OVER":
@@ -255,7 +255,15 @@ class TeamBehavior:
 
     def _drop(self, member: Member) -> None:
         if self._controller is not None:
-            self._controller.drop(member.id)
+            for name in self._controller.drop(member.id):
+                _log.warning("%s: %s goes around %s", self.id, name, member.id)
+                self._led_around[name] = member.id
+                self._shares.withdraw(name)
+                self.members[name].cancel(self.epoch)
+        elif self._on_the_way(member):
+            code, _, reason = member.lost.partition(": ")
+            reason = f"{member.id}: {reason}; the others cannot pass it"
+            self._end_all(BehaviorState.FAILED, code, reason)
         self._shares.drop(member.id, self.members, self._place)
 
     def _place(self, member: ResourceId) -> EastNorth | None:
@@ -285,7 +293,32 @@ class TeamBehavior:
         if not active and not self._plan.stays and self._shares.all_over:
             self._end_well()
 
+    def _on_the_way(self, member: Member) -> bool:
+        """Whether a member is on a way that others take after it."""
+        follow = any(leg.after for leg in self._plan.legs)
+        return follow and bool(member.part) and member.id not in self._shares.arrived
+
+    def _lead_around(self, controller: FormationController) -> None:
+        """Give new ways to members that have stopped, around those that were lost."""
+        for name in list(self._led_around):
+            member, pose = self.members[name], self._look(name)
+            if member.active and not member.lost:
+                continue
+            lost = self._led_around.pop(name)
+            if member.lost:
+                continue
+            if pose is not None:
+                self._shares.renew(name, controller.lead_around(name, pose.place))
+            stuck = name if pose is None else controller.stuck()
+            if stuck is not None and not self._led_around:
+                reason = f"{stuck} cannot go around {lost}, which is lost"
+                self._end_all(BehaviorState.FAILED, "FAILED", reason)
+
     def _send_off(self) -> None:
+        if self._controller is not None:
+            self._lead_around(self._controller)
+            if self._ending is not None:
+                return
         for assignment in self._shares.assignments(self.members, self.epoch):
             part = f"{self.id}.{assignment.part}"
             preempts = self._request.preempts if assignment.own else ()

@@ -104,15 +104,10 @@ class Clearance:
             if behind:
                 self._yields[first].append((second, _Yield(a.line, b.line, behind)))
 
-    def limit_m(self, member: int, place_m: Callable[[int], float | None]) -> float:
-        """How far along its path a member may go. `place_m`: where another is on its own path;
-        None: that does not matter any more."""
-        limit_m = math.inf
-        for other, rule in self._yields[member]:
-            other_m = place_m(other)
-            if other_m is not None:
-                limit_m = min(limit_m, rule.limit_m(other_m))
-        return limit_m
+    def limit_m(self, member: int, place_m: Callable[[int], float]) -> float:
+        """How far along its path a member may go. `place_m`: where another is on its own path."""
+        rules = self._yields[member]
+        return min((rule.limit_m(place_m(other)) for other, rule in rules), default=math.inf)
 
     def in_the_way(self) -> tuple[int, int] | None:
         """Return a member that another one comes by before it may set off, and the other one."""
@@ -126,12 +121,13 @@ class Clearance:
                     return member, other
         return None
 
-    def reached_m(self, ends_m: Sequence[float], short_m: float) -> list[float]:
-        """How far along their paths the members get at most, each from the beginning of its own.
+    def reached_m(
+        self, at_m: Sequence[float], ends_m: Sequence[float], short_m: float
+    ) -> Sequence[float]:
+        """How far along their paths the members get at most, from where they are.
 
         `short_m`: how far before the place where it must stop a member may come to a stop.
         """
-        at_m = [0.0] * len(ends_m)
         while True:
             limits_m = [self.limit_m(index, at_m.__getitem__) for index in range(len(at_m))]
             then_m = [

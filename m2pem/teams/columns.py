@@ -194,7 +194,7 @@ def _keep_ends_apart(context: PlanningContext, ways: Sequence[_Way], spacing_m: 
         clearance = Clearance(paths, nearest_m)
         ends_m = [path.line.length_m for path in paths]
         shorter = False
-        for index, at_m in enumerate(clearance.reached_m(ends_m, short_m)):
+        for index, at_m in enumerate(clearance.reached_m([0.0] * len(ways), ends_m, short_m)):
             way, by_m = ways[index], ends_m[index] - at_m
             farther_m[index] += by_m
             too_far = farther_m[index] > _FARTHER_BACK_SHARE * spacing_m

@@ -7,13 +7,16 @@ Pure: the caller passes the poses; the controller uses no clock.
 """
 
 import math
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 from m2pem.api.telemetry import TeamMemberState
+from m2pem.geo.local_frame import EastNorth
+from m2pem.geo.polyline import EastNorthUp
 from m2pem.mission.catalogue import ResourceId
 from m2pem.teams.clearance import NEAREST_SHARE, Clearance, Way
 from m2pem.teams.columns import GAP_SHARE, lane_mates
+from m2pem.teams.detours import around, comes_near
 from m2pem.teams.plan import (
     REACTION_S,
     REACTION_SHARE,
@@ -23,7 +26,13 @@ from m2pem.teams.plan import (
     MemberPose,
 )
 
+PERIOD_S = 0.25
+"""Period of the formation controller."""
+
 _SLACK_S = 1.5
+_SILENT_S = 1.0
+"""A member of which nothing new is received for so long is not waited for: it may go on."""
+
 _HARD_BRAKING = 2.0
 """Vehicles brake at most so many times as hard as they do at least."""
 
@@ -48,11 +57,18 @@ class _Track:
     back_m: float
     stops_m: float = 0.0
     room_m: float = math.inf
+    pose: MemberPose | None = None
+    unseen_s: float = 0.0
     along_m: float | None = None
     mark_m: float = -math.inf
     off_m: float | None = None
     stands: bool = False
     arrived: bool = False
+
+    def rest(self) -> list[EastNorthUp]:
+        """The places ahead of it."""
+        path, along_m = self.marcher.path, self.along_m or 0.0
+        return path.rest(path.line.at(along_m), along_m)
 
 
 class FormationController:
@@ -67,9 +83,9 @@ class FormationController:
         self._tracks = {
             marcher.member: _Track(marcher, marcher.back_m) for marcher in march.marchers
         }
-        ways = [Way(each.path, each.back_m) for each in march.marchers]
-        self._clearance = Clearance(ways, NEAREST_SHARE * march.spacing_m)
-        self._numbers = [marcher.member for marcher in march.marchers]
+        self._nearest_m = NEAREST_SHARE * march.spacing_m
+        self._lost: list[list[EastNorth]] = []
+        self._clearance = self._clear()
         self._slack_m = max(march.spacing_m / 2, _SLACK_S * march.speed_m_s)
 
     @property
@@ -87,12 +103,46 @@ class FormationController:
         """The last known progress of each member along the team's route."""
         return tuple(track.mark_m for track in self._tracks.values())
 
-    def drop(self, member: ResourceId) -> None:
-        """Go on without a member; in a column, the members behind it move up."""
-        self._tracks.pop(member, None)
+    def drop(self, member: ResourceId) -> list[ResourceId]:
+        """Go on without a member; in a column, the members behind it move up.
+
+        Return the members whose ways lead too near to where the lost one may be: it went on until
+        its loss was noticed, and needs its way to stop.
+        """
+        lost = self._tracks.pop(member, None)
+        self._clearance = self._clear()
+        if lost is not None and lost.along_m is not None:
+            line, from_m = lost.marcher.path.line, lost.along_m
+            speed_m_s = lost.pose.speed_m_s if lost.pose is not None else 0.0
+            goes_m = speed_m_s * lost.unseen_s + lost.marcher.motion.stopping_m(speed_m_s)
+            corners = [
+                point
+                for point, mark_m in zip(line.points, line.marks_m, strict=True)
+                if from_m < mark_m < from_m + goes_m
+            ]
+            self._lost.append([line.at(from_m), *corners, line.at(from_m + goes_m)])
         if self._march.closes:
             for rank, track in enumerate(self._tracks.values()):
                 track.back_m = rank * self._march.spacing_m
+        if lost is None or lost.along_m is None:
+            return []
+        return [
+            name
+            for name, track in self._tracks.items()
+            if not track.arrived and comes_near(track.rest(), self._lost[-1], self._nearest_m)
+        ]
+
+    def lead_around(self, member: ResourceId, place: EastNorth) -> Sequence[EastNorthUp]:
+        """Return the places to which a member goes that is at `place`, around all lost ones."""
+        track = self._tracks[member]
+        path = track.marcher.path
+        places = path.rest(place, path.find(place, track.along_m, _LOOK_AHEAD_M))
+        for lost in self._lost:
+            places = around(places, lost, self._march.spacing_m)
+        path = path.onward(places)
+        track.marcher, track.along_m, track.stops_m = replace(track.marcher, path=path), 0.0, 0.0
+        self._clearance = self._clear()
+        return places[1:]
 
     def step(
         self, seen: Mapping[ResourceId, MemberPose], arrived: Collection[ResourceId] = ()
@@ -112,7 +162,11 @@ class FormationController:
         wanted: dict[ResourceId, float] = {}
         for index, track in enumerate(known):
             if not track.arrived:
-                others = [each for each in known if each is not track and not each.arrived]
+                others = [
+                    each
+                    for each in known
+                    if each is not track and not each.arrived and each.unseen_s < _SILENT_S
+                ]
                 waits_m = max((self._delay_m(other, track) for other in others), default=0.0)
                 speed = self._speed(track, known[:index], waits_m)
                 track.stands = speed == 0.0
@@ -139,25 +193,39 @@ class FormationController:
             )
         return tuple(states)
 
+    def stuck(self) -> ResourceId | None:
+        """Return a member that cannot get to its end any more; None: all can."""
+        tracks = list(self._tracks.values())
+        at_m = [track.along_m or 0.0 for track in tracks]
+        ends_m = [track.marcher.path.line.length_m for track in tracks]
+        short_m = max(track.marcher.motion.short_m(self._march.speed_m_s) for track in tracks)
+        reached_m = self._clearance.reached_m(at_m, ends_m, short_m)
+        stuck = (t for t, end, at in zip(tracks, ends_m, reached_m, strict=True) if at < end)
+        return next((track.marcher.member for track in stuck), None)
+
+    def _clear(self) -> Clearance:
+        marchers = [track.marcher for track in self._tracks.values()]
+        return Clearance([Way(each.path, each.back_m) for each in marchers], self._nearest_m)
+
     def _look(self, track: _Track, stand: MemberPose | None, arrived: bool) -> None:
         path = track.marcher.path
         if arrived:
             track.arrived, track.mark_m = True, path.end_mark_m
             track.along_m = track.stops_m = path.line.length_m
-        elif stand is not None:
+        elif stand is None or (stand.speed_m_s > 0 and stand == track.pose):
+            track.unseen_s += PERIOD_S
+        else:
+            track.pose, track.unseen_s = stand, 0.0
             found_m = path.find(stand.place, track.along_m, _LOOK_AHEAD_M, stand.yaw_rad)
             track.along_m, track.mark_m = found_m, path.mark_m(found_m)
             track.off_m = path.off_m(stand.place, found_m)
             braking_m_s2 = _HARD_BRAKING * track.marcher.motion.braking_m_s2
             track.stops_m = found_m + stand.speed_m_s**2 / (2 * braking_m_s2)
 
-    def _measure_room(self, track: _Track) -> None:
-        def stops_m(number: int) -> float | None:
-            other = self._tracks.get(self._numbers[number])
-            return None if other is None else other.stops_m
 
-        number = self._numbers.index(track.marcher.member)
-        limit_m = self._clearance.limit_m(number, stops_m)
+    def _measure_room(self, track: _Track) -> None:
+        others = list(self._tracks.values())
+        limit_m = self._clearance.limit_m(others.index(track), lambda index: others[index].stops_m)
         ends = limit_m >= track.marcher.path.line.length_m
         track.room_m = math.inf if ends else limit_m - (track.along_m or 0.0)
 

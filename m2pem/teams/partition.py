@@ -5,7 +5,9 @@ from dataclasses import dataclass, replace
 
 from m2pem.api.remaining import RemainingWork, raw_parameters
 from m2pem.geo.local_frame import EastNorth, LocalFrame
+from m2pem.geo.polyline import EastNorthUp
 from m2pem.mission.catalogue import ResourceId
+from m2pem.mission.geometry import Route
 from m2pem.mission.values import Value
 from m2pem.teams.division import Taker, divide, from_nearer_end, read_parameters, work_of
 from m2pem.teams.member import Member
@@ -20,7 +22,8 @@ _OF = "~"
 class Share:
     """A planned part of one member, or a piece of a lost member's. `by`: the member that carries
     it out; None: it has not begun. `part`: the id of the part. `left`: the parameters of what is
-    left of it, as last reported. `given_up`: no member does it, or others do it in pieces."""
+    left of it, as last reported. `given_up`: no member does it, or others do it in pieces.
+    `begins`: how many times it has begun anew."""
 
     leg: Leg
     by: ResourceId | None = None
@@ -28,6 +31,7 @@ class Share:
     done: bool = False
     given_up: bool = False
     left: Mapping[str, Value] | None = None
+    begins: int = 0
 
     @property
     def over(self) -> bool:
@@ -106,6 +110,29 @@ class Partition:
         for share in self._shares.values():
             if share.part == part:
                 share.done = True
+
+    def withdraw(self, member: ResourceId) -> None:
+        """Let the share that a member carries out begin anew, when what it does has ended."""
+        for share in self._shares.values():
+            if share.by == member and not share.over:
+                share.by, share.part, share.begins = None, "", share.begins + 1
+
+    def renew(self, member: ResourceId, places: Sequence[EastNorthUp]) -> None:
+        """Let a member's own share be a route through other places."""
+        share = self._shares[str(member)]
+        given = {k: v for k, v in share.leg.parameters.items() if k not in ("target", "heading")}
+        route = given.get("route")
+        high = isinstance(route, Route) and all(each[2] is not None for each in route.waypoints)
+        waypoints = tuple(
+            (*self._frame.to_latlon(place[:2]), place[2] if high else None) for place in places
+        )
+        frame = route.altitude_frame if isinstance(route, Route) else None
+        given["route"] = Route(waypoints, frame) if frame else Route(waypoints)
+        share.leg = Leg(member, "single_vehicle_routing", given)
+
+    def carries(self, part: str) -> bool:
+        """Whether a part is that of a share, and not of one that begins anew."""
+        return any(share.part == part for share in self._shares.values())
 
     def place(self, part: str, *, done: bool) -> ResourceId:
         """Assign a part that an arbiter knows after a restart; return its member."""
@@ -225,9 +252,10 @@ class Partition:
             own = _own(key)
             if (before is not None and not before.over) or not (own or self._has_done(doer.id)):
                 continue
-            part = f"{doer.id}/{key}/{epoch}" if self.again else f"{doer.id}/{key}"
-            share.by, share.part = doer.id, doer.id if own and not self.again else part
-            yield Assignment(doer, share.leg, share.part, own)
+            anew = [str(each) for each in (epoch if self.again else 0, share.begins) if each]
+            part = doer.id if own and not anew else "/".join((doer.id, key, *anew))
+            share.by, share.part = doer.id, part
+            yield Assignment(doer, share.leg, share.part, own and not share.begins)
 
     def _has_done(self, member: ResourceId) -> bool:
         own = self._shares.get(str(member))

@@ -50,13 +50,14 @@ _WRONG_WAY_M = 10.0
 
 class MemberPath:
     """A member's places in a row. `marks_m`: how far each is along the team's route.
-    `line`: the places, without their heights.
+    `line`: the `places`, without their heights.
 
     On a bend the outer of two paths is longer, but both have the same marks at its ends: members
     that are abreast have the same mark.
     """
 
     def __init__(self, places: Sequence[EastNorthUp], marks: Sequence[float]) -> None:
+        self.places = tuple(places)
         self.line = Polyline((east, north) for east, north, _ in places)
         self.marks_m = tuple(marks)
 
@@ -64,6 +65,17 @@ class MemberPath:
     def end_mark_m(self) -> float:
         """The mark of its end."""
         return self.marks_m[-1]
+
+    def rest(self, place: EastNorth, along_m: float) -> list[EastNorthUp]:
+        """Return the places ahead of a member that is at `place`, which is the first."""
+        index = self.line.segment_at(along_m)
+        return [(*place, self.places[index][2]), *self.places[index + 1 :]]
+
+    def onward(self, places: Sequence[EastNorthUp]) -> "MemberPath":
+        """Return another path to the end of this one, or to a place before it."""
+        line = Polyline((east, north) for east, north, _ in places)
+        end_m = self.mark_m(min(self.find(line.points[-1], None, 0.0), self.line.length_m))
+        return MemberPath(places, [end_m - line.length_m + mark_m for mark_m in line.marks_m])
 
     def find(
         self,

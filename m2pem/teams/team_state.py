@@ -132,6 +132,12 @@ class TeamSituation:
         state = self._state(vehicle)
         return None if state is None else pose_of(frame, state)
 
+    def present(self, member: ResourceId, frame: LocalFrame) -> MemberPose | None:
+        """Return the present pose of a member; None: nothing is received of it."""
+        sighted = self._sighted.get(member)
+        state = sighted.sight(member) if sighted is not None else self._state(member)
+        return pose_of(frame, state) if state is not None and state.position is not None else None
+
     def _state(self, vehicle: ResourceId) -> VehicleState | None:
         sighted = self._sighted.get(vehicle)
         state = sighted.sight(vehicle) if sighted is not None else None
