@@ -16,15 +16,8 @@ from m2pem.deconfliction.participant import FlightParameters, Participant
 from m2pem.fleet.parameters import read_offsets
 from m2pem.geo.local_frame import EastNorth
 from m2pem.geo.polygon import buffered_hull, convex_hull
-from m2pem.geo.polyline import EastNorthUp, Polyline, shifted, trimmed
-from m2pem.teams.paths import SPACING_M, slot
-
-_SHAPES = {
-    "formation": "wedge",
-    "road_following_formation": "column",
-    "road_sweep": "line",
-    "bridge_crossing": "column",
-}
+from m2pem.geo.polyline import EastNorthUp, Polyline, shifted
+from m2pem.teams.paths import SHAPES, SPACING_M, lane, slot
 
 
 def member_volume(
@@ -35,7 +28,7 @@ def member_volume(
     start_s: float,
 ) -> Volume:
     """Return the volume of member `index` of a team (0 leads); the lead need not be an aircraft."""
-    if behavior in _SHAPES:
+    if behavior in SHAPES:
         return _march(behavior, parameters, lead, index)
     plan = _PLANS.get(behavior)
     return volume_of(behavior, parameters, start_s) if plan is None else plan(parameters)
@@ -63,7 +56,7 @@ def _march(
     if back_m <= Polyline(place[:2] for place in places).length_m:
         return volume
     # Its place is before the route's beginning: it goes there at once, or by way of the route.
-    end = trimmed([(*place, 0.0) for place in moved], back_m)[-1][:2]
+    end = lane(places, back_m, left_m)[-1][:2]
     over = spans[0]
     for span in (*spans, parameters.vehicle.span):
         over = over.to(span)
@@ -76,7 +69,7 @@ def _march(
 def _offset(behavior: str, parameters: FlightParameters, index: int) -> tuple[float, float]:
     """How far behind the lead and left of it a member goes, in metres."""
     spacing_m = parameters.spacing_m or SPACING_M
-    back, left = slot(parameters.text("shape") or _SHAPES[behavior], index)
+    back, left = slot(parameters.text("shape") or SHAPES[behavior], index)
     offsets = parameters.text("offsets")
     if index and offsets and len(given := read_offsets(offsets)) >= index:
         return given[index - 1]
@@ -86,13 +79,13 @@ def _offset(behavior: str, parameters: FlightParameters, index: int) -> tuple[fl
 def end_of_member(behavior: str, parameters: FlightParameters, index: int) -> EastNorth | None:
     """Return where member `index` of a team stands at the end of a route; None: not known."""
     route = parameters.route
-    if behavior not in _SHAPES or route is None or not route.waypoints:
+    if behavior not in SHAPES or route is None or not route.waypoints:
         return None
     places: list[EastNorthUp] = [(*parameters.to_local(each), 0.0) for each in route.waypoints]
     if len({place[:2] for place in places}) == 1:
         return None if index else places[0][:2]
     back_m, left_m = _offset(behavior, parameters, index)
-    return trimmed(shifted(places, left_m), back_m)[-1][:2]
+    return lane(places, back_m, left_m)[-1][:2]
 
 
 def _stop(lead: Participant | None) -> Sequence[EastNorth]:
@@ -124,5 +117,5 @@ _PLANS: Mapping[str, Callable[[FlightParameters], Volume]] = {
     "escort": _escort,
 }
 
-TEAM_BEHAVIORS = frozenset({*_SHAPES, *_PLANS})
+TEAM_BEHAVIORS = frozenset({*SHAPES, *_PLANS})
 """Those whose members' volumes are known; of others, each member does that of one vehicle."""

@@ -26,6 +26,7 @@ from m2pem.mission.elements import ServiceTask
 from m2pem.mission.library import KeptLibrary
 from m2pem.mission.mission import Mission
 from m2pem.suggestions import suggest_or
+from m2pem.teams.turn_check import check_turns
 
 if TYPE_CHECKING:
     from m2pem.plugins import Plugins
@@ -130,6 +131,7 @@ def findings_for(
     if arbiters is not None:
         offered = arbiters.offered
         findings += check_mission(mission, arbiters.fleet, offered, handed_over)
+        findings += check_turns(mission, arbiters.fleet)
     else:
         findings += check_named(mission)
     findings += _unprovided(mission, writes)

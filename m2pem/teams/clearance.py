@@ -1,8 +1,8 @@
 """Which member of a march waits for which, so that none comes too near to another in the plane.
 
 Of two members, the one ahead in the formation passes each narrow place first: a place where the
-formation would bring the two too near, as at a sharp turn. A place that the formation passes safely,
-as where a route crosses itself, is first passed by the member that is there first.
+formation would bring the two too near, as at a sharp turn. A place that the formation passes
+safely, as where a route crosses itself, is first passed by the member that is there first.
 """
 
 import math
@@ -14,12 +14,13 @@ from m2pem.geo.local_frame import EastNorth
 from m2pem.geo.polyline import Polyline, Segment
 from m2pem.teams.paths import MemberPath
 
-NEAREST_SHARE = 0.8
-"""Share of the spacing: the minimum distance of two members in the plane."""
+NEAREST_SHARE = 0.82
+"""Share of the spacing that is aimed at, to keep a minimum distance of 0.8 in the plane."""
 
 _BEND_RADIUS_M, _FARTHEST_MISS_M = 10.0, 3.5
 """Vehicles round corners: so far from the corner do they pass at most."""
 
+_FAR_SHARE = 0.08
 _SAMPLES = 8
 _STEPS = 20
 _NOTHING_M = 1e-6
@@ -249,7 +250,7 @@ def _nears(a: Polyline, b: Polyline, apart_m: float) -> Iterator[_Near]:
         for second, box in enumerate(boxes):
             if box[0] < east and box[2] > west and box[1] < north and box[3] > south:
                 between = sorted((first, second))
-                least_m = apart_m + max(_missed_m(a, *between), _missed_m(b, *between))
+                least_m = apart_m + max(_missed_m(line, *between, apart_m) for line in (a, b))
                 if first_within_m(own, b.segments[second], least_m) < math.inf:
                     yield _Near(first, second, least_m)
 
@@ -259,10 +260,10 @@ def _box(segment: Segment, wide_m: float) -> tuple[float, float, float, float]:
     return min(ae, be) - wide_m, min(an, bn) - wide_m, max(ae, be) + wide_m, max(an, bn) + wide_m
 
 
-def _missed_m(line: Polyline, first: int, second: int) -> float:
-    """How far off a vehicle passes the corners between two segments that are close in the path."""
+def _missed_m(line: Polyline, first: int, second: int, apart_m: float) -> float:
+    """How far off a vehicle passes the corners between two segments; less if many are between."""
     if second - first > 2:
-        return 0.0
+        return _FAR_SHARE * apart_m
     turns = (
         turn_rad(line, corner, corner + 1)
         for corner in range(first, min(second, len(line.segments) - 1))

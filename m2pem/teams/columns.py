@@ -2,15 +2,24 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import combinations
 
 from m2pem.fleet.parameters import read_offsets
-from m2pem.geo.polyline import EastNorthUp, Polyline, Segment, shifted, trimmed
+from m2pem.geo.polyline import EastNorthUp, Polyline, Segment
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.geometry import Route
 from m2pem.teams.clearance import NEAREST_SHARE, Clearance, Nearest, Way, nearest
-from m2pem.teams.paths import SPACING_M, MemberPath, beside, slot
-from m2pem.teams.plan import Leg, March, Marcher, Plan, PlanningContext, TeamRefusedError
+from m2pem.teams.paths import SHAPES, SPACING_M, MemberPath, beside, lane, slot
+from m2pem.teams.plan import (
+    Leg,
+    March,
+    Marcher,
+    MemberPose,
+    Plan,
+    PlanningContext,
+    TeamRefusedError,
+)
 
 GAP_SHARE = 0.5
 """Share of the spacing: the minimum distance of members in one lane, along the route."""
@@ -70,6 +79,35 @@ _REMEDY = (
 )
 
 
+def turns(context: PlanningContext, behavior: str) -> tuple[str, str]:
+    """Say where a route brings members too near to each other, and what would be right; "" if not.
+
+    The members come from their places behind the beginning of the route.
+    """
+    route, (shape, spacing) = context.parameters.route, _shape(context, SHAPES[behavior])
+    if route is None or len(context.members) < 2:
+        return "", ""
+    places = _places(context, shape, spacing)
+    if context.parameters.text("offsets"):
+        spacing = min(math.dist(a, b) for a, b in combinations(places, 2))
+    start, then = (context.level(each) for each in _apart(context, route)[:2])
+    yaw_rad, first_m = Segment.between(start, then).yaw_rad, min(back for back, _ in places)
+    poses = {
+        member: MemberPose(beside(start, yaw_rad, back - first_m + 1.0, left)[:2])
+        for member, (back, left) in zip(context.members, places, strict=False)
+    }
+    context = replace(context, poses=poses)
+    try:
+        _ways(context, route, places, spacing)
+    except TeamRefusedError as error:
+        return str(error), ""
+    near = nearest([Way(way.path(), way.back_m) for way in _drawn(context, route, places)])
+    if near.distance_m >= GAP_SHARE * spacing or behavior == "bridge_crossing":
+        return "", ""
+    said = f"parameter 'route': {_turn(context, near)} if they kept their spacing along it"
+    return said, f"the members pass it one after the other, or else {_REMEDY}"
+
+
 def lane_mates(a: "Marcher | _Way", b: "Marcher | _Way", spacing_m: float) -> bool:
     """Whether two members are in one lane."""
     return abs(a.left_m - b.left_m) < spacing_m / 2
@@ -88,12 +126,7 @@ class _Way:
         self._end_at(self._route_marks_m[-1] - self.back_m)
 
     def _end_at(self, mark_m: float) -> None:
-        if mark_m > 0:
-            cut = trimmed(self._route, self._route_marks_m[-1] - mark_m)
-            self.places = shifted(cut, self.left_m)
-        else:  # its place is before the route: it need not see the route's start
-            first = Segment.between(self._route[0][:2], self._route[1][:2])
-            self.places = [beside(first.start, first.yaw_rad, -mark_m, self.left_m)]
+        self.places = lane(self._route, self._route_marks_m[-1] - mark_m, self.left_m)
         self._marks = [*self._route_marks_m[: len(self.places) - 1], mark_m]
 
     def path(self, begin: tuple[float, float] | None = None) -> MemberPath:
@@ -164,19 +197,25 @@ def _ways(
     offsets: Sequence[tuple[float, float]],
     spacing_m: float,
 ) -> list[_Way]:
+    ways = _drawn(context, route, offsets)
+    _refuse_wrong_order(ways, spacing_m)
+    _keep_ends_apart(context, ways, spacing_m)
+    return ways
+
+
+def _drawn(
+    context: PlanningContext, route: Route, offsets: Sequence[tuple[float, float]]
+) -> list[_Way]:
     if route.altitude_frames and context.parameters.altitude_m is None:
         raise TeamRefusedError(
             "parameter 'route': the altitudes of its waypoints count from different heights, which "
             "a formation cannot keep: set 'altitude'"
         )
     places = [(*context.level(each), each[2] or 0.0) for each in _apart(context, route)]
-    ways = [
+    return [
         _Way(member, places, offset)
         for member, offset in zip(context.members, offsets, strict=False)
     ]
-    _refuse_wrong_order(ways, spacing_m)
-    _keep_ends_apart(context, ways, spacing_m)
-    return ways
 
 
 def _keep_ends_apart(context: PlanningContext, ways: Sequence[_Way], spacing_m: float) -> None:

@@ -1,8 +1,8 @@
 """Keeps the members of a march in their places by limiting their speeds.
 
 A member that is ahead of its place waits. All members wait when one falls back too far. No member
-comes too near to the member ahead in its lane, even if that one stops at once; and none to any other
-in the plane, if that one brakes as vehicles do: one after the other passes a sharp turn.
+comes too near to the member ahead in its lane, even if that one stops at once; and none to any
+other in the plane, if that one brakes as vehicles do: one after the other passes a sharp turn.
 Pure: the caller passes the poses; the controller uses no clock.
 """
 
@@ -222,7 +222,6 @@ class FormationController:
             braking_m_s2 = _HARD_BRAKING * track.marcher.motion.braking_m_s2
             track.stops_m = found_m + stand.speed_m_s**2 / (2 * braking_m_s2)
 
-
     def _measure_room(self, track: _Track) -> None:
         others = list(self._tracks.values())
         limit_m = self._clearance.limit_m(others.index(track), lambda index: others[index].stops_m)
@@ -278,4 +277,3 @@ def _lag_m(track: _Track, other: _Track) -> float:
     """
     place_m = other.mark_m + other.back_m - track.back_m
     return min(place_m, track.marcher.path.end_mark_m) - track.mark_m
-

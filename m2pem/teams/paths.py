@@ -5,10 +5,18 @@ from bisect import bisect_left
 from collections.abc import Sequence
 
 from m2pem.geo.local_frame import EastNorth
-from m2pem.geo.polyline import EastNorthUp, Polyline, Segment
+from m2pem.geo.polyline import EastNorthUp, Polyline, Segment, shifted, trimmed
 
 SPACING_M = 15.0
 """The default spacing between members."""
+
+SHAPES = {
+    "formation": "wedge",
+    "road_following_formation": "column",
+    "road_sweep": "line",
+    "bridge_crossing": "column",
+}
+"""The default shape of each behavior that leads a team along a route."""
 
 
 def slot(shape: str, index: int) -> tuple[float, float]:
@@ -38,6 +46,18 @@ def beside(place: EastNorth, yaw_rad: float, back_m: float, left_m: float) -> Ea
     cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
     east, north = place
     return (east - back_m * cos - left_m * sin, north - back_m * sin + left_m * cos, 0.0)
+
+
+def lane(route: Sequence[EastNorthUp], back_m: float, left_m: float) -> list[EastNorthUp]:
+    """Return a member's way: the route without its last `back_m`, and to the left of it.
+
+    One whose place is before the route's beginning goes to that place alone.
+    """
+    length_m = Polyline(place[:2] for place in route).length_m
+    if back_m < length_m:
+        return shifted(trimmed(route, back_m), left_m)
+    first = Segment.between(route[0][:2], route[1][:2])
+    return [beside(first.start, first.yaw_rad, back_m - length_m, left_m)]
 
 
 _BEHIND_M = 5.0

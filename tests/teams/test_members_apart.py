@@ -2,20 +2,26 @@
 team says so before: on random routes with turns of any angle, judged by where the vehicles are."""
 
 import math
-from dataclasses import dataclass, field
-from itertools import combinations, pairwise
-from pathlib import Path
+from dataclasses import dataclass, field, replace
+from itertools import combinations
 from random import Random
-from typing import Any
 
 import pytest
 
+from m2pem.api.clock import SystemClock
+from m2pem.bpmn import parse_mission
 from m2pem.engine.records import BehaviorEnded
+from m2pem.executive.fleet_connections import FleetArbiters
+from m2pem.executive.loading import findings_for
+from m2pem.findings import Finding, Severity
 from m2pem.fleet.fleet import Domain, Fleet, LostMemberPolicy
 from m2pem.mission.catalogue import BehaviorState
+from m2pem.plugins import PluginManager
 from m2pem.simulation.faults import Fault
+from m2pem.testing.contracts.arbiter_harness import context
 from tests.seeds import named
 
+from .carts import FRAME
 from .conftest import one_task, route
 from .rehearsed import Rehearsed, rehearsed, sim_fleet
 
@@ -129,8 +135,8 @@ def judged(fleet: Fleet, mission: bytes, *faults: tuple[str, Fault]) -> Judged:
         await world.executive.control.start(mission)
         for _ in range(10 * 7200):
             places = places_of(world)
-            for a, b in nearest:
-                if (apart_m := math.dist(places[a], places[b])) < nearest[a, b]:
+            for (a, b), least_m in nearest.items():
+                if (apart_m := math.dist(places[a], places[b])) < least_m:
                     nearest[a, b] = apart_m
                     when[a, b] = (world.clock.now_us() - start_us) / 1e6
             if world.ended():
@@ -145,20 +151,123 @@ def judged(fleet: Fleet, mission: bytes, *faults: tuple[str, Fault]) -> Judged:
     return found
 
 
-def refused(case: Case, found: Judged) -> bool:
+def refused(found: Judged) -> bool:
     """Whether the team has said that it cannot, before anybody moved."""
-    if found.ended.state is BehaviorState.SUCCEEDED:
+    if found.ended.code != "REJECTED":
         return False
-    assert found.ended.code == "REJECTED", found.ended
-    assert "it turns by" in found.ended.reason or "come within" in found.ended.reason, found.ended
+    assert "would come within" in found.ended.reason, found.ended
+    assert found.nearest_m == found.begun_m
     return True
 
 
-def check(seed: int) -> str:
+def check(seed: int) -> None:
     case = Case.of(seed)
     with named(seed):
         found = judged(case.fleet(), case.mission)
-        if refused(case, found):
-            return "refused"
-        assert found.least_m >= 0.8 * case.spacing_m, (case, found)
-        return "kept"
+        if not refused(found):
+            assert found.ended.state is BehaviorState.SUCCEEDED, (case, found)
+            assert found.least_m >= 0.8 * case.spacing_m, (case, found)
+
+
+@pytest.mark.parametrize("seed", [0, 2, 12, 18, 23, 27, 51, 99, 107, 112, 210, 215])
+def test_members_keep_apart_on_any_route_or_say_before_that_they_cannot(seed: int) -> None:
+    check(seed)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("first", range(0, 300, 25))
+def test_members_keep_apart_on_three_hundred_routes(first: int) -> None:
+    for seed in range(first, first + 25):
+        check(seed)
+
+
+def check_lost(seed: int) -> None:
+    case, random = Case.of(seed), Random(seed * 7 + 1)
+    victim, kind = random.choice(case.names), random.choice(["fail", "lose_link"])
+    error = "ROUTE_BLOCKED" if kind == "fail" else ""
+    fault = Fault(kind, after_s=random.uniform(2, 90), error=error)
+    with named(seed):
+        found = judged(case.fleet(LostMemberPolicy.CONTINUE), case.mission, (victim, fault))
+        if refused(found):
+            return
+        assert found.least_m >= 0.75 * case.spacing_m, (case, victim, found)
+        if found.ended.state is BehaviorState.FAILED:
+            assert "cannot" in found.ended.reason or len(case.names) == 1, found.ended
+
+
+@pytest.mark.parametrize("seed", [3, 25, 51, 60, 62, 92])
+def test_nobody_drives_over_a_lost_member(seed: int) -> None:
+    check_lost(seed)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("first", range(0, 100, 25))
+def test_nobody_drives_over_a_lost_member_on_a_hundred_routes(first: int) -> None:
+    for seed in range(first, first + 25):
+        check_lost(seed)
+
+
+HAIRPIN = [(0.0, 0.0), (200.0, 0.0), (200.0, 4.0), (0.0, 4.0)]
+OUT_AND_BACK = [(0.0, 0.0), (200.0, 0.0), (0.0, 0.5)]
+SPUR = [(0.0, 0.0), (100.0, 0.0), (100.0, 80.0), (100.0, 0.0), (200.0, 0.0)]
+SHARP = [(0.0, 0.0), (200.0, 0.0), (60.0, 80.0)]
+
+
+def column(places: list[tuple[float, float]], count: int = 4) -> Case:
+    return Case(NAMES[:count], "column", 20.0, places, Domain.GROUND)
+
+
+@pytest.mark.parametrize(("places", "turn_deg"), [(HAIRPIN, 180), (OUT_AND_BACK, 180), (SPUR, 180)])
+def test_a_column_that_would_meet_itself_is_refused_with_the_corner(
+    places: list[tuple[float, float]], turn_deg: int
+) -> None:
+    case = column(places)
+    found = judged(case.fleet(), case.mission)
+    assert refused(found)
+    assert f"it turns by {turn_deg} degrees" in found.ended.reason
+    latitude, longitude = map(float, found.ended.reason.split("[")[1].split("]")[0].split(", "))
+    corner = FRAME.to_local((latitude, longitude))
+    assert min(math.dist(corner, place) for place in places[1:-1]) < 0.2
+    (finding,) = checked(case)
+    assert (finding.rule, finding.severity) == ("members-meet", Severity.WARNING)
+    assert found.ended.reason in finding.message
+
+
+def test_a_column_passes_a_sharp_turn_one_after_the_other_and_check_says_so() -> None:
+    case = column(SHARP)
+    found = judged(case.fleet(), case.mission)
+    assert found.ended.state is BehaviorState.SUCCEEDED
+    assert found.least_m >= 16
+    (finding,) = checked(case)
+    assert finding.rule == "members-meet"
+    assert "it turns by 150 degrees" in finding.message
+    assert "one after the other" in finding.remedy
+
+
+def test_check_finds_nothing_where_members_keep_apart() -> None:
+    assert checked(column([(0.0, 0.0), (200.0, 0.0), (200.0, 200.0)])) == []
+
+
+def test_a_column_goes_around_the_member_that_it_has_lost() -> None:
+    case = column([(0.0, 0.0), (200.0, 0.0), (200.0, 150.0), (60.0, 150.0)], 3)
+    lost = "b", Fault("lose_link", after_s=30.0)
+    found = judged(case.fleet(LostMemberPolicy.CONTINUE), case.mission, lost)
+    assert found.ended.state is BehaviorState.SUCCEEDED
+    assert found.ended.reason.startswith("without b (LINK_LOST")
+    assert found.least_m >= 16
+
+
+def test_nobody_crosses_a_bridge_on_which_a_member_was_lost() -> None:
+    case = replace(column([(0.0, 0.0), (200.0, 0.0)], 3), behavior="bridge_crossing")
+    lost = "a", Fault("lose_link", after_s=10.0)
+    found = judged(case.fleet(LostMemberPolicy.CONTINUE), case.mission, lost)
+    assert (found.ended.state, found.ended.code) == (BehaviorState.FAILED, "LINK_LOST")
+    assert found.ended.reason.endswith("the others cannot pass it")
+    assert found.least_m == 20
+
+
+def checked(case: Case) -> list[Finding]:
+    """What `m2pem check` finds."""
+    fleet, plugins = case.fleet(), PluginManager(block=("all",))
+    connected = FleetArbiters(fleet, plugins, context(SystemClock()))
+    return findings_for(parse_mission(case.mission, "m.bpmn"), connected, plugins)
