@@ -15,7 +15,7 @@ from m2pem.mission.elements import ScriptTask, SendTask, ServiceTask
 from m2pem.mission.geometry import Route
 from m2pem.mission.mission import Mission
 from m2pem.teams.columns import turns
-from m2pem.teams.paths import SHAPES
+from m2pem.teams.paths import SHAPES, SPACING_M
 from m2pem.teams.plan import PlanningContext, TeamRefusedError
 
 
@@ -64,6 +64,14 @@ def _turns(behavior: Behavior, mission: Mission, fleet: Fleet) -> tuple[str, str
         BehaviorParameters(values),
         LocalFrame(route.waypoints[0][:2]),
     )
+    apart_m = max(
+        (fleet.surface_separation_m.get(fleet.vehicles[m].domain, 0.0) for m in members),
+        default=0.0,
+    )
+    spacing_m = context.parameters.spacing_m or SPACING_M
+    if "offsets" not in given and len(members) > 1 and 0.8 * spacing_m < apart_m:
+        said = f"parameter 'spacing': members come within {0.8 * spacing_m:g} m of each other"
+        return f"{said}, below the fleet's separation of {apart_m:g} m", "set a larger spacing"
     try:
         return turns(context, behavior.name)
     except (TeamRefusedError, KeyError):  # it is refused for another reason

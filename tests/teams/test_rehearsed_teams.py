@@ -113,6 +113,14 @@ def test_a_team_that_stays_for_ever_is_seen_to_wait_for_nothing(name: str) -> No
     assert result.records[-1].t_s < 600
 
 
+def test_a_team_of_which_one_was_never_received_is_refused_and_the_rehearsal_waits_for_it() -> None:
+    result = rehearsal(
+        one_task("area_survey", area="field"), settings={"a": {"link_lost": [{"at": "0 s"}]}}
+    )
+    assert "the position of a is not known" in result.summary.detail
+    assert result.records[-1].t_s == pytest.approx(1.5, abs=0.2)
+
+
 def test_a_march_that_nobody_can_end_is_given_up_and_named() -> None:
     stalled = {"a": {"faults": [{"kind": "stall", "after": "20 s"}]}}
     result = rehearsal(MARCH, settings=stalled)
