@@ -14,13 +14,16 @@ from m2pem.geo.local_frame import EastNorth
 from m2pem.geo.polyline import Polyline, Segment
 from m2pem.teams.paths import MemberPath
 
-NEAREST_SHARE = 0.82
+NEAREST_SHARE = 0.83
 """Share of the spacing that is aimed at, to keep a minimum distance of 0.8 in the plane."""
 
 _BEND_RADIUS_M, _FARTHEST_MISS_M = 10.0, 3.5
 """Vehicles round corners: so far from the corner do they pass at most."""
 
 _FAR_SHARE = 0.08
+_BESIDE_SHARE = 0.97 / NEAREST_SHARE
+"""Members beside each other pass corners together: that counts at most this share apart."""
+
 _SAMPLES = 8
 _STEPS = 20
 _NOTHING_M = 1e-6
@@ -28,10 +31,11 @@ _NOTHING_M = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Way:
-    """A member's path, and how far behind the lead it is, along the team's route."""
+    """A member's path, and how far behind the lead and to its left its place is."""
 
     path: MemberPath
     back_m: float
+    left_m: float
 
     @property
     def line(self) -> Polyline:
@@ -98,7 +102,9 @@ class Clearance:
             a, b = ways[first], ways[second]
             ahead: list[_Near] = []
             behind: list[_Near] = []
-            for nears in _places(a.line, b.line, apart_m):
+            beside = abs(a.left_m - b.left_m) >= apart_m
+            most_m = _BESIDE_SHARE * apart_m if beside else math.inf
+            for nears in _places(a.line, b.line, apart_m, most_m):
                 (ahead if _meets(a, b, nears) else behind).extend(nears)
             turned = [_Near(each.second, each.first, each.apart_m) for each in ahead]
             self._yields[second].append((first, _Yield(b.line, a.line, turned)))
@@ -225,9 +231,9 @@ def turn_rad(line: Polyline, first: int, second: int) -> float:
     return abs(math.remainder(change, math.tau))
 
 
-def _places(a: Polyline, b: Polyline, apart_m: float) -> Iterator[list[_Near]]:
+def _places(a: Polyline, b: Polyline, apart_m: float, most_m: float) -> Iterator[list[_Near]]:
     """The places where two paths come too near to each other: pairs of segments that touch."""
-    left = {(each.first, each.second): each for each in _nears(a, b, apart_m)}
+    left = {(each.first, each.second): each for each in _nears(a, b, apart_m, most_m)}
     while left:
         group = [left.popitem()[1]]
         for near in group:
@@ -243,14 +249,15 @@ def _places(a: Polyline, b: Polyline, apart_m: float) -> Iterator[list[_Near]]:
         yield group
 
 
-def _nears(a: Polyline, b: Polyline, apart_m: float) -> Iterator[_Near]:
+def _nears(a: Polyline, b: Polyline, apart_m: float, most_m: float) -> Iterator[_Near]:
     boxes = [_box(each, apart_m + _FARTHEST_MISS_M) for each in b.segments]
     for first, own in enumerate(a.segments):
         west, south, east, north = _box(own, 0.0)
         for second, box in enumerate(boxes):
             if box[0] < east and box[2] > west and box[1] < north and box[3] > south:
                 between = sorted((first, second))
-                least_m = apart_m + max(_missed_m(line, *between, apart_m) for line in (a, b))
+                missed_m = max(_missed_m(line, *between, apart_m) for line in (a, b))
+                least_m = min(apart_m + missed_m, most_m)
                 if first_within_m(own, b.segments[second], least_m) < math.inf:
                     yield _Near(first, second, least_m)
 

@@ -101,7 +101,9 @@ def turns(context: PlanningContext, behavior: str) -> tuple[str, str]:
         _ways(context, route, places, spacing)
     except TeamRefusedError as error:
         return str(error), ""
-    near = nearest([Way(way.path(), way.back_m) for way in _drawn(context, route, places)])
+    near = nearest(
+        [Way(way.path(), way.back_m, way.left_m) for way in _drawn(context, route, places)]
+    )
     if near.distance_m >= GAP_SHARE * spacing or behavior == "bridge_crossing":
         return "", ""
     said = f"parameter 'route': {_turn(context, near)} if they kept their spacing along it"
@@ -226,10 +228,10 @@ def _keep_ends_apart(context: PlanningContext, ways: Sequence[_Way], spacing_m: 
     """
     nearest_m = NEAREST_SHARE * spacing_m
     short_m = max(context.motion(way.member).short_m(context.speed()) for way in ways)
-    formation = [Way(way.path(), way.back_m) for way in ways]
+    formation = [Way(way.path(), way.back_m, way.left_m) for way in ways]
     farther_m = [0.0 for _ in ways]
     while True:
-        paths = [Way(way.path(context.begin(way.member)), way.back_m) for way in ways]
+        paths = [Way(way.path(context.begin(way.member)), way.back_m, way.left_m) for way in ways]
         clearance = Clearance(paths, nearest_m)
         ends_m = [path.line.length_m for path in paths]
         shorter = False

@@ -205,7 +205,9 @@ class FormationController:
 
     def _clear(self) -> Clearance:
         marchers = [track.marcher for track in self._tracks.values()]
-        return Clearance([Way(each.path, each.back_m) for each in marchers], self._nearest_m)
+        return Clearance(
+            [Way(each.path, each.back_m, each.left_m) for each in marchers], self._nearest_m
+        )
 
     def _look(self, track: _Track, stand: MemberPose | None, arrived: bool) -> None:
         path = track.marcher.path
@@ -230,8 +232,17 @@ class FormationController:
 
     def _delay_m(self, track: _Track, other: _Track) -> float:
         """How far a member that can go on has fallen behind another one."""
-        blocked = track.room_m <= track.marcher.motion.short_m(self._march.speed_m_s)
-        return min(_lag_m(track, other), 0.0 if blocked else math.inf)
+        needed_m = track.marcher.motion.short_m(self._march.speed_m_s)
+        if track.marcher.member in self._steady:
+            needed_m = self._all_well_m(track) + _RESTART_SHARE * self._march.spacing_m
+        return min(_lag_m(track, other), 0.0 if track.room_m <= needed_m else math.inf)
+
+    def _all_well_m(self, track: _Track) -> float:
+        """The room that a member without variable speed needs to go on."""
+        stopping_m = track.marcher.motion.stopping_m(
+            self._march.speed_m_s, REACTION_S * REACTION_SHARE
+        )
+        return stopping_m / _HARD_BRAKING
 
     def _speed(self, track: _Track, before: list[_Track], waits_m: float) -> float:
         """`waits_m`: how far the slowest other member has fallen back behind this one."""
@@ -246,8 +257,7 @@ class FormationController:
             room_m_s = motion.safe_m_s(track.room_m, REACTION_S * REACTION_SHARE)
             return self._graded(track, min(speed, motion.safe_m_s(free_m), room_m_s))
         needed_m = motion.stopping_m(march_m_s)
-        all_well_m = motion.stopping_m(march_m_s, REACTION_S * REACTION_SHARE) / _HARD_BRAKING
-        free_m = min(free_m, track.room_m - all_well_m + needed_m)
+        free_m = min(free_m, track.room_m - self._all_well_m(track) + needed_m)
         if track.stands:
             wide = free_m >= needed_m + _RESTART_SHARE * self._march.spacing_m
             goes = wide and lag_m >= -slack / 2 and waits_m <= slack
