@@ -5,8 +5,9 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True, slots=True)
 class TaskEstimate:
-    """One task of one vehicle. `begins_s`: after the mission's start. `battery_left`: after the
-    task, from 0 to 1; below 0 if the battery does not last."""
+    """One task of one vehicle or payload, of which `vehicle` is the id. `begins_s`: after the
+    mission's start. `battery_left`: of the vehicle after the task, from 0 to 1; below 0 if the
+    battery does not last."""
 
     element: str
     label: str
@@ -19,7 +20,7 @@ class TaskEstimate:
 
 @dataclass(frozen=True, slots=True)
 class VehicleEstimate:
-    """One vehicle. `distance_m` on the map, and `time_s`, of its tasks; where the mission branches,
+    """One vehicle. `distance_m` in space, and `time_s`, of its tasks; where the mission branches,
     of those that take the most. `battery_left`: at the mission's end. `endurance_s`: with a full
     battery; `stated`: whether the fleet says so, or the simulation assumes it."""
 

@@ -4,6 +4,7 @@ import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from functools import partial
 from typing import Any, get_type_hints
 
 import msgspec
@@ -258,22 +259,28 @@ def real_resources(fleet: Fleet) -> list[ResourceId]:
 
 
 def simulated_fleet(fleet: Fleet, settings: Mapping[str, Any] | None = None) -> Fleet:
-    """The fleet with the simulated arbiter in place of every other; `settings` are added to the
-    connection of every resource, in place of its own of the same names. Nothing moves, so that
-    missions need no approval."""
-    extra = settings or {}
+    """The fleet with the simulated arbiter in place of every other; `settings` are added to those
+    that the simulation has of every resource, in place of its own of the same names. Nothing moves,
+    so that missions need no approval."""
+    changed = partial(sim_settings, changed=settings or {})
     return replace(
         fleet,
         approval_persons=0,
         vehicles={
-            id_: replace(each, arbiter=SIMULATED, settings={**each.settings, **extra}, host="")
+            id_: replace(each, arbiter=SIMULATED, settings=changed(each.settings), host="")
             for id_, each in fleet.vehicles.items()
         },
         payloads={
-            id_: replace(each, arbiter=SIMULATED, settings={**each.settings, **extra})
+            id_: replace(each, arbiter=SIMULATED, settings=changed(each.settings))
             for id_, each in fleet.payloads.items()
         },
     )
+
+
+def sim_settings(connection: Mapping[str, Any], changed: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a connection with other settings of the simulation: in `sim`, if it has that."""
+    own = connection.get("sim")
+    return {**connection, **({"sim": {**own, **changed}} if isinstance(own, Mapping) else changed)}
 
 
 VERSION = 1

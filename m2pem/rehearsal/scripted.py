@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, cast
 from m2pem.api.arbiter import Arbiter, ArbiterContext, BehaviorRequest, Connection
 from m2pem.api.service import Service, ServiceContext, ServiceError
 from m2pem.findings import Finding
-from m2pem.fleet.fleet import SIMULATED
+from m2pem.fleet.fleet import SIMULATED, sim_settings
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.values import Value
 from m2pem.plugins import Plugins
@@ -58,7 +58,12 @@ class ScriptedPlugins:
         ) -> Arbiter:
             if name == SIMULATED:
                 connections = {
-                    resource: _with_settings(each, self._answers.model.settings_of(resource))
+                    resource: replace(
+                        each,
+                        settings=sim_settings(
+                            each.settings, self._answers.model.settings_of(resource)
+                        ),
+                    )
                     for resource, each in connections.items()
                 }
             arbiter = make(connections, context)
@@ -93,15 +98,6 @@ class ScriptedPlugins:
     def real_service(self, name: str) -> Service:
         """The plugins' own service of that name; errors as for the plugins."""
         return self._plugins.service(name)()
-
-
-def _with_settings(connection: Connection, changed: Mapping[str, Any]) -> Connection:
-    if not changed:
-        return connection
-    settings = dict(connection.settings)
-    own = settings.get("sim")
-    settings = {"sim": {**own, **changed}} if isinstance(own, Mapping) else {**settings, **changed}
-    return replace(connection, settings=settings)
 
 
 @dataclass(eq=False)

@@ -6,6 +6,7 @@ import math
 from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import count
 from pathlib import Path
 
 from m2pem.api.arbiter import (
@@ -88,11 +89,31 @@ class RadioRange:
 LOST_AFTER_S = 3.0
 
 
+def bodies_at_home(
+    connections: Mapping[ResourceId, Connection], origin: tuple[float, float, float], now_us: int
+) -> dict[ResourceId, Body]:
+    """Return simulated resources that stand where their settings say.
+
+    Raises:
+        FleetError: a setting cannot be used.
+    """
+    frame, places = FlatFrame(origin), count()
+    bodies: dict[ResourceId, Body] = {}
+    for resource, connection in connections.items():
+        settings = read_settings(connection, origin)
+        if "/" in resource:
+            bodies[resource] = SimPayload(connection, settings, now_us)
+        else:
+            bodies[resource] = SimVehicle(connection, settings, frame, next(places), now_us)
+    return bodies
+
+
 class SimArbiter:
     """Implements `m2pem.api.Arbiter`; its settings in a fleet file: docs/simulation.md.
 
     `telemetry_hz`: of every resource that does not say its own; 0 reports changes alone, so that
-    nothing happens while nothing moves, and then links can't be watched by silence.
+    nothing happens while nothing moves, and then links can't be watched by silence. `bodies`: go on
+    with these, in place of new ones at home.
 
     Beside the protocol, tests and rehearsals look at `effects`, `expects`, `searching`, `vehicles`
     and `broadcast`, and use `script`, `scale_time`, `inject`, `lose_link` and `restore_link`.
@@ -105,6 +126,7 @@ class SimArbiter:
         connections: Mapping[ResourceId, Connection],
         context: ArbiterContext,
         telemetry_hz: float | None = None,
+        bodies: Mapping[ResourceId, Body] | None = None,
     ) -> None:
         self._connections = dict(connections)
         self._clock = context.clock
@@ -112,18 +134,8 @@ class SimArbiter:
         self._context = context
         now_us = context.clock.now_us()
         self._frame = frame = FlatFrame(context.origin)
-        self._settings = {
-            resource: read_settings(connection, context.origin)
-            for resource, connection in connections.items()
-        }
-        self._bodies: dict[ResourceId, Body] = {}
-        for resource, connection in connections.items():
-            settings = self._settings[resource]
-            if "/" in resource:
-                self._bodies[resource] = SimPayload(connection, settings, now_us)
-            else:
-                place = sum("/" not in other for other in self._bodies)
-                self._bodies[resource] = SimVehicle(connection, settings, frame, place, now_us)
+        self._bodies = dict(bodies or bodies_at_home(connections, context.origin, now_us))
+        self._settings = {resource: body.settings for resource, body in self._bodies.items()}
         default_hz = DEFAULT_HZ if telemetry_hz is None else telemetry_hz
         self._rates_hz = {
             resource: default_hz if settings.telemetry_hz is None else settings.telemetry_hz

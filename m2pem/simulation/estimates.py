@@ -1,24 +1,27 @@
-"""Estimates of a mission as it is drawn, by the kinematics of simulated vehicles.
+"""Estimates of a mission as it is drawn, by simulated vehicles.
 
-The flow is followed once, from the start: each behavior's plan says how long it takes, how far it
-goes and where it ends. Where branches meet, what took the longest counts. Loops count once, and
-waits for operators, messages and detections take no time; all that is said in `left_out`.
+The flow is followed once, from the start: each behavior is simulated alone, which says how long it
+takes, how far its vehicles go and where they are then. Where branches meet, what took the longest
+counts. Loops count once, and waits for operators, messages and detections take no time; all that is
+said in `left_out`.
 """
 
 import copy
-import math
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import cast
 
-from m2pem.api.arbiter import Connection
+from m2pem.api.arbiter import BehaviorRequest, Connection
+from m2pem.api.behavior_parameters import BehaviorParameters
 from m2pem.api.estimates import MissionEstimate, NotEstimated, TaskEstimate, VehicleEstimate
 from m2pem.errors import FleetError, MissionError
 from m2pem.findings import Finding, Severity
-from m2pem.fleet.allocation import resources_of
+from m2pem.fleet.allocation import AllocationError, allocate
 from m2pem.fleet.behaviors import SHARED
 from m2pem.fleet.endurance import RESERVE
-from m2pem.fleet.fleet import Fleet
+from m2pem.fleet.fleet import Fleet, simulated_fleet
 from m2pem.fleet.parameters import ResolvedValue, examine
+from m2pem.fleet.space import may_wait_for_space
 from m2pem.mission.behavior import Behavior, BehaviorType
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.elements import (
@@ -38,48 +41,60 @@ from m2pem.mission.elements import (
     SubProcess,
     UserTask,
 )
-from m2pem.mission.events import TimerEventDefinition
+from m2pem.mission.events import (
+    ConditionalEventDefinition,
+    MessageEventDefinition,
+    SignalEventDefinition,
+    TimerEventDefinition,
+)
 from m2pem.mission.mission import Mission
-from m2pem.simulation.course import RefusedError
-from m2pem.simulation.frame import FlatFrame
-from m2pem.simulation.gimbals import GAZES
-from m2pem.simulation.local_parameters import LocalParameters
-from m2pem.simulation.manoeuvres import MANOEUVRES
-from m2pem.simulation.segments import Pose
-from m2pem.simulation.settings import read_settings
-from m2pem.simulation.vehicles import SimVehicle
+from m2pem.simulation.arbiters import bodies_at_home
+from m2pem.simulation.executions import Body
+from m2pem.simulation.single_behavior import simulate_behavior
+from m2pem.simulation.vehicles import SimVehicle, carrier_of
 from m2pem.units import US_PER_S
 from m2pem.verify.translate.timers import fixed
 
 _DEEPEST_CALL = 20
-_MORE = 1_000.0
+_ROUNDING_S = 1e-3
+_SPARE = 1_000.0
 """Batteries that each vehicle has besides, so that what lacks can be said."""
 
-_AS_ROUTES = ("formation", "road_following_formation", "road_sweep", "bridge_crossing")
-"""Team behaviors whose members go along the route."""
+_SETTINGS = {
+    **{"telemetry_hz": 0, "footprints": False, "reports_left": False, "state": ""},
+    **dict.fromkeys(("faults", "link_lost", "detections", "targets"), ()),
+}
+"""Of every simulated resource: nothing fails, and nothing is published."""
+
+_WHENEVER = SignalEventDefinition, MessageEventDefinition, ConditionalEventDefinition
+
+_LOOKS = ("target", "area", "heading")
+"""What a payload does with these depends on where its vehicle is."""
 
 
 @dataclass(frozen=True, slots=True)
 class _State:
-    """The vehicles when a token is somewhere. `busy_s`, `distance_m`: of their tasks until then."""
+    """The resources when a token is somewhere. `busy_s`: the time of their tasks until then."""
 
     at_us: int
-    vehicles: dict[ResourceId, SimVehicle]
+    bodies: dict[ResourceId, Body]
     busy_s: dict[ResourceId, float] = field(default_factory=dict)
-    distance_m: dict[ResourceId, float] = field(default_factory=dict)
+
+    def vehicle(self, name: ResourceId) -> SimVehicle:
+        """Return a vehicle; it is known that it is one."""
+        return cast("SimVehicle", self.bodies[name])
 
     def merged(self, other: "_State") -> "_State":
-        """Of each vehicle, the state in which it has done more."""
+        """Of each resource, the state in which it has done more."""
         at_us = max(self.at_us, other.at_us)
         chosen = {
             each: other if other.busy_s.get(each, 0.0) > self.busy_s.get(each, 0.0) else self
-            for each in self.vehicles
+            for each in self.bodies
         }
         return _State(
             at_us,
-            {each: state.vehicles[each] for each, state in chosen.items()},
+            {each: state.bodies[each] for each, state in chosen.items()},
             {each: state.busy_s.get(each, 0.0) for each, state in chosen.items()},
-            {each: state.distance_m.get(each, 0.0) for each, state in chosen.items()},
         )
 
 
@@ -110,7 +125,7 @@ def endurance_findings(mission: Mission, fleet: Fleet) -> list[Finding]:
     }
     findings = []
     for name, vehicle in short.items():
-        own = [each for each in estimate.tasks if each.vehicle == name]
+        own = [each for each in estimate.tasks if carrier_of(ResourceId(each.vehicle)) == name]
         at = next((each for each in own if each.battery_left < estimate.reserve), own[-1])
         node = mission.elements[at.element]
         left = (
@@ -139,8 +154,11 @@ class _Estimate:
 
     def __init__(self, mission: Mission, fleet: Fleet) -> None:
         self._mission = mission
-        self._fleet = fleet
-        self._frame = FlatFrame(fleet.origin)
+        self._fleet = simulated_fleet(fleet, _SETTINGS)
+        self._connections = {
+            each: Connection.of(self._fleet, each) for each in (*fleet.vehicles, *fleet.payloads)
+        }
+        self._depending: list[tuple[Activity, ResourceId, float, float]] = []
         self._geometries = {**fleet.geometries, **mission.geometries}
         self._tasks: list[TaskEstimate] = []
         self._left_out: dict[NotEstimated, None] = {}
@@ -153,19 +171,25 @@ class _Estimate:
             message, file = f"there is no process {process!r}", self._mission.file
             finding = Finding(Severity.ERROR, file, 0, process or "", "unknown-process", message)
             raise MissionError(f"{file} cannot be estimated", [finding]) from None
-        state = self._container(start, _State(0, dict(self._simulated())))
+        bodies = bodies_at_home(self._connections, self._fleet.origin, 0)
+        for body in bodies.values():
+            if isinstance(body, SimVehicle):
+                body.spare = _SPARE
+                body.battery += _SPARE  # a battery never shows less than nothing
+        state = self._container(start, _State(0, bodies))
+        self._leave_out_where_others_move()
         end_us = state.at_us
         vehicles = []
-        acting = {each.vehicle for each in self._tasks}
+        acting = {carrier_of(ResourceId(each.vehicle)) for each in self._tasks}
         for name in (each for each in self._fleet.vehicles if each in acting):
             stated = self._fleet.vehicles[name].endurance_s is not None
-            vehicle = state.vehicles[name]
+            vehicle = state.vehicle(name)
             vehicles.append(
                 VehicleEstimate(
                     name,
-                    state.distance_m.get(name, 0.0),
+                    vehicle.driven_m(end_us),
                     state.busy_s.get(name, 0.0),
-                    _battery_left(vehicle, end_us),
+                    vehicle.battery_at(end_us) - _SPARE,
                     vehicle.kinematics.endurance_s,
                     stated,
                 )
@@ -177,20 +201,6 @@ class _Estimate:
             tuple(sorted(self._tasks, key=lambda each: each.begins_s)),
             tuple(self._left_out),
         )
-
-    def _simulated(self) -> Iterator[tuple[ResourceId, SimVehicle]]:
-        for place, each in enumerate(self._fleet.vehicles.values()):
-            connection = Connection(
-                each.id,
-                each.domain.value,
-                each.settings,
-                cruise_speed_m_s=each.cruise_speed_m_s,
-                endurance_s=each.endurance_s,
-            )
-            settings = read_settings(connection, self._fleet.origin)
-            vehicle = SimVehicle(connection, settings, self._frame, place, 0)
-            vehicle.battery += _MORE  # a battery never shows less than nothing
-            yield each.id, vehicle
 
     # --- the flow -------------------------------------------------------------------------------
 
@@ -207,6 +217,8 @@ class _Estimate:
             if before is None:
                 continue
             after = self._node(node, before)
+            if isinstance(node, Activity):
+                self._leave_out_interruptions(node, after.at_us - before.at_us)
             followers = _followers(node)
             for to in followers:
                 if place[to] <= place[node]:
@@ -250,14 +262,18 @@ class _Estimate:
             if isinstance(definition, TimerEventDefinition):
                 duration_us = fixed(definition)
                 if duration_us is not None:
-                    return _State(
-                        state.at_us + duration_us,
-                        state.vehicles,
-                        state.busy_s,
-                        state.distance_m,
-                    )
+                    return replace(state, at_us=state.at_us + duration_us)
         self._leave_out(node, "how long it waits is not known")
         return state
+
+    def _leave_out_interruptions(self, activity: Activity, duration_us: int) -> None:
+        for event in activity.boundary:
+            for definition in event.definitions if event.interrupting else ():
+                due_us = duration_us
+                if isinstance(definition, TimerEventDefinition):
+                    due_us = fixed(definition) or 0
+                if due_us < duration_us or isinstance(definition, _WHENEVER):
+                    self._leave_out(event, "what it interrupts is counted to its end")
 
     def _leave_out(self, node: FlowNode, reason: str) -> None:
         self._left_out[NotEstimated(node.id, node.label, reason)] = None
@@ -268,74 +284,70 @@ class _Estimate:
         if any(not role.resource for role in behavior.roles):
             self._leave_out(task, "who does it is chosen when it starts")
             return state
-        if behavior.type is BehaviorType.PAYLOAD:
-            reason = "how long a payload takes is not counted"
-            if behavior.name in GAZES:
-                self._leave_out(task, reason)
-            return state
         values = self._values(task, behavior)
-        name = behavior.name
-        if behavior.type is BehaviorType.TEAM and name in _AS_ROUTES and values is not None:
-            name = "single_vehicle_routing"
-        elif behavior.type is BehaviorType.TEAM:
-            self._leave_out(task, "how a team shares its work is not known before")
+        if values is None:
             return state
-        manoeuvre = MANOEUVRES.get(name)
-        if values is None or manoeuvre is None:
-            if manoeuvre is None:
-                self._leave_out(task, f"how long '{behavior.name}' takes is not known")
+        if not behavior.roles and behavior.name == "hold":
+            seconds = BehaviorParameters(values).duration_s or 0.0
+            return replace(state, at_us=state.at_us + round(seconds * US_PER_S))
+        try:
+            found = allocate(behavior, self._fleet)
+        except AllocationError as error:
+            self._leave_out(task, str(error))
             return state
-        vehicles, busy_s = dict(state.vehicles), dict(state.busy_s)
-        distance_m, end_us = dict(state.distance_m), state.at_us
-
-        def pose_of(name: str) -> Pose | None:
-            vehicle = vehicles.get(ResourceId(name))
-            return None if vehicle is None else vehicle.pose(state.at_us)
-
-        parameters = LocalParameters(values, self._frame, pose_of)
-        for resource in self._vehicles(behavior):
-            vehicle = copy.copy(vehicles[resource])
-            try:
-                made = manoeuvre(vehicle.craft(state.at_us), parameters)
-            except RefusedError as error:
-                self._leave_out(task, error.reason)
-                return state
-            duration_s = 0.0 if made.plan is None else made.plan.duration_s
-            if made.pursuit is not None or math.isinf(duration_s):
-                self._leave_out(task, "it does not end by itself")
-                continue
-            if made.plan is not None:
-                vehicle.take(made.plan, state.at_us)
-            if made.cruise_m_s is not None:
-                vehicle.cruise_m_s = made.cruise_m_s
-            vehicles[resource] = vehicle
-            ends_us = state.at_us + round(duration_s * US_PER_S)
-            end_us = max(end_us, ends_us)
-            length_m = 0.0 if made.plan is None else made.plan.level_m_left(0.0)
-            busy_s[resource] = busy_s.get(resource, 0.0) + duration_s
-            distance_m[resource] = distance_m.get(resource, 0.0) + length_m
+        acting, is_payload = set(found.resources), behavior.type is BehaviorType.PAYLOAD
+        target = BehaviorParameters(values).target_vehicle
+        others = {ResourceId(target)} if target is not None else set()
+        if is_payload and any(each in values for each in _LOOKS):
+            others |= set(map(carrier_of, acting))
+        others -= acting
+        needed = (*found.resources, *sorted(others))
+        bodies = {each: copy.copy(state.bodies[each]) for each in needed}
+        for body in bodies.values():
+            body.rest(state.at_us, 0)
+        end = simulate_behavior(
+            self._fleet,
+            {each: self._connections[each] for each in bodies},
+            bodies,
+            BehaviorRequest("e.1", 1, behavior.name, values, found.resources, found.roles),
+            behavior.type,
+        )
+        if end.at_us is None:
+            self._leave_out(task, end.reason)
+            return state
+        if may_wait_for_space(self._fleet, behavior.type, behavior.name, found.resources):
+            self._leave_out(task, "how long it waits for space is not counted")
+        after = _State(state.at_us + end.at_us, dict(state.bodies), dict(state.busy_s))
+        begins_s, time_s = state.at_us / US_PER_S, end.at_us / US_PER_S
+        for resource in found.resources:
+            if ("/" in resource) is not is_payload:
+                continue  # it is only held
+            body = after.bodies[resource] = copy.copy(end.bodies[resource])
+            body.rest(end.at_us, after.at_us)
+            after.busy_s[resource] = after.busy_s.get(resource, 0.0) + time_s
+            vehicle = after.vehicle(carrier_of(resource))
+            before_m = state.vehicle(carrier_of(resource)).driven_m(state.at_us)
+            way_m = vehicle.driven_m(after.at_us) - before_m
+            left = vehicle.battery_at(after.at_us) - _SPARE
             self._tasks.append(
-                TaskEstimate(
-                    task.id,
-                    task.label,
-                    resource,
-                    state.at_us / US_PER_S,
-                    length_m,
-                    duration_s,
-                    _battery_left(vehicle, ends_us),
-                )
+                TaskEstimate(task.id, task.label, resource, begins_s, way_m, time_s, left)
             )
-        return _State(end_us, vehicles, busy_s, distance_m)
+        for other in others:
+            busy_s = state.busy_s.get(other, 0.0)
+            self._depending.append((task, other, busy_s, begins_s + time_s))
+        return after
 
-    def _vehicles(self, behavior: Behavior) -> Iterable[ResourceId]:
-        for role in behavior.roles:
-            for resource in resources_of(role, self._fleet):
-                if resource in self._fleet.vehicles:
-                    yield resource
+    def _leave_out_where_others_move(self) -> None:
+        for task, other, busy_s, end_s in self._depending:
+            acts_s = (t.time_s for t in self._tasks if t.vehicle == other and t.begins_s < end_s)
+            if sum(acts_s) > busy_s + _ROUNDING_S:
+                reason = f"it depends on where {other} is, which another branch moves"
+                self._leave_out(task, reason)
 
     def _values(self, task: Activity, behavior: Behavior) -> dict[str, ResolvedValue] | None:
         spec = SHARED.get((behavior.name, behavior.type))
         if spec is None:
+            self._leave_out(task, f"how long '{behavior.name}' takes is not known")
             return None
         literal = {p.name: p.value for p in behavior.parameters if isinstance(p.value, str)}
         deferred = [p.name for p in behavior.parameters if not isinstance(p.value, str)]
@@ -354,11 +366,6 @@ class _Estimate:
             self._leave_out(task, problems[0].message)
             return None
         return values
-
-
-def _battery_left(vehicle: SimVehicle, at_us: int) -> float:
-    """Return what is left of its battery; below 0 if that does not last."""
-    return vehicle.battery_at(at_us) - _MORE
 
 
 def _followers(node: FlowNode) -> Sequence[FlowNode]:

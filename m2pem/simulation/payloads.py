@@ -102,6 +102,11 @@ class SimPayload:
         self.held = False
         self.track: Track[Look] = Track(Plan([Slew(Look(), Look(), 0.0)]), now_us)
 
+    def rest(self, now_us: int, then_us: int) -> None:
+        """Look from `then_us` on where it does at `now_us`."""
+        look = self.look(now_us)
+        self.track = Track(Plan([Slew(look, look, 0.0)]), then_us)
+
     def mount(self, now_us: int, carrier: Pose | None, ground_up_m: float) -> Mount:
         """As a behavior sees it."""
         look = self.look(now_us)

@@ -20,7 +20,7 @@ class SimVehicle:
     """Stands at its `home`, or (without one) in a row south of the fleet's origin.
 
     `behavior`: the id of what it is busy with, `doing` the name; "" when free. `held`: whether
-    `hold` was called on it.
+    `hold` was called on it. `spare`: full batteries that it has besides the one that it shows.
     """
 
     def __init__(
@@ -38,6 +38,7 @@ class SimVehicle:
         )
         self.home = self._home(frame, place)
         self.battery = settings.battery
+        self.spare = 0.0
         yaw = yaw_of(settings.heading_rad)
         self._driven_m = 0.0
         self.track: Track[Pose] = Track(Plan([Stand(self.home, yaw, 0.0, 0.0)]), now_us)
@@ -48,6 +49,12 @@ class SimVehicle:
         latitude, longitude, altitude = self.settings.home
         up = 0.0 if altitude is None else altitude - frame.origin[2]
         return (*frame.to_place((latitude, longitude)), up)
+
+    def rest(self, now_us: int, then_us: int) -> None:
+        """Stand or hover from `then_us` on as it does at `now_us`."""
+        pose, self.battery = self.pose(now_us), self.battery_at(now_us)
+        self._driven_m = self.driven_m(now_us)
+        self.track = Track(Plan([Stand(pose.place, pose.yaw, 0.0, 0.0)]), then_us)
 
     def pose(self, now_us: int) -> Pose:
         """Where it is, and how it moves."""
@@ -158,7 +165,7 @@ class SimVehicle:
         """What it says about itself."""
         pose = self.pose(now_us)
         aloft = self._is_aloft(pose)
-        battery = self._battery(now_us, aloft=aloft)
+        battery = max(0.0, self._battery(now_us, aloft=aloft) - self.spare)
         return VehicleState(
             resource=self.id,
             time_us=now_us,

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from m2pem.errors import JournalError
-from m2pem.fleet.fleet import Domain, Fleet, Vehicle, dump, restore
+from m2pem.fleet.fleet import Domain, Fleet, Vehicle, dump, restore, simulated_fleet
 from m2pem.fleet.fleet_file import load_fleet
 from m2pem.mission.geometry import Area, Point, Route, VehiclePosition
 
@@ -69,3 +69,14 @@ def test_any_geometry_and_setting_survives(geometry: dict, settings: dict) -> No
 def test_what_is_no_snapshot_is_refused(content: bytes, message: str) -> None:
     with pytest.raises(JournalError, match=message):
         restore(content)
+
+
+def test_settings_of_a_simulated_fleet_replace_those_that_the_simulation_reads() -> None:
+    real = {"address": "udp:127.0.0.1:14550", "sim": {"state": "kept", "battery": 0.5}}
+    vehicles = {
+        "real": Vehicle("real", Domain.AIR, "mavlink", real),
+        "made": Vehicle("made", Domain.AIR, "sim", {"state": "kept"}),
+    }
+    fleet = simulated_fleet(Fleet("n", "f.yaml", vehicles), {"state": ""})
+    assert fleet.vehicles["real"].settings == {**real, "sim": {"state": "", "battery": 0.5}}
+    assert fleet.vehicles["made"].settings == {"state": ""}

@@ -14,7 +14,8 @@ from m2pem_plugin_web.rest.models import Answer
 
 
 class TaskEstimateModel(Answer):
-    """A task of a vehicle. `battery_left`: after it; below 0 if the battery does not last."""
+    """A task of a vehicle or payload. `battery_left`: of the vehicle after it; below 0 if that does
+    not last."""
 
     element: str
     label: str
