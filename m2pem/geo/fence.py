@@ -1,34 +1,85 @@
-"""The fleet's fence: whether a way stays within it, and if not, where and how far it leaves it.
+"""Where vehicles may be: within an inclusion polygon, and out of exclusion polygons.
 
-The fence is a polygon; its holes are keep-out areas. It has no ceiling.
+The words are those of MAVLink's geofence. Holes of the inclusion are exclusions; there is no
+ceiling. Ways have a width: all that is kept out grows by half of it. Distances are metres in the
+plane of a local frame. Shapely does the geometry; it is imported when a fence is built, as that
+takes 0.3 s.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+import math
+from collections.abc import Callable, Iterable, Sequence
+from functools import cached_property
 from itertools import pairwise
+from typing import TYPE_CHECKING, Any
 
 from m2pem.geo.local_frame import EastNorth, LatLon, LocalFrame
-from m2pem.geo.polygon import Edge, edge_distance_m, edges_enclose
-from m2pem.mission.geometry import Area
+from m2pem.mission.geometry import Area, Coordinate
+
+if TYPE_CHECKING:
+    from shapely.geometry.base import BaseGeometry
 
 MARGIN_M = 0.1
 """A way may run along the fence."""
 
-_LOOKS = 8
-"""At so many places of a part that lies outside is measured how far outside it is."""
+GRAZE_M = 0.01
+"""A way that is planned may run along what is kept out, as near as rounding is."""
+
+_AROUND_M = 0.05
+"""How far from its corners a way leads around what is kept out, beside the clearance."""
+
+_FAR_M = 1e7
+_MAX_CORNERS = 1_000
+"""Of what a way leads around; with more of them, it leads around at a greater distance."""
+
+_LOOKS = 16
+"""At so many places of a part that lies outside is measured how far outside it is, and again
+around the farthest."""
+
+_NEAR_M, _NEAR_FACTOR = 1.0, 3.0
+"""A start in an exclusion may leave it by a way of this length, and this much for each metre that
+it is inside."""
 
 
 class Fence:
-    """An area that may not be left."""
+    """Where vehicles may be; public in `m2pem.api`.
 
-    def __init__(self, area: Area) -> None:
-        self._frame = LocalFrame(area.rings[0][0][:2])
-        self._edges: list[Edge] = []
-        for ring in area.rings:
-            self._edges += pairwise(self._frame.to_local(corner[:2]) for corner in ring)
+    `inclusion`: may not be left; None: no limit. `exclusions`: may not be entered; their holes may.
+    `clearance_m`: half of the width that a vehicle needs. `frame`: of `is_free`, `way` and
+    `closed`; None: one at the first corner. Rings that are not valid are made so.
+    """
+
+    def __init__(
+        self,
+        inclusion: Area | None,
+        exclusions: Sequence[Area] = (),
+        clearance_m: float = 0.0,
+        frame: LocalFrame | None = None,
+    ) -> None:
+        import shapely  # noqa: PLC0415  # slow to load
+
+        if frame is None:
+            first, *_ = (inclusion, *exclusions) if inclusion is not None else exclusions
+            frame = LocalFrame(first.rings[0][0][:2])
+        self.frame = frame
+        everywhere = shapely.box(-_FAR_M, -_FAR_M, _FAR_M, _FAR_M)
+        inside = everywhere
+        kept_out = [area_in(each.rings, frame) for each in exclusions]
+        if inclusion is not None:
+            inside = area_in(inclusion.rings[:1], frame).buffer(-clearance_m, join_style="mitre")
+            kept_out += [area_in([hole], frame) for hole in inclusion.rings[1:]]
+        self.closed: BaseGeometry = shapely.union_all(kept_out)
+        """The exclusions with the clearance, in metres of the frame."""
+        if clearance_m > 0:
+            self.closed = self.closed.buffer(clearance_m, join_style="mitre")
+        self._free = inside.difference(self.closed)
+        self._out = self.closed.union(everywhere.difference(inside))
+        self._deep, self._inner = _eroded(self._out, MARGIN_M), _eroded(self._out, GRAZE_M)
+        for each in (self._free, self._deep, self._inner):
+            shapely.prepare(each)
 
     def outside_m(self, place: LatLon) -> float:
         """How far a place is from where one may be; 0 inside."""
-        return self._outside_m(self._frame.to_local(place))
+        return self._outside_m(self.frame.to_local(place))
 
     def breach(
         self,
@@ -38,10 +89,11 @@ class Fence:
     ) -> str:
         """Where a way of straight lines leaves the fence; "" if it does not.
 
-        `start`: where the vehicle is. One that is outside already may come back. `name`: what
+        `start`: where the vehicle is. One that is outside of the inclusion may come in by a way
+        that is never farther out, one in an exclusion may leave it by a near way. `name`: what
         people call a point of the way.
         """
-        levels = [self._frame.to_local(place) for place in way]
+        levels = [self.frame.to_local(place) for place in way]
         for index, (place, level) in enumerate(zip(way, levels, strict=True)):
             if (by_m := self._outside_m(level)) > MARGIN_M:
                 return f"{name(index)}, {_text(place)}, is {_by(by_m)} outside the fleet's fence"
@@ -49,45 +101,184 @@ class Fence:
             (f"between {name(index)} and {name(index + 1)}", *ends)
             for index, ends in enumerate(pairwise(levels))
         ]
-        if start is not None and levels and self.outside_m(start) <= MARGIN_M:
-            ways.insert(0, (f"to {name(0)}", self._frame.to_local(start), levels[0]))
+        if start is not None and levels:
+            place = self.frame.to_local(start)
+            ways.insert(0, (f"to {name(0)}", self._entered(place, levels[0]), levels[0]))
         for ends, a, b in ways:
             if out := self._worst(a, b):
-                where = f"by {_by(out[1])} at {_text(self._frame.to_latlon(out[0]))}"
+                where = f"by {_by(out[1])} at {_text(self.frame.to_latlon(out[0]))}"
                 return f"the way {ends} leaves the fleet's fence {where}"
         return ""
 
+    def is_free(self, a: EastNorth, b: EastNorth) -> bool:
+        """Whether the straight way between two places enters nothing that is kept out."""
+        return self._are_free(a, [b])[0]
+
+    def way(self, a: EastNorth, b: EastNorth) -> list[EastNorth] | None:
+        """Return the places to pass between two places on the shortest way around what is kept out;
+        None: there is no way.
+
+        The way from, or to, a place that is kept out leads by the nearest one that is not.
+        """
+        if a == b or self.is_free(a, b):
+            return []
+        import rustworkx  # noqa: PLC0415  # as shapely
+
+        near = [self._nearest_free(each) for each in (a, b)]
+        ends = [place or end for place, end in zip(near, (a, b), strict=True)]
+        graph = self._corner_graph.copy()
+        start, end = (self._add(graph, place) for place in ends)
+        paths = rustworkx.dijkstra_shortest_paths(graph, start, target=end, weight_fn=float)
+        if end not in paths:
+            return None
+        between = [graph[at] for at in paths[end][1:-1]]
+        return [place for place in (near[0], *between, near[1]) if place is not None]
+
     def _outside_m(self, level: EastNorth) -> float:
-        if edges_enclose(self._edges, level):
-            return 0.0
-        return min(edge_distance_m(level, edge) for edge in self._edges)
+        import shapely  # noqa: PLC0415
+
+        distance_m = float(self._free.distance(shapely.Point(level)))
+        return math.inf if math.isnan(distance_m) else distance_m  # nothing is left of it
+
+    def _entered(self, a: EastNorth, b: EastNorth) -> EastNorth:
+        """Where the way from a place that may be outside is inside; the place itself if it leads
+        farther out, or through an exclusion."""
+        import shapely  # noqa: PLC0415
+
+        start = shapely.Point(a)
+        parts = _lines(shapely.LineString((a, b)).intersection(self._out))
+        first = min(parts, key=start.distance, default=None)
+        if first is None or start.distance(first) > MARGIN_M:
+            return a
+        length_m = max(math.dist(a, corner) for corner in first.coords)
+        depth_m = self._outside_m(a)
+        if self.closed.distance(start) <= MARGIN_M:
+            leads = length_m <= _NEAR_FACTOR * depth_m + _NEAR_M
+        else:
+            leads = self._deepest(first)[1] <= depth_m + MARGIN_M and not _lines(
+                first.intersection(self.closed)
+            )
+        return _between(a, b, min(1.0, length_m / math.dist(a, b))) if leads else a
 
     def _worst(self, a: EastNorth, b: EastNorth) -> tuple[EastNorth, float] | None:
         """Of the parts of a line that lie outside, the point farthest out, and how far."""
-        worst: tuple[EastNorth, float] | None = None
-        cuts = sorted({0.0, 1.0, *self._cuts(a, b)})
-        for low, high in pairwise(cuts):
-            if edges_enclose(self._edges, _between(a, b, (low + high) / 2)):
-                continue
-            for look in range(_LOOKS + 1):
-                level = _between(a, b, low + (high - low) * look / _LOOKS)
-                by_m = self._outside_m(level)
-                if by_m > MARGIN_M and (worst is None or by_m > worst[1]):
-                    worst = (level, by_m)
-        return worst
+        import shapely  # noqa: PLC0415
 
-    def _cuts(self, a: EastNorth, b: EastNorth) -> Iterator[float]:
-        """Where a line crosses edges, as parts of its length."""
-        de, dn = b[0] - a[0], b[1] - a[1]
-        for c, d in self._edges:
-            ce, cn = d[0] - c[0], d[1] - c[1]
-            cross = de * cn - dn * ce
-            if cross == 0.0:
-                continue
-            along = ((c[0] - a[0]) * cn - (c[1] - a[1]) * ce) / cross
-            across = ((c[0] - a[0]) * dn - (c[1] - a[1]) * de) / cross
-            if 0.0 < along < 1.0 and 0.0 <= across <= 1.0:
-                yield along
+        parts = _lines(shapely.LineString((a, b)).intersection(self._deep)) if a != b else ()
+        return max(map(self._deepest, parts), key=lambda deepest: deepest[1], default=None)
+
+    def _deepest(self, line: Any) -> tuple[EastNorth, float]:
+        """Return the point of a line that is farthest out, and how far."""
+        low, step, a, b = 0.0, 1.0 / _LOOKS, line.coords[0], line.coords[-1]
+        while True:
+            places = [_between(a, b, low + look * step) for look in range(_LOOKS + 1)]
+            depths = [self._outside_m(place) for place in places]
+            look = depths.index(max(depths))
+            if step * math.dist(a, b) < MARGIN_M:
+                return places[look], depths[look]
+            low += step * max(0, min(_LOOKS - 2, look - 1))
+            step *= 2 / _LOOKS
+
+    def _nearest_free(self, place: EastNorth) -> EastNorth | None:
+        """Return the nearest place that is not kept out; None: this one is not, or all are."""
+        import shapely  # noqa: PLC0415
+
+        point = shapely.Point(place)
+        room = self._free.buffer(-_AROUND_M, join_style="mitre")
+        if room.is_empty or not self._inner.intersects(point):
+            return None
+        nearest = shapely.shortest_line(room, point).coords[0]
+        return nearest[0], nearest[1]
+
+    def _are_free(self, place: EastNorth, others: Sequence[EastNorth]) -> list[bool]:
+        import shapely  # noqa: PLC0415
+
+        lines = shapely.linestrings([(place, other) for other in others])
+        return [not each for each in shapely.intersects(self._inner, lines)]
+
+    @cached_property
+    def _corner_graph(self) -> Any:
+        """The corners to go around, and the lengths of the free straight ways between them."""
+        import rustworkx  # noqa: PLC0415
+
+        around_m, corners = _AROUND_M, _corners(self._out.buffer(_AROUND_M, join_style="mitre"))
+        while len(corners) > _MAX_CORNERS:
+            around_m *= 2
+            grown = self._out.buffer(around_m, join_style="mitre")
+            corners = _corners(grown.simplify(around_m / 2))
+        graph = rustworkx.PyGraph()
+        for corner in corners:
+            self._add(graph, corner)
+        return graph
+
+    def _add(self, graph: Any, place: EastNorth) -> int:
+        """Add a place and the free straight ways from it; return its index."""
+        others = graph.nodes()
+        ways = [
+            (at, math.dist(place, others[at]))
+            for at, free in enumerate(self._are_free(place, others) if others else ())
+            if free
+        ]
+        index: int = graph.add_node(place)
+        graph.add_edges_from([(index, at, length_m) for at, length_m in ways])
+        return index
+
+
+def area_in(rings: Sequence[Sequence[Coordinate]], frame: LocalFrame) -> "BaseGeometry":
+    """Return the area that rings bound, made valid."""
+    import shapely  # noqa: PLC0415
+
+    outer, *holes = (
+        shapely.make_valid(
+            shapely.Polygon([frame.to_local(corner[:2]) for corner in ring]),
+            method="structure",
+            keep_collapsed=False,
+        )
+        for ring in rings
+    )
+    return outer.difference(shapely.union_all(holes))
+
+
+def polygons(geometry: "BaseGeometry") -> list[Any]:
+    """Return the polygons that a geometry is made of."""
+    return [part for part in _parts(geometry) if part.geom_type == "Polygon" and not part.is_empty]
+
+
+def _lines(geometry: "BaseGeometry") -> list[Any]:
+    return [part for part in _parts(geometry) if part.geom_type == "LineString" and part.length > 0]
+
+
+def _parts(geometry: "BaseGeometry") -> Iterable[Any]:
+    return getattr(geometry, "geoms", [geometry])
+
+
+def _eroded(geometry: "BaseGeometry", by_m: float) -> "BaseGeometry":
+    """Return what is deeper inside than a distance; of a part that is too thin, than less."""
+    import shapely  # noqa: PLC0415
+
+    return shapely.union_all(
+        [
+            part.buffer(-by_m) or part.buffer(-by_m / 10) or part.buffer(-by_m / 100)
+            for part in polygons(geometry)
+        ]
+    )
+
+
+def _corners(kept_out: "BaseGeometry") -> list[EastNorth]:
+    """Return the corners that a shortest way may pass: where what is kept out is convex."""
+    import shapely  # noqa: PLC0415
+
+    corners = []
+    for part in polygons(shapely.orient_polygons(kept_out)):  # what is kept out is to the left
+        for ring in (part.exterior, *part.interiors):
+            coords = [(x, y) for x, y, *_ in ring.coords[:-1]]
+            for a, b, c in zip(
+                (coords[-1], *coords), coords, (*coords[1:], coords[0]), strict=False
+            ):
+                turn = (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0])
+                if turn > 0 and max(map(abs, b)) < _FAR_M / 2:
+                    corners.append(b)
+    return corners
 
 
 def _between(a: EastNorth, b: EastNorth, part: float) -> EastNorth:

@@ -8,32 +8,25 @@ kept out. Several vehicles get passes in a row, by their speeds.
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from itertools import pairwise, product
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
-import rustworkx
 import shapely
 from shapely.geometry.base import BaseGeometry
 
+from m2pem.geo.fence import Fence, area_in, polygons
 from m2pem.geo.geojson import GeometryError
 from m2pem.geo.lawn_mower import lawn_mower
 from m2pem.geo.local_frame import EastNorth, LocalFrame
 from m2pem.geo.polygon import convex_hull, turned
 from m2pem.geo.work_shares import owners, reach_m, split
-from m2pem.mission.geometry import Area, Coordinate, Route
+from m2pem.mission.geometry import Area, Route
 
 MAX_PASSES = 2_000
 MAX_CORNERS = 500
 """Of the area and of all that is kept out together: the way around them is searched."""
 
 _TRIED_HEADINGS = 3
-_GRAZE_M = 0.01
-"""Ways may run along what is kept out."""
-
-_AROUND_M = 0.05
-"""How far from its corners a way leads around it, beside the clearance."""
-
 _SHORTEST_M = 0.01
 _SAME_HEADING_RAD = 1e-6
 _ROW_DIGITS = 4
@@ -135,12 +128,10 @@ def best_heading_rad(pattern: SurveyPattern) -> float:
 
 @dataclass
 class _Ground:
-    """What is surveyed and what is kept out, in metres. `inner`: where no way is."""
+    """What is surveyed, in metres, and what is kept out."""
 
     region: BaseGeometry
-    closed: BaseGeometry
-    inner: BaseGeometry
-    corners: list[EastNorth]
+    fence: Fence
 
     @classmethod
     def of(cls, pattern: SurveyPattern, frame: LocalFrame) -> "_Ground":
@@ -156,29 +147,12 @@ class _Ground:
             raise GeometryError(
                 f"the area and what is kept out have more than {MAX_CORNERS} corners: simplify them"
             )
-        outer, *holes = (_polygon(ring, frame) for ring in pattern.area.rings)
-        obstacles = [*holes, *(_whole(area, frame) for area in pattern.keep_out)]
-        closed: BaseGeometry = shapely.union_all(obstacles) if obstacles else shapely.Polygon()
-        if pattern.clearance_m > 0:
-            closed = closed.buffer(pattern.clearance_m, join_style="mitre")
-        region: BaseGeometry = (
-            outer.buffer(pattern.margin_m, join_style="mitre") if pattern.margin_m else outer
-        )
-        region = region.difference(closed)
-        around = closed.buffer(_AROUND_M, join_style="mitre")
-        corners = [
-            (x, y)
-            for part in _polygons(around)
-            for ring in (part.exterior, *part.interiors)
-            for x, y, *_ in ring.coords[:-1]
-        ]
-        inner = closed.buffer(-_GRAZE_M, join_style="mitre")
-        shapely.prepare(inner)
-        return cls(region, closed, inner, corners)
-
-    def free(self, a: EastNorth, b: EastNorth) -> bool:
-        """Whether the straight way between two places enters nothing that is kept out."""
-        return not self.inner.intersects(shapely.LineString((a, b)))
+        outer, *holes = (Area((ring,)) for ring in pattern.area.rings)
+        fence = Fence(None, [*holes, *pattern.keep_out], pattern.clearance_m, frame)
+        region = area_in(outer.rings, frame)
+        if pattern.margin_m:
+            region = region.buffer(pattern.margin_m, join_style="mitre")
+        return cls(region.difference(fence.closed), fence)
 
     def way(self, a: EastNorth, b: EastNorth) -> list[EastNorth]:
         """Return the places to pass between two places on the shortest way around.
@@ -186,57 +160,19 @@ class _Ground:
         Raises:
             GeometryError: there is none.
         """
-        if a == b or self.free(a, b):
-            return []
-        graph = self._corner_graph.copy()
-        start, end = self._add(graph, a), self._add(graph, b)
-        paths = rustworkx.dijkstra_shortest_paths(graph, start, target=end, weight_fn=float)
-        if end not in paths:
+        if (places := self.fence.way(a, b)) is None:
             raise GeometryError(
                 "a part of the area cannot be reached without entering what is kept out: "
                 "survey the parts on their own"
             )
-        return [graph[at] for at in paths[end][1:-1]]
-
-    @cached_property
-    def _corner_graph(self) -> rustworkx.PyGraph:
-        """The corners, and the lengths of the free straight ways between them."""
-        graph: rustworkx.PyGraph = rustworkx.PyGraph()
-        for corner in self.corners:
-            self._add(graph, corner)
-        return graph
-
-    def _add(self, graph: rustworkx.PyGraph, place: EastNorth) -> int:
-        """Add a place and the free straight ways from it; return its index."""
-        ways = [
-            (at, math.dist(place, graph[at]))
-            for at in graph.node_indices()
-            if self.free(place, graph[at])
-        ]
-        index: int = graph.add_node(place)
-        graph.add_edges_from([(index, at, length_m) for at, length_m in ways])
-        return index
-
-
-def _polygon(ring: Sequence[Coordinate], frame: LocalFrame) -> shapely.Polygon:
-    return shapely.Polygon([frame.to_local(corner[:2]) for corner in ring])
-
-
-def _whole(area: Area, frame: LocalFrame) -> BaseGeometry:
-    outer, *holes = (_polygon(ring, frame) for ring in area.rings)
-    return outer.difference(shapely.union_all(holes)) if holes else outer
-
-
-def _polygons(geometry: BaseGeometry) -> list[Any]:
-    parts = getattr(geometry, "geoms", [geometry])
-    return [part for part in parts if part.geom_type == "Polygon" and not part.is_empty]
+        return places
 
 
 def _yaw(pattern: SurveyPattern, ground: _Ground) -> float:
     """Return the direction of the passes, from east, counter-clockwise, in rad."""
     if pattern.heading_rad is not None:
         return math.pi / 2 - pattern.heading_rad
-    corners = [place for part in _polygons(ground.region) for place in part.exterior.coords]
+    corners = [place for part in polygons(ground.region) for place in part.exterior.coords]
     hull = convex_hull((x, y) for x, y, *_ in corners)
     if len(hull) < 3:
         return 0.0
@@ -257,7 +193,7 @@ def _width_m(hull: Sequence[EastNorth], yaw: float) -> float:
 def _passes(pattern: SurveyPattern, ground: _Ground, yaw: float) -> list[Pass]:
     """Return the passes in the order in which they are flown or driven."""
     cells: list[_Cell] = []
-    for part in _polygons(ground.region):
+    for part in polygons(ground.region):
         rings = [[(x, y) for x, y, *_ in ring.coords] for ring in (part.exterior, *part.interiors)]
         if _width_m(rings[0], yaw) > MAX_PASSES * pattern.spacing_m:
             raise GeometryError(
@@ -267,7 +203,7 @@ def _passes(pattern: SurveyPattern, ground: _Ground, yaw: float) -> list[Pass]:
         rows: dict[float, list[tuple[float, float]]] = {}
         points = lawn_mower(rings, pattern.spacing_m, yaw)
         for a, b in zip(points[::2], points[1::2], strict=True):
-            for start, end in _outside((a, b), ground.closed):
+            for start, end in _outside((a, b), ground.fence.closed):
                 (ax, ay), (bx, _) = turned(start, yaw), turned(end, yaw)
                 rows.setdefault(round(ay, _ROW_DIGITS), []).append((min(ax, bx), max(ax, bx)))
         cells += _cells([(y, sorted(spans)) for y, spans in sorted(rows.items())])
@@ -386,7 +322,7 @@ def _beyond(a: EastNorth, b: EastNorth, by_m: float, ground: _Ground) -> EastNor
     if by_m <= 0 or length <= 0:
         return b
     place = (b[0] + (b[0] - a[0]) * by_m / length, b[1] + (b[1] - a[1]) * by_m / length)
-    return place if ground.free(b, place) else b
+    return place if ground.fence.is_free(b, place) else b
 
 
 def _length_m(lines: Sequence[Pass]) -> float:

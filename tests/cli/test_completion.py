@@ -91,7 +91,7 @@ def test_completion_imports_nothing_slow(m2pem: CommandLine, words: str) -> None
         COMP_CWORD=str(1 + words.count(" ")),
     )[2]
     assert "m2pem.cli.completers" in imported
-    slow = ("lxml", "pydantic", "ruamel", "rustworkx", "numpy", "fastapi")
+    slow = ("lxml", "pydantic", "ruamel", "rustworkx", "numpy", "shapely", "fastapi")
     assert [name for name in slow if f" {name}\n" in imported] == []
 
 
