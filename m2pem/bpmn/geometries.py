@@ -6,7 +6,7 @@ import re
 from lxml import etree
 
 from m2pem.bpmn.context import ReadingContext
-from m2pem.bpmn.rules.behaviors import BAD_GEOMETRY
+from m2pem.bpmn.rules.behaviors import BAD_GEOMETRY, MENDED_GEOMETRY
 from m2pem.bpmn.xml import BPMN, M2PEM
 from m2pem.geo.geojson import GeometryError, parse_geojson
 
@@ -34,7 +34,12 @@ def _read(context: ReadingContext, element: etree._Element, process: str) -> Non
         refuse(f"two geometries are named '{name}'", "rename one, and the parameters that mean it")
     else:
         try:
-            context.geometries[name] = parse_geojson(_object(element.text or ""))
+            context.geometries[name] = parse_geojson(
+                _object(element.text or ""),
+                lambda said: context.findings.warning(
+                    element, process, MENDED_GEOMETRY, f"geometry '{name}': {said}"
+                ),
+            )
         except GeometryError as error:
             refuse(f"geometry '{name}' {error}", "draw it again, or write GeoJSON (RFC 7946)")
 

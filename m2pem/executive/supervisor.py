@@ -76,7 +76,7 @@ from m2pem.fleet.allocation import Availability, resources_of_mission
 from m2pem.fleet.approval import is_named
 from m2pem.fleet.fleet import Fleet
 from m2pem.fleet.space import waits_for_space
-from m2pem.geo.geojson import GeometryError, parse_geojson
+from m2pem.geo.geojson import GeometryError, as_geojson, parse_geojson
 from m2pem.geo.positions import NO_ORIGIN, geometry_out_of_reach
 from m2pem.journal.base import Journal
 from m2pem.mission.catalogue import ResourceId
@@ -578,13 +578,19 @@ class Supervisor:
         Raises:
             OperatorError: it is no geometry that m2pem knows.
         """
+        said: list[str] = []
         try:
-            parsed = parse_geojson(geometry)
+            parsed = parse_geojson(geometry, said.append)
         except GeometryError as error:
             raise OperatorError(f"geometry {name!r} {error}") from error
         origin = self.fleet.origin
         if origin != NO_ORIGIN and (wrong := geometry_out_of_reach(parsed, origin)):
             raise OperatorError(f"geometry {name!r}: {wrong[0]}; {wrong[1]}")
+        if said:
+            geometry = as_geojson(parsed)
+            self.events.publish(
+                Alert(run or RunId(""), "GEOMETRY", f"geometry {name!r}: {said[0]}")
+            )
         item = GeometrySet(name, dict(geometry), by)
         if run is None:
             self.drawings.change(name, geometry, by)

@@ -60,7 +60,12 @@ def _read(
         raise GeometryError("a JSON object is expected")
     if not is_wgs84(value.get("crs")):
         return _only_one(path, content, kind, warn)
-    return parse_geojson(value)
+    said: list[str] = []
+    geometry = parse_geojson(value, said.append)
+    if warn is not None:
+        for each in said:
+            warn(FileProblem(Severity.WARNING, "", each, kind=kind))
+    return geometry
 
 
 def _only_one(

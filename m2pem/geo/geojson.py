@@ -9,13 +9,13 @@ route's property `"speeds_m_s"` has a speed or null for each position (`Route.sp
 import json
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NoReturn
 
 from m2pem.errors import M2pemError
 from m2pem.geo.geoid import mean_sea_level_m
-from m2pem.geo.polygon import ring_problem
+from m2pem.geo.polygon import mended, ring_problem
 from m2pem.mission.geometry import Area, Coordinate, Geometry, Point, Route
 from m2pem.suggestions import suggest
 from m2pem.units import article
@@ -56,15 +56,18 @@ class GeometryError(M2pemError, ValueError):
         self.remedy = remedy
 
 
-def parse_geojson(value: Mapping[str, Any]) -> Point | Route | Area:
+def parse_geojson(
+    value: Mapping[str, Any], said: Callable[[str], object] | None = None
+) -> Point | Route | Area:
     """Read a GeoJSON geometry, Feature, or FeatureCollection of one feature.
 
-    A LineString or MultiPoint is a `Route`, a Polygon an `Area`, a Point a `Point`.
+    A LineString or MultiPoint is a `Route`, a Polygon an `Area`, a Point a `Point`. `said`: takes
+    what was changed of it, so that it is valid.
 
     Raises:
         GeometryError: not GeoJSON, another type, a position out of range, a ring not closed.
     """
-    return above_sea_level(_parse(value, "relative", depth=0))
+    return above_sea_level(_parse(value, "relative", 0, said))
 
 
 def above_sea_level(geometry: Point | Route | Area) -> Point | Route | Area:
@@ -117,7 +120,9 @@ def _written(place: Coordinate) -> list[Any]:
     return level if altitude_m is None else [*level, altitude_m]
 
 
-def _parse(value: object, altitude_frame: str, depth: int) -> Point | Route | Area:
+def _parse(
+    value: object, altitude_frame: str, depth: int, said: Callable[[str], object] | None
+) -> Point | Route | Area:
     if not isinstance(value, Mapping):
         raise GeometryError("is not GeoJSON: an object with 'type' is expected")
     check_crs(value)
@@ -127,7 +132,7 @@ def _parse(value: object, altitude_frame: str, depth: int) -> Point | Route | Ar
         if not isinstance(features, list) or len(features) != 1:
             count = len(features) if isinstance(features, list) else "no"
             raise GeometryError(f"has {count} features; one geometry is expected")
-        return _parse(features[0], altitude_frame, depth=1)
+        return _parse(features[0], altitude_frame, 1, said)
     if kind == "Feature" and depth <= 1:
         given = value.get("properties")
         properties: Mapping[str, Any] = given if isinstance(given, Mapping) else {}
@@ -136,7 +141,7 @@ def _parse(value: object, altitude_frame: str, depth: int) -> Point | Route | Ar
             frame = ""
             if isinstance(member, Mapping):
                 member = {**member, "coordinates": _level(member.get("coordinates"))}
-        geometry = _parse(member, checked_frame(frame or "relative"), depth=2)
+        geometry = _parse(member, checked_frame(frame or "relative"), 2, said)
         geometry = with_frames(geometry, properties.get(FRAMES))
         return with_speeds(geometry, properties.get(SPEEDS))
     coordinates = value.get("coordinates")
@@ -149,7 +154,7 @@ def _parse(value: object, altitude_frame: str, depth: int) -> Point | Route | Ar
         if not isinstance(coordinates, list | tuple) or not coordinates:
             raise GeometryError("coordinates: a Polygon is a list of rings")
         rings = tuple(_ring(ring, f"coordinates[{i}]") for i, ring in enumerate(coordinates))
-        return Area(checked(rings), altitude_frame)
+        return Area(checked(rings, said), altitude_frame)
     hint = suggest(str(kind), _TYPES, "types")
     raise GeometryError(f"GeoJSON type {kind!r} is not a route, area or point; {hint}")
 
@@ -267,15 +272,25 @@ def closed_ring(corners: Sequence[Coordinate], where: str = "") -> tuple[Coordin
     return tuple(corners) if is_closed else (*corners, corners[0])
 
 
-def checked(rings: tuple[tuple[Coordinate, ...], ...]) -> tuple[tuple[Coordinate, ...], ...]:
-    """The closed rings of an area.
+def checked(
+    rings: tuple[tuple[Coordinate, ...], ...], said: Callable[[str], object] | None = None
+) -> tuple[tuple[Coordinate, ...], ...]:
+    """The closed rings of an area, without parts that have no area: an edge that goes out and back.
+
+    `said`: takes what was changed.
 
     Raises:
         GeometryError: an edge crosses another or the antimeridian, or a hole lies outside.
     """
-    if problem := ring_problem(rings):
+    problem = ring_problem(rings)
+    if not problem:
+        return rings
+    valid = mended(rings)
+    if valid is None:
         raise GeometryError(problem)
-    return rings
+    if said is not None:
+        said(f"{problem.partition(';')[0]}: mended, its area is the same")
+    return valid
 
 
 def _positions(value: object, where: str, minimum: int) -> tuple[Coordinate, ...]:

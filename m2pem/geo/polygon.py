@@ -22,6 +22,9 @@ Hull: TypeAlias = tuple[EastNorth, ...]
 
 MAX_CORNERS = 10_000
 
+_SAME_AREA = 1e-9
+"""Of the area: rings that were made valid have lost no more."""
+
 BUFFER_SIDES = 16
 """Sides of the polygon that stands for a circle, and lies around it."""
 
@@ -240,22 +243,59 @@ def region_of(geometry: Geometry, width_m: float | None, frame: LocalFrame) -> R
 def ring_problem(rings: Sequence[Sequence[Coordinate]]) -> str:
     """What keeps closed rings from bounding an area, with its edges; "" if nothing does.
 
-    No edge may cross another or the antimeridian (RFC 7946, 3.1.9), and each hole lies within the
-    outer ring and in no other hole. Rings may touch in corners.
+    No edge may cross another, go back along it, or cross the antimeridian (RFC 7946, 3.1.9), and
+    each hole lies within the outer ring and in no other hole. Rings may touch in corners.
     """
+    if problem := _limit_problem(rings):
+        return problem
+    for a, b in _overlapping(_edges_of(rings)):
+        if does := _crosses(a, b):
+            return f"its edge {_text(a)} {does} its edge {_text(b)}; a ring may not cross itself"
+    return next(filter(None, map(_eight_problem, rings)), "") or _hole_problem(rings)
+
+
+def mended(rings: Sequence[Sequence[Coordinate]]) -> tuple[tuple[Coordinate, ...], ...] | None:
+    """Return closed rings without the parts that have no area, such as an edge that goes out and
+    back; None: that is not all that is wrong with them.
+
+    Shapely makes them valid. It is imported here, as it is slow to load and seldom needed.
+    """
+    if _limit_problem(rings):
+        return None
+    import shapely  # noqa: PLC0415
+
+    heights = {corner[:2]: corner[2] for ring in rings for corner in ring}
+    outer, *holes = ([corner[:2] for corner in ring] for ring in rings)
+    drawn = shapely.Polygon(outer, holes)
+    valid = shapely.make_valid(drawn, method="structure", keep_collapsed=False)
+    if not isinstance(valid, shapely.Polygon) or valid.is_empty:
+        return None
+    if abs(valid.area - drawn.area) > _SAME_AREA * drawn.area:
+        return None
+    return tuple(
+        tuple((*at, heights[_nearest_corner(heights, at)]) for at in ring.coords)
+        for ring in (valid.exterior, *valid.interiors)
+    )
+
+
+def _nearest_corner(corners: Iterable[LatLon], place: LatLon) -> LatLon:
+    return min(corners, key=lambda corner: math.dist(corner, place))
+
+
+def _limit_problem(rings: Sequence[Sequence[Coordinate]]) -> str:
     if sum(map(len, rings)) > MAX_CORNERS:
         return f"has more than {MAX_CORNERS:,} corners; simplify it"
-    edges = [edge for ring in rings for edge in pairwise(c[:2] for c in ring) if edge[0] != edge[1]]
-    for edge in edges:
+    for edge in _edges_of(rings):
         if abs(edge[1][1] - edge[0][1]) > 180.0:
             return (
                 f"its edge {_text(edge)} crosses the antimeridian (longitude 180); "
                 "use an area for each side of it"
             )
-    for a, b in _overlapping(edges):
-        if _crosses(a, b):
-            return f"its edge {_text(a)} crosses its edge {_text(b)}; a ring may not cross itself"
-    return _hole_problem(rings)
+    return ""
+
+
+def _edges_of(rings: Sequence[Sequence[Coordinate]]) -> list[Edge]:
+    return [edge for ring in rings for edge in pairwise(c[:2] for c in ring) if edge[0] != edge[1]]
 
 
 def _overlapping(edges: list[Edge]) -> Iterator[tuple[Edge, Edge]]:
@@ -271,18 +311,19 @@ def _overlapping(edges: list[Edge]) -> Iterator[tuple[Edge, Edge]]:
         active.append(index)
 
 
-def _crosses(a: Edge, b: Edge) -> bool:
-    """Whether two edges have more in common than a corner of both."""
+def _crosses(a: Edge, b: Edge) -> str:
+    """What an edge does to another; "" if they have no more in common than a corner of both."""
     sides = [_side(*a, b[0]), _side(*a, b[1]), _side(*b, a[0]), _side(*b, a[1])]
     if sides[0] * sides[1] < 0 and sides[2] * sides[3] < 0:
-        return True
-    if set(a) & set(b):
-        return False
-    touches = ((a, b[0]), (a, b[1]), (b, a[0]), (b, a[1]))
-    return any(
-        side == 0 and _within(corner, edge)
-        for side, (edge, corner) in zip(sides, touches, strict=True)
+        return "crosses"
+    common = set(a) & set(b)
+    touched = any(
+        side == 0 and corner not in common and _within(corner, edge)
+        for side, edge, corner in zip(sides, (a, a, b, b), (*b, *a), strict=True)
     )
+    if touched or len(common) == 2:
+        return "goes along" if common else "crosses"
+    return ""
 
 
 def _side(a: LatLon, b: LatLon, c: LatLon) -> int:
@@ -293,6 +334,24 @@ def _side(a: LatLon, b: LatLon, c: LatLon) -> int:
 
 def _within(corner: LatLon, edge: Edge) -> bool:
     return all(min(a, b) <= at <= max(a, b) for a, b, at in zip(*edge, corner, strict=True))
+
+
+def _eight_problem(ring: Sequence[Coordinate]) -> str:
+    """Where a ring crosses itself in a corner that it passes twice."""
+    first: dict[LatLon, int] = {}
+    for index, corner in enumerate(ring[:-1]):
+        begin = first.setdefault(corner[:2], index)
+        if index - begin < 3:
+            continue
+        loop, rest = [*ring[begin : index + 1]], [*ring[: begin + 1], *ring[index + 1 :]]
+        nested = _any_inside(loop, rest) or _any_inside(rest, loop)
+        if not nested and _doubled_area(loop) * _doubled_area(rest) < 0:
+            return f"it crosses itself at its corner [{corner[0]:.9g}, {corner[1]:.9g}]"
+    return ""
+
+
+def _doubled_area(ring: Sequence[Coordinate]) -> float:
+    return sum(_turn(ring[0][:2], a[:2], b[:2]) for a, b in pairwise(ring))
 
 
 def _hole_problem(rings: Sequence[Sequence[Coordinate]]) -> str:

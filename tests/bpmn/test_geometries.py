@@ -63,3 +63,12 @@ def test_all_processes_of_a_file_have_one_space_of_names() -> None:
     ).replace('id="', 'id="q').replace('Ref="', 'Ref="q')
     (found,) = findings(definitions(both))
     assert (found.rule, found.element) == ("bad-geometry", "qQ")
+
+
+def test_an_edge_that_goes_out_and_back_is_left_out_with_a_warning() -> None:
+    spike = AREA.replace("[7.1, 50.1]", "[7.1, 50.1], [7.2, 50.2], [7.1, 50.1]")
+    mission = load(definitions(with_geometries(geometry("field", spike))))
+    (found,) = mission.warnings
+    assert (found.rule, found.element) == ("mended-geometry", "P")
+    assert "geometry 'field': its edge from [50.1, 7.1]" in found.message
+    assert len(mission.geometries["field"].rings[0]) == 4

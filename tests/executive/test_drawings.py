@@ -42,6 +42,31 @@ def test_versions_are_kept_and_a_deleted_drawing_is_gone(play: Any) -> None:
     assert [each.number for each in versions] == [1, 2, 3]
 
 
+def test_an_area_is_mended_once_and_operators_read_of_it(play: Any) -> None:
+    ring = [
+        [7.0, 50.0],
+        [7.1, 50.0],
+        [7.1, 50.1],
+        [7.1, 50.2],
+        [7.1, 50.1],
+        [7.0, 50.1],
+        [7.0, 50.0],
+    ]
+    spike = {"type": "Polygon", "coordinates": [ring]}
+
+    async def story(world: World) -> Any:
+        control = world.executive.control
+        await control.set_geometry("field", spike, by="anna")
+        return control.geometries()["field"].geometry, await control.alerts()
+
+    kept, alerts = play(story)
+    assert kept["geometry"]["coordinates"] == [
+        [[7.0, 50.0], [7.1, 50.0], [7.1, 50.1], [7.0, 50.1], [7.0, 50.0]]
+    ]
+    (alert,) = alerts
+    assert "geometry 'field': its edge from [50.1, 7.1] to [50.2, 7.1]" in alert.text
+
+
 def test_the_next_executive_knows_them(play: Any) -> None:
     journal = MemoryJournal()
 

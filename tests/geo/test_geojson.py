@@ -165,7 +165,7 @@ def test_kinds_have_the_names_that_people_use() -> None:
         Point((38.1, -77.3, None), "amsl"),
         Route(((38.1, -77.3, 1.0), (38.2, -77.4, None)), "relative"),
         Route(((38.1, -77.3, None),), "relative"),
-        Area((tuple((38.0 + x, -77.0, None) for x in (0, 0.1, 0.2, 0)),)),
+        Area((tuple((38.0 + x, -77.0 + x * x, None) for x in (0, 0.1, 0.2, 0)),)),
     ],
 )
 def test_a_geometry_is_read_back_as_it_was_written(geometry: Point | Route | Area) -> None:

@@ -86,6 +86,12 @@ BAD_GEOMETRY = error(
     "a route, area or point of the mission has no name of its own, or is no GeoJSON",
     "the message says what is expected",
 )
+MENDED_GEOMETRY = warning(
+    318,
+    "mended-geometry",
+    "an area of the mission has an edge that goes out and back",
+    "draw it again, if it is not as you mean it",
+)
 DUPLICATE_PROPERTY = error(
     221,
     "duplicate-property",

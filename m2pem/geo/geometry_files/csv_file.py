@@ -4,6 +4,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from csv import Error, reader, writer
 from dataclasses import dataclass
+from functools import partial
 from io import StringIO
 from itertools import islice, zip_longest
 from typing import TypeAlias
@@ -169,7 +170,7 @@ def read_csv(content: bytes, contents: Contents) -> None:
         with contents.feature(f"line {group[0][0]} {name!r}" if name else ""):
             # One after the other: with all rows as mappings a table takes three times the memory.
             rows_of_it = ((number, _cells(row, columns, is_litchi)) for number, row in group)
-            contents.add(name, _geometry(rows_of_it, columns, contents.kind))
+            contents.add(name, _geometry(rows_of_it, columns, name, contents))
 
 
 def _cells(row: Sequence[str], columns: Mapping[str, Column], is_litchi: bool) -> _Cells:
@@ -310,9 +311,9 @@ def _words(text: str) -> list[str]:
 
 
 def _geometry(
-    rows: Iterable[tuple[int, _Cells]], columns: Mapping[str, Column], default: str
+    rows: Iterable[tuple[int, _Cells]], columns: Mapping[str, Column], name: str, contents: Contents
 ) -> Point | Route | Area:
-    kind = ""
+    kind, default = "", contents.kind
     frames: list[str] = []
     rings: dict[str, list[Coordinate]] = {}
     speeds = []
@@ -341,7 +342,10 @@ def _geometry(
     kind = kind or default or ("route" if len(places) > 1 or any(speeds) else "point")
     geometry: Point | Route | Area
     if kind == "area":
-        geometry = Area(checked(tuple(map(closed_ring, rings.values()))), frames[0])
+        geometry = Area(
+            checked(tuple(map(closed_ring, rings.values())), partial(contents.warn, name)),
+            frames[0],
+        )
     elif kind == "point":
         if len(places) > 1:
             raise GeometryError(f"has {len(places)} positions; a point is one")

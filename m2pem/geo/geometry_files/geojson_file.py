@@ -3,6 +3,7 @@
 import json
 import re
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from m2pem.geo.geojson import (
@@ -104,7 +105,10 @@ def read_feature(
             if system.has_heights and not frame:
                 properties = {**given, "altitude_frame": "amsl"}
         read = [
-            parse_geojson({"type": "Feature", "properties": properties, "geometry": part})
+            parse_geojson(
+                {"type": "Feature", "properties": properties, "geometry": part},
+                partial(contents.warn, where),
+            )
             for part in parts
         ]
         for part in read:

@@ -7,6 +7,7 @@ a route's waypoints.
 
 import json
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from itertools import chain
 from posixpath import dirname, join, normpath
 from urllib.parse import unquote
@@ -174,7 +175,7 @@ def _geometry(
         ]
         if not rings:
             raise GeometryError("a polygon has an outerBoundaryIs")
-        return Area(checked(tuple(map(closed_ring, rings))), frame)
+        return Area(checked(tuple(map(closed_ring, rings)), partial(contents.warn, where)), frame)
     if local == "Track":
         positions = _track(element, keeps, where, contents)
     else:

@@ -5,8 +5,9 @@ vehicle would fly another way than the file says. `mission_commands` says which.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 from m2pem.findings import Severity
 from m2pem.geo.geojson import GeometryError, checked, closed_ring, coordinate
@@ -246,7 +247,7 @@ class MissionReader:
             self._corners.append(place[:2])
             if len(self._corners) == item.params[0]:
                 corners, self._corners = self._corners, []
-                self.contents.add(name, polygon(corners))
+                self.contents.add(name, polygon(corners, partial(self.contents.warn, item.where)))
         elif name:
             self.contents.add(name, circle(place[:2], item.params[0], name == "fence"))
         else:
@@ -276,13 +277,13 @@ def _frame(item: MissionItem) -> str:
     return _FRAMES[item.frame]
 
 
-def polygon(corners: Sequence[LatLon]) -> Area:
-    """Return an area with these corners.
+def polygon(corners: Sequence[LatLon], said: Callable[[str], object] | None = None) -> Area:
+    """Return an area with these corners. `said`: takes what was mended.
 
     Raises:
         GeometryError: there are less than three, or they bound no area.
     """
-    return Area(checked((closed_ring([(*corner, None) for corner in corners]),)))
+    return Area(checked((closed_ring([(*corner, None) for corner in corners]),), said))
 
 
 def circle(center: LatLon, radius_m: float | None, is_inside: bool) -> Area:

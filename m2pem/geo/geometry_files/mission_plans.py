@@ -6,6 +6,7 @@ https://mavlink.io/en/file_formats/.
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from itertools import count, zip_longest
 from typing import Any
 
@@ -132,7 +133,7 @@ def _read_complex(
     with contents.feature(where):
         if kind in _PATTERNS:
             is_corridor = kind == "CorridorScan"
-            area = _corridor(item) if is_corridor else _polygon(item.get("polygon"), "polygon")
+            area = _corridor(item) if is_corridor else _polygon(item, where, contents)
             contents.add("corridor" if is_corridor else kind, area)
             style = _mapping(item.get("TransectStyleComplexItem"))
             old, camera = _mapping(item.get("grid")), _mapping(style.get("CameraCalc"))
@@ -187,11 +188,11 @@ def _read_fence(plan: Mapping[str, Any], contents: Contents) -> None:
                 if isinstance(shape, Mapping):
                     contents.add(name, _circle(shape, where, name))
                 else:
-                    contents.add(name, _polygon(shape, f"{where}.{key}"))
+                    contents.add(name, _polygon(_mapping(each), where, contents))
     fence = _mapping(plan.get("geoFence"))
     if fence.get("polygon"):  # as QGroundControl wrote it at first
         with contents.feature("geoFence.polygon", "area"):
-            contents.add("fence", _polygon(fence["polygon"], "geoFence.polygon"))
+            contents.add("fence", _polygon(fence, "geoFence", contents))
     if fence.get("breachReturn"):
         with contents.feature("geoFence.breachReturn", "point"):
             contents.add("fence_return", Point(_place_of(fence["breachReturn"], "breachReturn")))
@@ -203,10 +204,12 @@ def _circle(shape: Mapping[str, Any], where: str, name: str) -> Area:
     return circle(_corner(shape.get("center"), where), radius_m, name == "fence")
 
 
-def _polygon(corners: object, where: str) -> Area:
+def _polygon(shape: Mapping[str, Any], where: str, contents: Contents) -> Area:
+    corners = shape.get("polygon")
     if not isinstance(corners, list) or len(corners) < 3:
-        raise GeometryError(f"{where}: at least three corners are expected")
-    return polygon([_corner(each, f"{where}[{index}]") for index, each in enumerate(corners)])
+        raise GeometryError("polygon: at least three corners are expected")
+    places = [_corner(each, f"polygon[{index}]") for index, each in enumerate(corners)]
+    return polygon(places, partial(contents.warn, where))
 
 
 def _corner(value: object, where: str) -> LatLon:
