@@ -83,6 +83,11 @@ if TYPE_CHECKING:
     from m2pem.api.exporter import ExportOptions as ExportOptions
     from m2pem.api.face import Face as Face
     from m2pem.api.face import FaceSettings as FaceSettings
+    from m2pem.api.fence_check import BEHIND_RAD as BEHIND_RAD
+    from m2pem.api.fence_check import OFFSET_M as OFFSET_M
+    from m2pem.api.fence_check import FenceCheck as FenceCheck
+    from m2pem.api.fence_check import known_yaw_rad as known_yaw_rad
+    from m2pem.api.fence_check import stance_on as stance_on
     from m2pem.api.follower import Follower as Follower
     from m2pem.api.follower import Listener as Listener
     from m2pem.api.follower import follow as follow
@@ -335,6 +340,7 @@ _MODULES = {
     "m2pem.fleet.behaviors": "SHARED",
     "m2pem.geo.cameras": "ImagePlan KNOWN_CAMERAS SurveyCamera image_plan",
     "m2pem.geo.fence": "Fence",
+    "m2pem.api.fence_check": "BEHIND_RAD FenceCheck OFFSET_M known_yaw_rad stance_on",
     "m2pem.fleet.endurance": "lasts_s",
     "m2pem.fleet.approval": "file_digest person_of",
     "m2pem.fleet.fleet": "Fleet",

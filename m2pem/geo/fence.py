@@ -104,11 +104,19 @@ class Fence:
         if start is not None and levels:
             place = self.frame.to_local(start)
             ways.insert(0, (f"to {name(0)}", self._entered(place, levels[0]), levels[0]))
-        for ends, a, b in ways:
-            if out := self._worst(a, b):
-                where = f"by {_by(out[1])} at {_text(self.frame.to_latlon(out[0]))}"
-                return f"the way {ends} leaves the fleet's fence {where}"
+        for ends, *leg in ways:
+            if out := self._worst(leg):
+                return f"the way {ends} leaves the fleet's fence {out}"
         return ""
+
+    def leaves(self, track: Sequence[EastNorth]) -> str:
+        """As `breach`, of a track in the local frame, from where it is inside for the first time.
+
+        It may have many points: those of curves, too.
+        """
+        inside = (at for at, place in enumerate(track) if self._outside_m(place) <= MARGIN_M)
+        out = self._worst(track[next(inside, 0) :])
+        return f"its way leaves the fleet's fence {out}" if out else ""
 
     def is_free(self, a: EastNorth, b: EastNorth) -> bool:
         """Whether the straight way between two places enters nothing that is kept out."""
@@ -155,21 +163,22 @@ class Fence:
         if self.closed.distance(start) <= MARGIN_M:
             leads = length_m <= _NEAR_FACTOR * depth_m + _NEAR_M
         else:
-            leads = self._deepest(first)[1] <= depth_m + MARGIN_M and not _lines(
-                first.intersection(self.closed)
-            )
+            _, deepest_m = self._deepest(first.coords[0], first.coords[-1])
+            leads = deepest_m <= depth_m + MARGIN_M and not first.intersection(self.closed).length
         return _between(a, b, min(1.0, length_m / math.dist(a, b))) if leads else a
 
-    def _worst(self, a: EastNorth, b: EastNorth) -> tuple[EastNorth, float] | None:
-        """Of the parts of a line that lie outside, the point farthest out, and how far."""
+    def _worst(self, way: Sequence[EastNorth]) -> str:
+        """Of the parts of a way that lie outside, how far the farthest point is out, and where."""
         import shapely  # noqa: PLC0415
 
-        parts = _lines(shapely.LineString((a, b)).intersection(self._deep)) if a != b else ()
-        return max(map(self._deepest, parts), key=lambda deepest: deepest[1], default=None)
+        parts = _lines(shapely.LineString(way).intersection(self._deep)) if len(way) > 1 else ()
+        legs = (self._deepest(*leg) for part in parts for leg in pairwise(part.coords))
+        place, by_m = max(legs, key=lambda deepest: deepest[1], default=((0.0, 0.0), 0.0))
+        return f"by {_by(by_m)} at {_text(self.frame.to_latlon(place))}" if by_m > 0 else ""
 
-    def _deepest(self, line: Any) -> tuple[EastNorth, float]:
+    def _deepest(self, a: EastNorth, b: EastNorth) -> tuple[EastNorth, float]:
         """Return the point of a line that is farthest out, and how far."""
-        low, step, a, b = 0.0, 1.0 / _LOOKS, line.coords[0], line.coords[-1]
+        low, step = 0.0, 1.0 / _LOOKS
         while True:
             places = [_between(a, b, low + look * step) for look in range(_LOOKS + 1)]
             depths = [self._outside_m(place) for place in places]

@@ -155,6 +155,19 @@ def _bend(before: Line, after: Line, radius_m: float) -> tuple[Bend | None, floa
     return bend, cut_m
 
 
+_LOOK_RAD = math.radians(3)
+
+
+def track_of(plan: Plan[Pose]) -> list[tuple[float, float]]:
+    """Return the places on the map that a plan passes, with many of a curve."""
+    track = []
+    for phase in plan.phases:
+        steps = max(1, math.ceil(abs(phase.sweep) / _LOOK_RAD)) if isinstance(phase, Curve) else 1
+        times = (phase.duration_s * step / steps if step else 0.0 for step in range(steps))
+        track += [phase.at(time_s).place[:2] for time_s in times]
+    return [*track, plan.phases[-1].at(plan.phases[-1].duration_s).place[:2]]
+
+
 class RefusedError(Exception):
     """The behavior cannot be done; the text says why, `code` is that of the report."""
 

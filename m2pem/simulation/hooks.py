@@ -1,5 +1,5 @@
 """Registers the simulated arbiter, through the same hook as any other, and warns of batteries that
-would not last, by its kinematics."""
+would not last and of what leaves the fence, by its kinematics."""
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING
@@ -25,9 +25,14 @@ def m2pem_register_arbiters(register: "Callable[[str, Callable[..., Arbiter]], N
 
 @hookimpl
 def m2pem_check_mission(mission: "Mission", fleet: "Fleet | None") -> "Sequence[Finding]":
-    """Warn of vehicles whose stated endurance is not enough."""
-    if fleet is None or not any(each.endurance_s for each in fleet.vehicles.values()):
-        return ()
-    from m2pem.simulation.estimates import endurance_findings  # noqa: PLC0415  # as above
+    """Warn of vehicles whose stated endurance is not enough, and find what leaves the fence."""
+    found: list[Finding] = []
+    if fleet is not None and fleet.fence:
+        from m2pem.simulation.fencing import fence_findings  # noqa: PLC0415  # as above
 
-    return endurance_findings(mission, fleet)
+        found += fence_findings(mission, fleet)
+    if fleet is not None and any(each.endurance_s for each in fleet.vehicles.values()):
+        from m2pem.simulation.estimates import endurance_findings  # noqa: PLC0415  # as above
+
+        found += endurance_findings(mission, fleet)
+    return found

@@ -4,6 +4,8 @@ from collections.abc import Callable, Mapping
 
 from m2pem.api.arbiter import ResolvedValue
 from m2pem.api.behavior_parameters import BehaviorParameters
+from m2pem.geo.fence import Fence
+from m2pem.geo.local_frame import LatLon
 from m2pem.mission.geometry import Area, Coordinate, Point, Route, VehiclePosition
 from m2pem.simulation.course import Craft, RefusedError
 from m2pem.simulation.frame import FlatFrame
@@ -13,7 +15,8 @@ from m2pem.simulation.segments import Pose, Vector
 class LocalParameters(BehaviorParameters):
     """Parameters that were checked, in the local frame of a simulation.
 
-    `pose_of_vehicle`: how a vehicle stands and moves now, None if it was never received.
+    `pose_of_vehicle`: how a vehicle stands and moves now, None if it was never received. `fence`:
+    in the same frame.
     """
 
     def __init__(
@@ -21,9 +24,11 @@ class LocalParameters(BehaviorParameters):
         values: Mapping[str, ResolvedValue],
         frame: FlatFrame,
         pose_of_vehicle: Callable[[str], Pose | None],
+        fence: Fence | None = None,
     ) -> None:
         super().__init__(values)
         self.frame = frame
+        self.fence = fence
         self._pose_of_vehicle = pose_of_vehicle
 
     def rings(self, area: Area) -> list[list[tuple[float, float]]]:
@@ -72,6 +77,11 @@ class LocalParameters(BehaviorParameters):
         if pose is None:
             raise RefusedError(f"parameter 'target': the position of {vehicle} is not known")
         return pose
+
+    def stance(self, vehicle: str) -> tuple[LatLon, float] | None:
+        """Where a vehicle is, and its yaw; None: it is not known."""
+        pose = self._pose_of_vehicle(vehicle)
+        return None if pose is None else (self.frame.to_latlon(pose.place[:2]), pose.yaw)
 
     def up_m(self, craft: Craft) -> float | None:
         """`up` of the parameter `altitude`, None if not given or nothing to this craft."""

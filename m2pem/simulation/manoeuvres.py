@@ -14,7 +14,7 @@ from m2pem.geo.lawn_mower import lawn_mower, longest_edge_yaw, strip_width_m
 from m2pem.geo.polygon import middle_of
 from m2pem.geo.polyline import Polyline
 from m2pem.geo.survey_tracks import SurveyTracks
-from m2pem.simulation.course import Course, Craft, RefusedError
+from m2pem.simulation.course import Course, Craft, RefusedError, track_of
 from m2pem.simulation.local_parameters import LocalParameters
 from m2pem.simulation.pursuit import Pursuit
 from m2pem.simulation.segments import Pose, Vector
@@ -68,6 +68,15 @@ def flying_height(craft: Craft, parameters: LocalParameters) -> float:
 
 
 def _route(craft: Craft, parameters: LocalParameters) -> Manoeuvre:
+    """Along the route, round its corners; with a stop at each if the bends would leave the
+    fence."""
+    made, fence = _along(craft, parameters, None), parameters.fence
+    if fence is not None and made.plan is not None and fence.leaves(track_of(made.plan)):
+        return _along(craft, parameters, 0.0)
+    return made
+
+
+def _along(craft: Craft, parameters: LocalParameters, radius_m: float | None) -> Manoeuvre:
     route = parameters.route
     if route is None:
         raise RefusedError("parameter 'route': there is none")
@@ -77,17 +86,17 @@ def _route(craft: Craft, parameters: LocalParameters) -> Manoeuvre:
     own = route.speeds_m_s and speed is None
     lap_speeds = [route.speed_from(index) for index in range(len(places))] if own else []
     course = under_way(craft, places[0][2])
-    course.through(places, speed, leg_speeds_m_s=[None, *lap_speeds[:-1]] if own else ())
+    course.through(places, speed, radius_m, [None, *lap_speeds[:-1]] if own else ())
     if not parameters.loop:
         work = RemainingRoute(raw_parameters(parameters.given), route, parameters.frame)
         return Manoeuvre(course.plan(), work=work)
     first_leg = next((p for p in places if math.dist(p[:2], places[0][:2]) > 0.1), None)
     if first_leg is None:
         raise RefusedError("parameter 'loop': a route of one place cannot be repeated")
-    course.through([places[0]], speed, leg_speeds_m_s=lap_speeds[-1:])
+    course.through([places[0]], speed, radius_m, lap_speeds[-1:])
     course.turn_to(math.atan2(first_leg[1] - places[0][1], first_leg[0] - places[0][0]))
     lap = course.steps
-    course.through([*places[1:], places[0]], speed, leg_speeds_m_s=lap_speeds)
+    course.through([*places[1:], places[0]], speed, radius_m, lap_speeds)
     course.turn_to(math.atan2(first_leg[1] - places[0][1], first_leg[0] - places[0][0]))
     return Manoeuvre(course.plan(cycle_from=lap))
 
@@ -113,14 +122,18 @@ def _land(craft: Craft, _: LocalParameters) -> Manoeuvre:
     return Manoeuvre(Course(craft).climb_to(craft.home[2]).plan())
 
 
-def _return(craft: Craft, _: LocalParameters) -> Manoeuvre:
-    course = Course(craft)
-    if not craft.flies:
-        return Manoeuvre(course.through([craft.home]).plan())
+def _return(craft: Craft, parameters: LocalParameters) -> Manoeuvre:
+    """Home, around what the fence keeps out if there is a way; a return is never refused."""
+    course, fence = Course(craft), parameters.fence
     east, north, ground = craft.home
+    around = [] if fence is None else fence.way(course.place[:2], (east, north)) or []
+    radius_m = 0.0 if around else None
+    way = [*around, (east, north)]
+    if not craft.flies:
+        return Manoeuvre(course.through([(*each, ground) for each in way], None, radius_m).plan())
     if math.dist(course.place[:2], (east, north)) > 0.1:
         course.climb_to(max(course.place[2], ground + craft.kinematics.default_altitude_m))
-        course.through([(east, north, course.place[2])])
+        course.through([(*each, course.place[2]) for each in way], None, radius_m)
     return Manoeuvre(course.climb_to(ground).plan())
 
 

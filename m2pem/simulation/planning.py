@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from typing import Any
 
@@ -13,15 +13,19 @@ from m2pem.api.behavior_parameters import refusal
 from m2pem.api.remaining import RemainingWork
 from m2pem.api.telemetry import GeoPosition, VehicleState
 from m2pem.fleet.behaviors import SHARED
+from m2pem.geo.fence import Fence
 from m2pem.mission.behavior import BehaviorType
 from m2pem.mission.catalogue import BehaviorSpec, ResourceId
 from m2pem.simulation.course import RefusedError
 from m2pem.simulation.executions import Aim, Body, Chase
+from m2pem.simulation.fencing import crossed
+from m2pem.simulation.fencing import refusal as refusal_of_fence
 from m2pem.simulation.frame import FlatFrame
 from m2pem.simulation.gimbals import GAZES, MAST_M, Shots
 from m2pem.simulation.local_parameters import LocalParameters
 from m2pem.simulation.manoeuvres import MANOEUVRES, Manoeuvre
 from m2pem.simulation.payloads import SimPayload
+from m2pem.simulation.pursuit import Pursuit
 from m2pem.simulation.segments import Pose
 from m2pem.simulation.trajectory import Plan
 from m2pem.simulation.vehicles import SimVehicle, carrier_of
@@ -109,6 +113,7 @@ class Planner:
     _context: ArbiterContext
     _frame: FlatFrame
     _bodies: Mapping[ResourceId, Body]
+    _fences: dict[int, Fence] = field(default_factory=dict)
 
     def pose_of(self, vehicle: str, now_us: int) -> Pose | None:
         """Return the pose of a vehicle: of a simulated one, or by its telemetry on the bus."""
@@ -154,7 +159,10 @@ class Planner:
             if problem:
                 raise RefusedError(problem)
         parameters = LocalParameters(
-            request.parameters, self._frame, lambda vehicle: self.pose_of(vehicle, now_us)
+            request.parameters,
+            self._frame,
+            lambda vehicle: self.pose_of(vehicle, now_us),
+            self._fence(bodies[0].id),
         )
         idle = [Assignment(body) for body in bodies if body not in acting]
         if type_ is BehaviorType.PAYLOAD:
@@ -164,10 +172,33 @@ class Planner:
             if vehicle.battery_at(now_us) <= 0:
                 raise RefusedError(f"the battery of {craft.name} is empty", "BATTERY_LOW")
         manoeuvre: Callable[..., Manoeuvre] = MANOEUVRES[request.behavior]
-        return [
-            _assignment(vehicle, manoeuvre(craft, parameters))
-            for vehicle, craft in zip(vehicles, crafts, strict=True)
-        ] + idle
+        made = [manoeuvre(craft, parameters) for craft in crafts]
+        for craft, each in zip(crafts, made, strict=True):
+            if reason := refusal_of_fence(request.behavior, parameters, craft, each):
+                raise RefusedError(reason)
+            if request.behavior == "return_to_launch" and (reason := crossed(parameters, each)):
+                self._context.logger.warning("%s returns: %s", craft.name, reason)
+        return [_assignment(*each) for each in zip(vehicles, made, strict=True)] + idle
+
+    def strays(self, body: Body, chase: Chase, now_us: int) -> str:
+        """Return where a vehicle that stays with another one would leave the fence; "" if it does
+        not."""
+        fence = self._fence(body.id)
+        if fence is None or not isinstance(chase, Pursuit) or not isinstance(body, SimVehicle):
+            return ""
+        target = self.pose_of(chase.target, now_us)
+        station = None if target is None else chase.station(target)[:2]
+        place = self._frame.to_latlon(body.pose(now_us).place[:2])
+        way = [] if station is None else [self._frame.to_latlon(station)]
+        return fence.breach(way, place, lambda _: "its station at the target")
+
+    def _fence(self, resource: ResourceId) -> Fence | None:
+        area = self._connections[resource].fence
+        if area is None:
+            return None
+        if id(area) not in self._fences:  # the fleet has one for all
+            self._fences[id(area)] = Fence(area, frame=self._frame)
+        return self._fences[id(area)]
 
     def catalogue(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
         """What the resource can do."""

@@ -443,6 +443,9 @@ class Simulation:
         part.timer = self._next_step(execution, part, now_us)
 
     def _chase(self, execution: Execution, part: Part, now_us: int) -> None:
+        if part.chase and (reason := self._planner.strays(part.body, part.chase, now_us)):
+            self._finish(execution, Outcome(BehaviorState.FAILED, "FAILED", reason), now_us)
+            return
         self._step(execution, part, now_us)
         self._changed(part.body, now_us)
         self.memory.save(execution)

@@ -4,8 +4,6 @@
 (`m2pem.api.read_declared_behaviors`).
 """
 
-import math
-
 from m2pem.api import SHARED, BehaviorType
 
 LEVEL = tuple(
@@ -24,8 +22,3 @@ LEVEL = tuple(
 
 PAYLOAD = tuple(spec for (_, type_), spec in SHARED.items() if type_ is BehaviorType.PAYLOAD)
 """The behaviors of payloads with a node of their own."""
-
-
-OFFSET_M = 15.0
-BEHIND_RAD = math.pi
-"""Bearing of a following vehicle from the heading of its target, clockwise."""

@@ -15,6 +15,8 @@ from m2pem.api import (
     BehaviorState,
     BehaviorTracker,
     Connection,
+    Fence,
+    FenceCheck,
     LatestTask,
     Limits,
     LinkState,
@@ -25,6 +27,7 @@ from m2pem.api import (
     Value,
     VehiclePosition,
     VehicleState,
+    stance_on,
 )
 from m2pem.api.remember import remember
 from m2pem.errors import PluginError
@@ -38,7 +41,6 @@ from m2pem_plugin_ros.drivers.driver import (
     Order,
     Outcome,
 )
-from m2pem_plugin_ros.fence_check import FenceCheck
 from m2pem_plugin_ros.log_throttle import LogThrottle
 from m2pem_plugin_ros.settings import DriverName, Settings
 
@@ -103,7 +105,9 @@ class Vehicle:
         self._ros_connection = ros_connection
         self._sensors, self.endpoints = ros_connection.sensors, ros_connection.endpoints
         fence = setup.connection.fence
-        self._fence_check = None if fence is None else FenceCheck(fence, setup.context.bus)
+        self._fence_check = (
+            None if fence is None else FenceCheck(Fence(fence), stance_on(setup.context.bus))
+        )
         self._log_throttle = LogThrottle(setup.context.logger, self.resource)
         self._behaviors: dict[UUID, BehaviorId] = {}
         self._runs: dict[str, BehaviorId] = {}
@@ -578,8 +582,9 @@ class Vehicle:
         if self._fence_check is None:
             return ""
         where = self._sensors.localization
+        start = None if where.position is None else where.position.latlon
         yaw_rad = None if where.pose is None else where.pose.yaw_rad
-        return self._fence_check.refusal(request, where.position, yaw_rad)
+        return self._fence_check.refusal(request.behavior, request.parameters, start, yaw_rad)
 
     def _health(self) -> Health:
         try:

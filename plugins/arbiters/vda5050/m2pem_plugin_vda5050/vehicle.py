@@ -17,14 +17,15 @@ from m2pem.api import (
     BehaviorTracker,
     Connection,
     Fence,
+    FenceCheck,
     GeoPosition,
-    LatLon,
     Limits,
     LinkState,
     ParameterKind,
     Point,
     ResolvedValue,
     VehicleState,
+    stance_on,
 )
 from m2pem_plugin_vda5050.catalogue import (
     DRIVING_PARAMETERS,
@@ -118,7 +119,9 @@ class Vehicle:
         self._pause = PauseControl(self._commander, self._clock)
         self._own = {own.spec.name: own for own in settings.own_behaviors}
         fence = setup.connection.fence
-        self._fence = None if fence is None else Fence(fence)
+        self._fence_check = (
+            None if fence is None else FenceCheck(Fence(fence), stance_on(setup.context.bus))
+        )
         self._factsheet: Factsheet | None = None
         self._state: State | None = None
         self._state_us = 0
@@ -599,23 +602,17 @@ class Vehicle:
 
     def _breach(self, request: BehaviorRequest) -> str:
         """Return where the request would leave the fence of the fleet; "" if it does not."""
-        if self._fence is None:
-            return ""
         position = self.position()
-        start = None if position is None else position.latlon
+        if self._fence_check is None or position is None:
+            return ""
         parameters = BehaviorParameters(request.parameters)
-        route, target = parameters.route, parameters.target
-        way: list[LatLon] = []
-        if route is not None:
-            way = [each[:2] for each in route.waypoints]
-            if parameters.loop:
-                way.append(way[0])
-        elif isinstance(target, Point):
-            way = [target.position[:2]]
-        elif request.behavior == "reverse" and self._state is not None:
-            points, _ = self._points(request, self._state)
-            way = [self._frame.to_position(*point).latlon for point in points or ()]
-        return self._fence.breach(way, start)
+        behavior = request.behavior
+        if parameters.route is not None:
+            behavior = "single_vehicle_routing"
+        elif isinstance(parameters.target, Point):
+            behavior = "goto"
+        yaw_rad = None if self._place is None else self._frame.to_yaw(self._place.theta)
+        return self._fence_check.refusal(behavior, request.parameters, position.latlon, yaw_rad)
 
     def _velocity_enu(self) -> tuple[float, float, float] | None:
         place, velocity = self._place, self._velocity

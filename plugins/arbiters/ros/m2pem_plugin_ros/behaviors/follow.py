@@ -3,7 +3,7 @@
 import math
 from dataclasses import replace
 
-from m2pem.api import BehaviorState
+from m2pem.api import BEHIND_RAD, OFFSET_M, BehaviorState
 from m2pem_plugin_ros.behaviors.goto import TARGET_SILENT_S
 from m2pem_plugin_ros.behaviors.motion import Motion
 from m2pem_plugin_ros.behaviors.motion_state import (
@@ -21,7 +21,6 @@ from m2pem_plugin_ros.behaviors.motion_state import (
 from m2pem_plugin_ros.behaviors.parameters import LocalParameters
 from m2pem_plugin_ros.behaviors.path_following import Approach
 from m2pem_plugin_ros.behaviors.steering import Steering, braking_speed, lookahead
-from m2pem_plugin_ros.catalogue import BEHIND_RAD, OFFSET_M
 from m2pem_plugin_ros.settings import Bounds
 
 STATION_M = 1.0

@@ -11,10 +11,9 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import BatteryState, Imu, JointState, NavSatFix, NavSatStatus
 from std_msgs.msg import Header
 
-from m2pem.api import PayloadState, VehicleState, ellipsoidal_m
+from m2pem.api import PayloadState, VehicleState, ellipsoidal_m, known_yaw_rad
 from m2pem_plugin_ros.frames import Quaternion, Vector, quaternion_of, rotated_back
 from m2pem_plugin_ros.interfaces.messages import time_of
-from m2pem_plugin_ros.pose import known_yaw_rad
 
 NOT_KNOWN = -1.0
 """A variance of what is not known."""

@@ -22,6 +22,7 @@ from m2pem.api import (
     ResolvedValue,
     ResourceId,
     VehicleState,
+    known_yaw_rad,
 )
 from m2pem.api.latest_task import cancel_and_wait
 from m2pem.api.remember import remember
@@ -42,7 +43,7 @@ from m2pem_plugin_ros.behaviors.motion_state import Place
 from m2pem_plugin_ros.drivers.base.topics import CommandTopic, TeleopTopic
 from m2pem_plugin_ros.drivers.driver import DriverSetup, Health, Order, Outcome
 from m2pem_plugin_ros.frames import to_geodetic, to_local
-from m2pem_plugin_ros.pose import Pose, Twist, known_yaw_rad
+from m2pem_plugin_ros.pose import Pose, Twist
 
 STEP_S = 0.05
 IDLE_STEP_S = 0.2

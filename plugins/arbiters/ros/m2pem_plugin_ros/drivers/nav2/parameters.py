@@ -14,10 +14,11 @@ from m2pem.api import (
     ResolvedValue,
     ResourceId,
     VehicleState,
+    known_yaw_rad,
 )
 from m2pem_plugin_ros.drivers.nav2.errors import NavigationError
 from m2pem_plugin_ros.frames import to_local
-from m2pem_plugin_ros.pose import Pose, known_yaw_rad
+from m2pem_plugin_ros.pose import Pose
 
 STALE_S = 3.0
 """Seconds after which the position of a vehicle is too old."""

@@ -7,8 +7,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from m2pem.api import BehaviorState, ResolvedValue
-from m2pem_plugin_ros.catalogue import BEHIND_RAD, OFFSET_M
+from m2pem.api import BEHIND_RAD, OFFSET_M, BehaviorState, ResolvedValue
 from m2pem_plugin_ros.drivers.driver import Outcome
 from m2pem_plugin_ros.drivers.nav2.errors import NavigationError
 from m2pem_plugin_ros.drivers.nav2.goal_client import GoalClient

@@ -1,0 +1,119 @@
+"""Whether a behavior of a vehicle would leave the fence of the fleet, before it begins."""
+
+import math
+from collections.abc import Callable, Mapping
+
+from m2pem.api.behavior_parameters import BehaviorParameters
+from m2pem.api.bus import FleetBus
+from m2pem.api.telemetry import VehicleState
+from m2pem.fleet.parameters import ResolvedValue
+from m2pem.geo.fence import Fence
+from m2pem.geo.local_frame import LatLon, offset
+from m2pem.mission.catalogue import ResourceId
+from m2pem.mission.geometry import Point
+
+OFFSET_M = 15.0
+BEHIND_RAD = math.pi
+"""The station of a following vehicle, if none is said: from its target, and clockwise from the
+target's heading."""
+
+COURSE_ABOVE_M_S = 0.3
+"""A vehicle that is faster than this heads where it moves, if its yaw is not known."""
+
+Stance = tuple[LatLon, float]
+"""Where a vehicle is, and its yaw: from east, counter-clockwise, in rad."""
+
+
+class FenceCheck:
+    """Where the behaviors of a vehicle would leave a fence.
+
+    `stance`: of a vehicle by its name, None if it is not known; of targets that move, only the
+    current position is known.
+    """
+
+    def __init__(self, fence: Fence, stance: Callable[[str], Stance | None]) -> None:
+        self.fence = fence
+        self._stance = stance
+
+    def refusal(
+        self,
+        behavior: str,
+        values: Mapping[str, ResolvedValue],
+        start: LatLon | None,
+        yaw_rad: float | None = None,
+    ) -> str:
+        """Return where the way would leave the fence; "" if it does not. `start` and `yaw_rad` are
+        those of the vehicle. Without them, the way from the vehicle is not checked."""
+        parameters = BehaviorParameters(values)
+        match behavior:
+            case "single_vehicle_routing":
+                return self._of_route(parameters, start)
+            case "goto":
+                return self._of_place(self._target(parameters), start, "the target")
+            case "follow":
+                return self.of_station(parameters, start)
+            case "reverse" if start is not None and yaw_rad is not None:
+                behind = _beside(start, yaw_rad, -parameters.distance_m)
+                return self._of_place(behind, start, "the place behind it")
+        return ""
+
+    def of_station(self, parameters: BehaviorParameters, start: LatLon | None) -> str:
+        """As `refusal`, of a vehicle that follows another one, as that is now."""
+        stance = self._stance(parameters.target_vehicle or "")
+        if stance is None:
+            return ""
+        bearing_rad, offset_m = parameters.bearing_rad, parameters.offset_m
+        yaw_rad = stance[1] - (BEHIND_RAD if bearing_rad is None else bearing_rad)
+        station = _beside(stance[0], yaw_rad, OFFSET_M if offset_m is None else offset_m)
+        return self._of_place(station, start, "its station at the target")
+
+    def _of_place(self, place: LatLon | None, start: LatLon | None, name: str) -> str:
+        return "" if place is None else self.fence.breach([place], start, lambda _: name)
+
+    def _of_route(self, parameters: BehaviorParameters, start: LatLon | None) -> str:
+        route = parameters.route
+        if route is None or not route.waypoints:
+            return ""
+        way = [waypoint[:2] for waypoint in route.waypoints]
+        reason = self.fence.breach(way, start, _waypoint)
+        if not reason and parameters.loop:
+            last = len(way) - 1
+            ends = [way[-1], way[0]]
+            reason = self.fence.breach(ends, None, lambda index: _waypoint(0 if index else last))
+        return reason
+
+    def _target(self, parameters: BehaviorParameters) -> LatLon | None:
+        target = parameters.target
+        if isinstance(target, Point):
+            return target.position[:2]
+        stance = self._stance(parameters.target_vehicle or "")
+        return None if stance is None else stance[0]
+
+
+def stance_on(bus: FleetBus) -> Callable[[str], Stance | None]:
+    """Return what says where vehicles are by their telemetry."""
+
+    def stance(vehicle: str) -> Stance | None:
+        state = bus.latest(ResourceId(vehicle))
+        if not isinstance(state, VehicleState) or state.position is None:
+            return None
+        return state.position.latlon, known_yaw_rad(state)
+
+    return stance
+
+
+def known_yaw_rad(state: VehicleState) -> float:
+    """Return the yaw of a vehicle, from east, counter-clockwise; 0 if it is not known."""
+    if state.yaw_rad is not None:
+        return state.yaw_rad
+    east_m_s, north_m_s, _ = state.velocity_enu_m_s or (0.0, 0.0, 0.0)
+    moves = math.hypot(east_m_s, north_m_s) > COURSE_ABOVE_M_S
+    return math.atan2(north_m_s, east_m_s) if moves else 0.0
+
+
+def _waypoint(index: int) -> str:
+    return f"waypoint {index + 1} of the route"
+
+
+def _beside(place: LatLon, yaw_rad: float, distance_m: float) -> LatLon:
+    return offset(place, distance_m * math.cos(yaw_rad), distance_m * math.sin(yaw_rad))
