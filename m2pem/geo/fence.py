@@ -61,6 +61,7 @@ class Fence:
             first, *_ = (inclusion, *exclusions) if inclusion is not None else exclusions
             frame = LocalFrame(first.rings[0][0][:2])
         self.frame = frame
+        self._given = inclusion, exclusions
         everywhere = shapely.box(-_FAR_M, -_FAR_M, _FAR_M, _FAR_M)
         inside = everywhere
         kept_out = [area_in(each.rings, frame) for each in exclusions]
@@ -76,6 +77,10 @@ class Fence:
         self._deep, self._inner = _eroded(self._out, MARGIN_M), _eroded(self._out, GRAZE_M)
         for each in (self._free, self._deep, self._inner):
             shapely.prepare(each)
+
+    def with_clearance(self, clearance_m: float) -> "Fence":
+        """Return the same one for a vehicle that needs another width."""
+        return Fence(*self._given, clearance_m, self.frame)
 
     def outside_m(self, place: LatLon) -> float:
         """How far a place is from where one may be; 0 inside."""
@@ -110,12 +115,12 @@ class Fence:
         return ""
 
     def leaves(self, track: Sequence[EastNorth]) -> str:
-        """As `breach`, of a track in the local frame, from where it is inside for the first time.
-
-        It may have many points: those of curves, too.
-        """
-        inside = (at for at, place in enumerate(track) if self._outside_m(place) <= MARGIN_M)
-        out = self._worst(track[next(inside, 0) :])
+        """As `breach`, of a track in the local frame from where the vehicle is. It may have many
+        points: those of curves, too."""
+        start = track[0]
+        moves = (at for at, place in enumerate(track) if math.dist(start, place) > GRAZE_M)
+        way = track[next(moves, len(track)) :]
+        out = self._worst([self._entered(start, way[0]), *way]) if way else ""
         return f"its way leaves the fleet's fence {out}" if out else ""
 
     def is_free(self, a: EastNorth, b: EastNorth) -> bool:

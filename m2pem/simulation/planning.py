@@ -25,7 +25,7 @@ from m2pem.simulation.gimbals import GAZES, MAST_M, Shots
 from m2pem.simulation.local_parameters import LocalParameters
 from m2pem.simulation.manoeuvres import MANOEUVRES, Manoeuvre
 from m2pem.simulation.payloads import SimPayload
-from m2pem.simulation.pursuit import Pursuit
+from m2pem.simulation.pursuit import STEP_S, Pursuit
 from m2pem.simulation.segments import Pose
 from m2pem.simulation.trajectory import Plan
 from m2pem.simulation.vehicles import SimVehicle, carrier_of
@@ -190,7 +190,15 @@ class Planner:
         station = None if target is None else chase.station(target)[:2]
         place = self._frame.to_latlon(body.pose(now_us).place[:2])
         way = [] if station is None else [self._frame.to_latlon(station)]
-        return fence.breach(way, place, lambda _: "its station at the target")
+        pose = body.pose(now_us)
+        stops_s = 2 * STEP_S + pose.speed / (2 * body.kinematics.deceleration_m_s2)
+        ahead = (
+            pose.place[0] + pose.velocity[0] * stops_s,
+            pose.place[1] + pose.velocity[1] * stops_s,
+        )
+        return fence.breach(way, place, lambda _: "its station at the target") or fence.leaves(
+            [pose.place[:2], ahead]
+        )
 
     def _fence(self, resource: ResourceId) -> Fence | None:
         area = self._connections[resource].fence

@@ -198,6 +198,9 @@ class DoubleVehicle:
         if body.heard_by_us:
             self.hear()
 
+    def warn(self, text: str) -> None:
+        logging.getLogger("m2pem.testing").warning("%s %s", self.resource, text)
+
     def hear(self) -> None:
         body, state = self.body, self.state
         if not body.heard_by_us:

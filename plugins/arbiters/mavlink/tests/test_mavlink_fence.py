@@ -1,4 +1,5 @@
 import pytest
+import shapely
 from mavlink_double import Body, at
 from mavlink_play import V, play
 
@@ -9,7 +10,8 @@ def ring(*corners: tuple[float, float]) -> tuple:
     return tuple((*at(*corner), None) for corner in (*corners, corners[0]))
 
 
-HOLE = ring((40, 40), (60, 40), (60, 60), (40, 60))
+HOLE_M = ((40, 40), (60, 40), (60, 60), (40, 60))
+HOLE = ring(*HOLE_M)
 FIELD = Area((ring((0, 0), (100, 0), (100, 100), (0, 100)), HOLE))
 
 
@@ -71,3 +73,34 @@ def test_within_the_fence_all_is_well() -> None:
         assert (await bench.ended("r1.b2", 120)).state is BehaviorState.SUCCEEDED
 
     play(Body(east=10.0, north=20.0).fly(), main, fence=FIELD)
+
+
+@pytest.mark.parametrize("domain", ["air", "ground"])
+def test_a_return_leads_around_what_is_kept_out(domain) -> None:
+    async def main(bench) -> None:
+        await bench.start("r1.b1", "return_to_launch", V)
+        await bench.running("r1.b1")
+        track = [(bench.body.east, bench.body.north)]
+        while not bench.states_of("r1.b1")[-1].terminal:
+            await bench.clock.sleep(0.1)
+            track.append((bench.body.east, bench.body.north))
+        assert (await bench.ended("r1.b1", 1)).state is BehaviorState.SUCCEEDED
+        hole = shapely.Polygon(HOLE_M)
+        assert not shapely.LineString(track).intersects(hole)
+        assert bench.told[0] == "go_to"
+        assert "return_home" in bench.told
+
+    body = Body(domain, east=85.0, north=85.0)
+    play(body.fly() if domain == "air" else body, main, fence=FIELD)
+
+
+def test_a_return_with_no_way_around_is_done_and_said(caplog) -> None:
+    moat = Area((*FIELD.rings[:1], ring((-5, 40), (110, 40), (110, 60), (-5, 60))))
+
+    async def main(bench) -> None:
+        end = await bench.do("return_to_launch")
+        assert end.state is BehaviorState.SUCCEEDED
+        assert bench.told[0] == "return_home"
+
+    play(Body(east=10.0, north=90.0).fly(), main, fence=moat)
+    assert "returns: the way to its home leaves the fleet's fence by 10 m" in caplog.text

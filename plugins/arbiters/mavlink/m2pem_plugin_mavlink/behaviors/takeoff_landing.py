@@ -11,6 +11,7 @@ from m2pem_plugin_mavlink.behaviors.arrival import (
     StillnessTimer,
     accepts_mode,
     arrival_radius_m,
+    cannot_stop,
     distance_to_m,
     height_m,
     height_tolerance_m,
@@ -215,8 +216,16 @@ async def disarm_after_landing(behavior: Behavior) -> None:
         await vehicle.driver.disarm()
 
 
+AROUND_M, LOOK_EVERY_S = 3.0, 0.2
+"""A return leads so far around what the fleet's fence keeps out, if there is room."""
+
+
 class ReturnToLaunch(Behavior):
-    """Return home; an aircraft lands there, unless it is set to hover or circle."""
+    """Return home; an aircraft lands there, unless it is set to hover or circle.
+
+    The autopilot returns on a straight line. Where that would leave the fleet's fence, the vehicle
+    is first sent around, unless it cannot stop; a return is never refused.
+    """
 
     name = "return_to_launch"
     modes = _RETURNS | {FlightMode.LAND}
@@ -227,6 +236,7 @@ class ReturnToLaunch(Behavior):
         self._near_m = 2 * TOLERANCES_M.get(self.vehicle.domain, 2.5)
         self._stillness = StillnessTimer(context)
         self._rally: Sequence[LatLon] = ()
+        self._around: list[LatLon] = []
 
     def refusal(self) -> str:
         """Check that an aircraft on the ground is at home."""
@@ -240,10 +250,41 @@ class ReturnToLaunch(Behavior):
         if self._is_there_already():
             self.modes = ANY_MODE
             return
-        await self.vehicle.driver.return_home()
+        self._around = self._way_around()
+        self.modes = type(self).modes | ({FlightMode.GUIDED} if self._around else set())
+        await self._send(self._around)
+
+    async def _send(self, around: Sequence[LatLon]) -> None:
+        if around:
+            height = VehicleParameters(self.context).altitude()
+            await self.vehicle.driver.go_to(TargetPosition(*around[0], *height))
+        else:
+            await self.vehicle.driver.return_home()
+
+    def _way_around(self) -> list[LatLon]:
+        """Return the places to pass on the way home, and say what the return still crosses."""
+        fence, home, here = self.context.fence, self.vehicle.state.home, position_of(self.vehicle)
+        if fence is None or home is None or here is None:
+            return []
+        around: list[LatLon] = []
+        if not cannot_stop(self.vehicle):
+            ends = fence.frame.to_local(here), fence.frame.to_local(home.latlon)
+            way = fence.with_clearance(AROUND_M).way(*ends) or fence.way(*ends) or ()
+            around = [fence.frame.to_latlon(place) for place in way]
+        way_home = [*around, home.latlon]
+        if reason := fence.breach(way_home, here, lambda index: "its home"):
+            self.vehicle.warn(f"returns: {reason}")
+        return around
 
     async def run_in_background(self) -> None:
-        """Read the rally points; then disarm as `Land` does."""
+        """Fly or drive around; then read the rally points, and disarm as `Land` does."""
+        near_m = TOLERANCES_M.get(self.vehicle.domain, 2.5)
+        while self._around:
+            await self.vehicle.sleep(LOOK_EVERY_S)
+            if distance_to_m(self.vehicle, self._around[0]) <= near_m:
+                await self._send(self._around[1:])
+                del self._around[0]
+                self.modes = self.modes if self._around else type(self).modes
         if self.vehicle.domain == "air" and self.modes is not ANY_MODE:
             with contextlib.suppress(ExchangeError):  # most have no rally points
                 self._rally = await self.vehicle.driver.rally_points()
@@ -277,6 +318,8 @@ class ReturnToLaunch(Behavior):
         Raises:
             BehaviorFailedError: an aircraft has landed somewhere else.
         """
+        if self._around:
+            return False
         air = self.vehicle.domain == "air" and self.modes is not ANY_MODE
         if air:
             # A LAND far from there is not the end of this return: it is a failsafe or a takeover.

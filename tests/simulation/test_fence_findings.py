@@ -1,0 +1,107 @@
+"""What `check` finds of the fence before a mission starts."""
+
+import itertools
+import json
+from pathlib import Path
+
+from m2pem.findings import Finding, Severity
+from m2pem.fleet.fleet_file import load_fleet
+from m2pem.scripting.sources import load_mission
+from m2pem.simulation.fencing import fence_findings
+from tests.simulation.conftest import place
+from tests.simulation.test_estimates import HEAD, TAIL, flows, task
+from tests.simulation.test_fencing import YARD
+
+FLEET = """version: 1
+origin: {{lat: {0}, lon: {1}, alt: 0}}
+vehicles:
+  v: {{domain: ground, arbiter: sim, connection: {{home: [{2}, {3}, 0]}}}}
+areas: {{yard: yard.geojson}}
+fence: yard
+"""
+
+
+def checked(
+    folder: Path,
+    tasks: list[tuple[str, str, str]],
+    more: str = "",
+    home: tuple[float, float] = (20, 100),
+) -> list[Finding]:
+    """The findings of tasks in a row: behavior, its parameter and that one's value."""
+    rings = [
+        [list(place(x, y)[1::-1]) for x, y, *_ in ring.coords]
+        for ring in (YARD.exterior, *YARD.interiors)
+    ]
+    (folder / "yard.geojson").write_text(json.dumps({"type": "Polygon", "coordinates": rings}))
+    path = folder / "fleet.yaml"
+    path.write_text(FLEET.format(*place(0, 0)[:2], *place(*home)[:2]))
+    names = ["S", *(f"T{number}" for number in range(len(tasks))), "E"]
+    nodes = '<startEvent id="S"/><endEvent id="E"/>' + "".join(
+        task(id_, behavior, "v", **{name: value})
+        for id_, (behavior, name, value) in zip(names[1:], tasks, strict=False)
+    )
+    text = HEAD + nodes + more + flows(*itertools.pairwise(names)) + TAIL
+    return fence_findings(load_mission(text.encode()), load_fleet(path))
+
+
+def at(east: float, north: float) -> str:
+    latitude, longitude, _ = place(east, north)
+    return f"[{latitude}, {longitude}]"
+
+
+def test_a_target_outside_is_an_error_with_the_place_and_the_distance(tmp_path: Path) -> None:
+    (found,) = checked(tmp_path, [("goto", "target", at(250, 100))])
+    latitude, longitude, _ = place(250, 100)
+    assert (found.severity, found.rule, found.element) == (Severity.ERROR, "outside-fence", "T0")
+    assert f"v: the target, [{latitude:.6f}, {longitude:.6f}], is 50 m outside" in found.message
+
+
+def test_the_way_from_home_and_from_the_task_before_is_known(tmp_path: Path) -> None:
+    assert not checked(tmp_path, [("goto", "target", at(60, 20)), ("goto", "target", at(60, 180))])
+    (found,) = checked(tmp_path, [("goto", "target", at(180, 100))])
+    assert "the way to the target leaves the fleet's fence by 20 m" in found.message
+    (found,) = [
+        each
+        for each in checked(
+            tmp_path,
+            [
+                ("goto", "target", at(60, 180)),
+                ("goto", "target", at(180, 180)),
+                ("hold", "duration", "3 s"),
+                ("goto", "target", at(180, 20)),
+                ("goto", "target", at(20, 180)),
+            ],
+        )
+        if each.severity is Severity.ERROR
+    ]
+    assert found.element == "T4"
+
+
+def test_where_ways_meet_nothing_is_supposed_of_the_start(tmp_path: Path) -> None:
+    """The second task may also begin elsewhere."""
+    more = '<startEvent id="S2"/>' + flows(("S2", "T0"))
+    found = checked(tmp_path, [("goto", "target", at(180, 100))], more)
+    assert [each.rule for each in found] == ["return-leaves-fence"]
+
+
+def test_a_return_that_would_cross_a_hole_is_a_warning_before(tmp_path: Path) -> None:
+    found = checked(tmp_path, [("goto", "target", at(60, 180)), ("goto", "target", at(100, 180))])
+    assert found == []
+    (found_,) = checked(
+        tmp_path,
+        [
+            ("goto", "target", at(60, 180)),
+            ("goto", "target", at(180, 150)),
+            ("goto", "target", at(180, 100)),
+        ],
+    )
+    assert (found_.severity, found_.rule) == (Severity.WARNING, "return-leaves-fence")
+    assert "the way to its home leaves the fleet's fence by 20 m" in found_.message
+
+
+def test_a_home_outside_is_named(tmp_path: Path) -> None:
+    (found,) = checked(tmp_path, [("goto", "target", at(60, 100))], home=(-0.5, 100))
+    assert "its home, [" in found.message
+    assert "is 0.5 m outside the fleet's fence" in found.message
+    (found,) = checked(tmp_path, [("goto", "target", at(180, 100))], home=(-0.5, 100))
+    assert found.severity is Severity.ERROR  # across the hole
