@@ -76,6 +76,7 @@ from m2pem.fleet.allocation import Availability, resources_of_mission
 from m2pem.fleet.approval import is_named
 from m2pem.fleet.fleet import Fleet
 from m2pem.fleet.space import waits_for_space
+from m2pem.geo.fence import Fence
 from m2pem.geo.geojson import GeometryError, as_geojson, parse_geojson
 from m2pem.geo.positions import NO_ORIGIN, geometry_out_of_reach
 from m2pem.journal.base import Journal
@@ -586,11 +587,12 @@ class Supervisor:
         origin = self.fleet.origin
         if origin != NO_ORIGIN and (wrong := geometry_out_of_reach(parsed, origin)):
             raise OperatorError(f"geometry {name!r}: {wrong[0]}; {wrong[1]}")
-        if said:
-            geometry = as_geojson(parsed)
-            self.events.publish(
-                Alert(run or RunId(""), "GEOMETRY", f"geometry {name!r}: {said[0]}")
-            )
+        geometry = as_geojson(parsed) if said else geometry
+        fence = self.fleet.geometries.get(self.fleet.fence)
+        if isinstance(parsed, Route) and isinstance(fence, Area):
+            said.append(Fence(fence).breach([each[:2] for each in parsed.waypoints]))
+        for each in filter(None, said):
+            self.events.publish(Alert(run or RunId(""), "GEOMETRY", f"geometry {name!r}: {each}"))
         item = GeometrySet(name, dict(geometry), by)
         if run is None:
             self.drawings.change(name, geometry, by)

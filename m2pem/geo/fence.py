@@ -7,7 +7,7 @@ takes 0.3 s.
 """
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
@@ -57,6 +57,7 @@ class Fence:
     ) -> None:
         import shapely  # noqa: PLC0415  # slow to load
 
+        self._shapely = shapely
         if frame is None:
             first, *_ = (inclusion, *exclusions) if inclusion is not None else exclusions
             frame = LocalFrame(first.rings[0][0][:2])
@@ -74,7 +75,9 @@ class Fence:
             self.closed = self.closed.buffer(clearance_m, join_style="mitre")
         self._free = inside.difference(self.closed)
         self._out = self.closed.union(everywhere.difference(inside))
-        self._deep, self._inner = _eroded(self._out, MARGIN_M), _eroded(self._out, GRAZE_M)
+        self._deep, self._inner = (
+            shapely.union_all([*_eroded(self._out, by_m)]) for by_m in (MARGIN_M, GRAZE_M)
+        )
         for each in (self._free, self._deep, self._inner):
             shapely.prepare(each)
 
@@ -148,18 +151,14 @@ class Fence:
         return [place for place in (near[0], *between, near[1]) if place is not None]
 
     def _outside_m(self, level: EastNorth) -> float:
-        import shapely  # noqa: PLC0415
-
-        distance_m = float(self._free.distance(shapely.Point(level)))
+        distance_m = float(self._free.distance(self._shapely.Point(level)))
         return math.inf if math.isnan(distance_m) else distance_m  # nothing is left of it
 
     def _entered(self, a: EastNorth, b: EastNorth) -> EastNorth:
         """Where the way from a place that may be outside is inside; the place itself if it leads
         farther out, or through an exclusion."""
-        import shapely  # noqa: PLC0415
-
-        start = shapely.Point(a)
-        parts = _lines(shapely.LineString((a, b)).intersection(self._out))
+        start = self._shapely.Point(a)
+        parts = _lines(self._shapely.LineString((a, b)).intersection(self._out))
         first = min(parts, key=start.distance, default=None)
         if first is None or start.distance(first) > MARGIN_M:
             return a
@@ -174,9 +173,9 @@ class Fence:
 
     def _worst(self, way: Sequence[EastNorth]) -> str:
         """Of the parts of a way that lie outside, how far the farthest point is out, and where."""
-        import shapely  # noqa: PLC0415
-
-        parts = _lines(shapely.LineString(way).intersection(self._deep)) if len(way) > 1 else ()
+        parts = (
+            _lines(self._shapely.LineString(way).intersection(self._deep)) if len(way) > 1 else ()
+        )
         legs = (self._deepest(*leg) for part in parts for leg in pairwise(part.coords))
         place, by_m = max(legs, key=lambda deepest: deepest[1], default=((0.0, 0.0), 0.0))
         return f"by {_by(by_m)} at {_text(self.frame.to_latlon(place))}" if by_m > 0 else ""
@@ -195,20 +194,16 @@ class Fence:
 
     def _nearest_free(self, place: EastNorth) -> EastNorth | None:
         """Return the nearest place that is not kept out; None: this one is not, or all are."""
-        import shapely  # noqa: PLC0415
-
-        point = shapely.Point(place)
+        point = self._shapely.Point(place)
         room = self._free.buffer(-_AROUND_M, join_style="mitre")
         if room.is_empty or not self._inner.intersects(point):
             return None
-        nearest = shapely.shortest_line(room, point).coords[0]
+        nearest = self._shapely.shortest_line(room, point).coords[0]
         return nearest[0], nearest[1]
 
     def _are_free(self, place: EastNorth, others: Sequence[EastNorth]) -> list[bool]:
-        import shapely  # noqa: PLC0415
-
-        lines = shapely.linestrings([(place, other) for other in others])
-        return [not each for each in shapely.intersects(self._inner, lines)]
+        lines = self._shapely.linestrings([(place, other) for other in others])
+        return [not each for each in self._shapely.intersects(self._inner, lines)]
 
     @cached_property
     def _corner_graph(self) -> Any:
@@ -255,37 +250,35 @@ def area_in(rings: Sequence[Sequence[Coordinate]], frame: LocalFrame) -> "BaseGe
 
 def polygons(geometry: "BaseGeometry") -> list[Any]:
     """Return the polygons that a geometry is made of."""
-    return [part for part in _parts(geometry) if part.geom_type == "Polygon" and not part.is_empty]
+    return [
+        part
+        for part in getattr(geometry, "geoms", [geometry])
+        if part.geom_type == "Polygon" and not part.is_empty
+    ]
 
 
 def _lines(geometry: "BaseGeometry") -> list[Any]:
-    return [part for part in _parts(geometry) if part.geom_type == "LineString" and part.length > 0]
+    return [
+        part
+        for part in getattr(geometry, "geoms", [geometry])
+        if part.geom_type == "LineString" and part.length > 0
+    ]
 
 
-def _parts(geometry: "BaseGeometry") -> Iterable[Any]:
-    return getattr(geometry, "geoms", [geometry])
-
-
-def _eroded(geometry: "BaseGeometry", by_m: float) -> "BaseGeometry":
-    """Return what is deeper inside than a distance; of a part that is too thin, than less."""
-    import shapely  # noqa: PLC0415
-
-    return shapely.union_all(
-        [
-            part.buffer(-by_m) or part.buffer(-by_m / 10) or part.buffer(-by_m / 100)
-            for part in polygons(geometry)
-        ]
-    )
+def _eroded(geometry: "BaseGeometry", by_m: float) -> Iterator["BaseGeometry"]:
+    """Yield what is deeper inside than a distance; of a part that is too thin, than less."""
+    for part in polygons(geometry):
+        yield part.buffer(-by_m) or part.buffer(-by_m / 10) or part.buffer(-by_m / 100)
 
 
 def _corners(kept_out: "BaseGeometry") -> list[EastNorth]:
     """Return the corners that a shortest way may pass: where what is kept out is convex."""
-    import shapely  # noqa: PLC0415
+    from shapely.geometry.polygon import orient  # noqa: PLC0415
 
     corners = []
-    for part in polygons(shapely.orient_polygons(kept_out)):  # what is kept out is to the left
+    for part in map(orient, polygons(kept_out)):  # what is kept out is to the left
         for ring in (part.exterior, *part.interiors):
-            coords = [(x, y) for x, y, *_ in ring.coords[:-1]]
+            coords = ring.coords[:-1]
             for a, b, c in zip(
                 (coords[-1], *coords), coords, (*coords[1:], coords[0]), strict=False
             ):

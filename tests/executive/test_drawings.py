@@ -13,6 +13,7 @@ from m2pem.errors import JournalError, OperatorError
 from m2pem.executive.drawings import MOST_VERSIONS, Drawings
 from m2pem.fleet.fleet import simulated_fleet
 from m2pem.journal import MemoryJournal, open_journal
+from m2pem.mission.geometry import Area
 from m2pem.testing import scenarios
 from tests.executive.conftest import World, mission, question, sequence
 
@@ -65,6 +66,25 @@ def test_an_area_is_mended_once_and_operators_read_of_it(play: Any) -> None:
     ]
     (alert,) = alerts
     assert "geometry 'field': its edge from [50.1, 7.1] to [50.2, 7.1]" in alert.text
+
+
+def test_a_route_that_leaves_the_fence_is_said(play: Any) -> None:
+    ring = ((50.0, 7.0, None), (50.0, 7.1, None), (50.1, 7.1, None), (50.1, 7.0, None))
+
+    async def story(world: World) -> Any:
+        fleet = world.executive.supervisor.fleet
+        fleet.geometries["yard"] = Area(((*ring, ring[0]),))
+        object.__setattr__(fleet, "fence", "yard")
+        control = world.executive.control
+        inside = {"type": "LineString", "coordinates": [[7.05, 50.05], [7.06, 50.05]]}
+        await control.set_geometry("inside", inside, by="anna")
+        outside = {"type": "LineString", "coordinates": [[7.05, 50.05], [7.05, 50.2]]}
+        await control.set_geometry("outside", outside, by="anna")
+        return await control.alerts()
+
+    (alert,) = play(story)
+    assert "geometry 'outside': waypoint 2, [50.200000, 7.050000], is 11" in alert.text
+    assert "outside the fleet's fence" in alert.text
 
 
 def test_the_next_executive_knows_them(play: Any) -> None:
@@ -244,6 +264,7 @@ _WRITER = """
 import asyncio, sys
 from m2pem.executive.drawings import Drawings
 from m2pem.journal import open_journal
+from m2pem.mission.geometry import Area
 from m2pem.testing import scenarios
 
 async def write(url, who, times):

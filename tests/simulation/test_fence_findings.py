@@ -96,7 +96,7 @@ def test_a_return_that_would_cross_a_hole_is_a_warning_before(tmp_path: Path) ->
         ],
     )
     assert (found_.severity, found_.rule) == (Severity.WARNING, "return-leaves-fence")
-    assert "the way to its home leaves the fleet's fence by 20 m" in found_.message
+    assert "the way to its home leaves the fleet's fence by 16 m" in found_.message
 
 
 def test_a_home_outside_is_named(tmp_path: Path) -> None:
