@@ -7,6 +7,7 @@ vehicle, whose plan says where it ends, or to the start of the mission, at the v
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from itertools import pairwise
 
 from m2pem.api.arbiter import Connection
 from m2pem.api.fence_check import FenceCheck
@@ -65,8 +66,12 @@ def crossed(parameters: LocalParameters, made: Manoeuvre) -> str:
     fence = parameters.fence
     if fence is None or made.plan is None:
         return ""
-    start, *way = map(fence.frame.to_latlon, track_of(made.plan))
-    return fence.breach(way, start, lambda _: "a corner of its way home")
+    track = track_of(made.plan)
+    way = [to for at, to in pairwise(track) if math.dist(at, to) > 1e-3]
+    start, *places = map(fence.frame.to_latlon, (track[0], *way))
+    return fence.breach(
+        places, start, lambda at: "its home" if at == len(way) - 1 else "a corner of its way home"
+    )
 
 
 def fence_findings(mission: Mission, fleet: Fleet) -> list[Finding]:
