@@ -8,6 +8,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import pairwise
+from typing import TypeAlias
 
 from m2pem.api.arbiter import Connection
 from m2pem.api.fence_check import FenceCheck
@@ -15,7 +16,7 @@ from m2pem.errors import FleetError
 from m2pem.findings import Finding, Severity
 from m2pem.fleet.allocation import resources_of
 from m2pem.fleet.behaviors import SHARED
-from m2pem.fleet.fleet import SIMULATED, Fleet
+from m2pem.fleet.fleet import Fleet
 from m2pem.fleet.parameters import ResolvedValue, examine
 from m2pem.fleet.task_findings import TaskFindings
 from m2pem.geo.fence import Fence
@@ -37,6 +38,11 @@ _BY_TRACK = ("area_observe", "area_survey", "orbit")
 
 _MOST_TASKS = 100
 """So many tasks of a vehicle are followed back at once; later ones begin where these end."""
+
+_ENDS_AT_A_PLACE = ("area_survey", "goto", "single_vehicle_routing")
+"""Behaviors that end at the same place wherever they begin."""
+
+_Start: TypeAlias = tuple[Pose, bool] | None
 
 _AS_ROUTES = ("formation", "road_following_formation", "road_sweep", "bridge_crossing")
 
@@ -75,8 +81,8 @@ def crossed(parameters: LocalParameters, made: Manoeuvre) -> str:
 
 
 def fence_findings(mission: Mission, fleet: Fleet) -> list[Finding]:
-    """Return an error for each behavior that the fence refuses, and a warning where only a return
-    would leave it, once for each vehicle."""
+    """Return an error for each behavior that the fence refuses, or a warning where it does if the
+    vehicle begins at its home; and where a return would leave it, once for each vehicle."""
     area = fleet.geometries.get(fleet.fence)
     return list(_Fenced(mission, fleet, area).found()) if isinstance(area, Area) else []
 
@@ -97,7 +103,7 @@ class _Fenced:
                 continue  # other checks say why
             self._vehicles[each] = SimVehicle(connection, settings, self._frame, place, 0)
         self._returned: set[ResourceId] = set()
-        self._ends: dict[tuple[FlowNode, ResourceId], Pose | None] = {}
+        self._ends: dict[tuple[FlowNode, ResourceId], _Start] = {}
 
     def found(self) -> Iterator[Finding]:
         for task in self._mission.activities():
@@ -119,10 +125,10 @@ class _Fenced:
         findings: TaskFindings,
     ) -> None:
         alone = behavior.type is BehaviorType.VEHICLE and any(r.resource for r in behavior.roles)
-        start = self._start(task, name) if alone else None
+        start, certain = (self._start(task, name) if alone else None) or (None, True)
         craft, made, reason = self._made(behavior, values, name, start)
         if reason:
-            certain = start is None or self._home_is_stated(name)
+            certain = certain or bool(self._made(behavior, values, name, None)[2])
             findings.add(
                 "outside-fence",
                 f"{name}: {reason}",
@@ -172,8 +178,9 @@ class _Fenced:
         reason = "" if moves else refusal(does, parameters, craft, made, start is not None)
         return craft, made, reason
 
-    def _start(self, node: FlowNode, name: ResourceId, depth: int = 0) -> Pose | None:
-        """Return where a vehicle is when a task begins; None: it is not known."""
+    def _start(self, node: FlowNode, name: ResourceId, depth: int = 0) -> _Start:
+        """Return where a vehicle is when a task begins, and whether that is certain: it may not
+        begin at its home. None: it is not known."""
         seen: set[FlowNode] = set()
         while node not in seen:
             seen.add(node)
@@ -182,7 +189,7 @@ class _Fenced:
                     node = node.container
                     continue
                 is_main = node.container is self._mission.process()
-                return self._vehicles[name].pose(0) if is_main else None
+                return (self._vehicles[name].pose(0), False) if is_main else None
             if len(node.incoming) != 1:
                 return None
             node = node.incoming[0].source
@@ -195,18 +202,14 @@ class _Fenced:
                 return self._ends.get((node, name))
         return None
 
-    def _end(self, task: FlowNode, behavior: Behavior, name: ResourceId, depth: int) -> Pose | None:
+    def _end(self, task: FlowNode, behavior: Behavior, name: ResourceId, depth: int) -> _Start:
         values, start = self._values(behavior), self._start(task, name, depth)
         if values is None or start is None or behavior.type is not BehaviorType.VEHICLE:
             return None
-        _, made, _ = self._made(behavior, values, name, start)
+        _, made, _ = self._made(behavior, values, name, start[0])
         if made is None or made.plan is None or math.isinf(made.plan.duration_s):
             return None
-        return made.plan.at(made.plan.duration_s)
-
-    def _home_is_stated(self, name: ResourceId) -> bool:
-        simulated = self._fleet.vehicles[name].arbiter == SIMULATED
-        return simulated or self._vehicles[name].settings.home is not None
+        return made.plan.at(made.plan.duration_s), start[1] or behavior.name in _ENDS_AT_A_PLACE
 
     def _who(self, behavior: Behavior) -> list[ResourceId]:
         """Return the vehicles that perform a behavior; of a role by need, one stands for all."""
