@@ -284,6 +284,11 @@ class RemainingSurvey(RemainingWork):
             "tracks": [list(self.frame.to_latlon(point)) for point in self.line.points],
             "width": self.tracks.width_m,
             "overshoot": self.tracks.overshoot_m,
+            "passes": [list(each) for each in self.tracks.passes],
+            "holes": [
+                [list(self.frame.to_latlon(corner)) for corner in ring]
+                for ring in self.tracks.holes
+            ],
             "up": self._up_m,
             "altitude_frame": self._altitude_frame,
         }
@@ -303,8 +308,13 @@ def restored_work(state: Mapping[str, Any], frame: LocalFrame) -> RemainingWork:
             raise TypeError("the state of a route has no route")
         work = RemainingRoute(parameters, route, frame)
     else:
-        points = [frame.to_local((latitude, longitude)) for latitude, longitude in state["tracks"]]
-        tracks = SurveyTracks(points, float(state["width"]), float(state["overshoot"]))
+        points, *holes = (
+            [frame.to_local((latitude, longitude)) for latitude, longitude in places]
+            for places in (state["tracks"], *state.get("holes", ()))
+        )
+        passes = [(int(at), *metres) for at, *metres in state.get("passes", ())]
+        width_m, overshoot_m = float(state["width"]), float(state["overshoot"])
+        tracks = SurveyTracks(points, width_m, overshoot_m, passes, holes)
         work = RemainingSurvey(parameters, tracks, frame, state["up"], str(state["altitude_frame"]))
     work.go_on_from(state)
     return work

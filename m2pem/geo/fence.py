@@ -55,20 +55,35 @@ class Fence:
         clearance_m: float = 0.0,
         frame: LocalFrame | None = None,
     ) -> None:
-        import shapely  # noqa: PLC0415  # slow to load
-
-        self._shapely = shapely
         if frame is None:
             first, *_ = (inclusion, *exclusions) if inclusion is not None else exclusions
             frame = LocalFrame(first.rings[0][0][:2])
         self.frame = frame
         self._given = inclusion, exclusions
-        everywhere = shapely.box(-_FAR_M, -_FAR_M, _FAR_M, _FAR_M)
-        inside = everywhere
+        inside = None
         kept_out = [area_in(each.rings, frame) for each in exclusions]
         if inclusion is not None:
             inside = area_in(inclusion.rings[:1], frame).buffer(-clearance_m, join_style="mitre")
             kept_out += [area_in([hole], frame) for hole in inclusion.rings[1:]]
+        self._keep(inside, kept_out, clearance_m)
+
+    @classmethod
+    def around(cls, rings: Sequence[Sequence[EastNorth]]) -> "Fence":
+        """Return the fence that keeps out what closed rings bound, in metres of any local frame: it
+        has no `frame`, and is for `is_free`, `way` and `closed`."""
+        fence = cls.__new__(cls)
+        fence._keep(None, [valid(ring) for ring in rings], 0.0)
+        return fence
+
+    def _keep(
+        self, inside: "BaseGeometry | None", kept_out: Sequence["BaseGeometry"], clearance_m: float
+    ) -> None:
+        import shapely  # noqa: PLC0415  # slow to load
+
+        self._shapely = shapely
+        everywhere = shapely.box(-_FAR_M, -_FAR_M, _FAR_M, _FAR_M)
+        if inside is None:
+            inside = everywhere
         self.closed: BaseGeometry = shapely.union_all(kept_out)
         """The exclusions with the clearance, in metres of the frame."""
         if clearance_m > 0:
@@ -237,15 +252,29 @@ def area_in(rings: Sequence[Sequence[Coordinate]], frame: LocalFrame) -> "BaseGe
     """Return the area that rings bound, made valid."""
     import shapely  # noqa: PLC0415
 
-    outer, *holes = (
-        shapely.make_valid(
-            shapely.Polygon([frame.to_local(corner[:2]) for corner in ring]),
-            method="structure",
-            keep_collapsed=False,
-        )
-        for ring in rings
-    )
+    outer, *holes = (valid([frame.to_local(corner[:2]) for corner in ring]) for ring in rings)
     return outer.difference(shapely.union_all(holes))
+
+
+def valid(ring: Sequence[EastNorth]) -> "BaseGeometry":
+    """Return what a closed ring bounds, made valid."""
+    import shapely  # noqa: PLC0415
+
+    return shapely.make_valid(shapely.Polygon(ring), method="structure", keep_collapsed=False)
+
+
+def rings_of(area: "BaseGeometry") -> list[list[EastNorth]]:
+    """Return the closed rings of an area; [] where it is not one polygon.
+
+    The first ring is the outer one, counter-clockwise, the others are holes, clockwise.
+    """
+    import shapely  # noqa: PLC0415
+
+    parts = [part for part in polygons(area) if not part.buffer(-GRAZE_M).is_empty]
+    if len(parts) != 1:
+        return []
+    part = shapely.orient_polygons(parts[0])
+    return [[(x, y) for x, y, *_ in ring.coords] for ring in (part.exterior, *part.interiors)]
 
 
 def polygons(geometry: "BaseGeometry") -> list[Any]:

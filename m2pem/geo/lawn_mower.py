@@ -1,24 +1,58 @@
 """Lawn-mower tracks over a polygon.
 
 Each strip of the given width is driven along its middle from where the polygon begins in the strip
-to where it ends, so that every point of the polygon is within half a spacing of a track.
+to where it ends, so that every point of the polygon is within half a spacing of a track. No pass
+enters a hole: where one has the middle of a strip, what is free beside it gets passes of its own.
 """
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
-from typing import TypeAlias
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
+from m2pem.geo.fence import Fence, polygons, valid
 from m2pem.geo.local_frame import EastNorth
 from m2pem.geo.polygon import Edge, turned
 
+if TYPE_CHECKING:
+    from shapely.geometry.base import BaseGeometry
+
 Ring: TypeAlias = Sequence[EastNorth]
 """A closed ring; the first point is repeated last."""
+
+Span: TypeAlias = tuple[float, float]
+"""From one x to a greater one."""
+
+Row: TypeAlias = list[tuple[float, Span]]
+"""The passes of one strip: the y and the span of each, by where they begin."""
 
 MAX_STRIPS = 5_000
 
 _SAME_LENGTH = 1e-5
 """Edges whose lengths differ by less than this part are equally long."""
+
+_NARROWEST_M = 0.05
+"""What is free beside a hole and narrower is left out."""
+
+_SHORTEST_M = 0.01
+_SEAM_M = 1e-4
+"""Passes side by side leave nothing between them, whatever the rounding."""
+
+_TRIED = 8
+"""Of so many lines through what is free beside a hole, the longest becomes a pass."""
+
+_ROUNDS = 40
+
+
+class Pass(NamedTuple):
+    """One pass, with how far it begins before the area and goes on beyond it, and how far it lies
+    to the left of the middle of its strip, in metres."""
+
+    start: EastNorth
+    end: EastNorth
+    before_m: float
+    after_m: float
+    left_m: float
 
 
 def longest_edge_yaw(ring: Ring) -> float:
@@ -35,8 +69,10 @@ def longest_edge_yaw(ring: Ring) -> float:
 
 def lawn_mower(
     rings: Sequence[Ring], spacing_m: float, yaw_rad: float, overshoot_m: float = 0.0
-) -> list[tuple[float, float]]:
+) -> list[EastNorth]:
     """The points to pass, in order; each pair of them is one pass over the area.
+
+    The way between two passes may lead over a hole: `SurveyTracks.over` has one that does not.
 
     Args:
         rings: the outer ring, then holes.
@@ -47,18 +83,135 @@ def lawn_mower(
     Raises:
         ValueError: it would take more than `MAX_STRIPS` passes.
     """
+    found = passes_over(rings, spacing_m, yaw_rad, overshoot_m)
+    return [point for each in found for point in (each.start, each.end)]
+
+
+def passes_over(
+    rings: Sequence[Ring], spacing_m: float, yaw_rad: float, overshoot_m: float = 0.0
+) -> list[Pass]:
+    """Return the passes of `lawn_mower`. One that ends at a hole does not go on beyond its end."""
+    found: list[Pass] = []
+    closed = _turned_holes(rings[1:], yaw_rad)
+    low, _, width_m = _strips([turned(corner, yaw_rad) for corner in rings[0]], spacing_m)
+    for number, row in enumerate(rows(rings, spacing_m, yaw_rad)):
+        backward = number % 2 == 1
+        for y, span in reversed(row) if backward else row:
+            low_m, high_m = (
+                overshoot_m if closed is None or is_free(closed, y, x, x + beyond) else 0.0
+                for x, beyond in ((span[0], -overshoot_m), (span[1], overshoot_m))
+            )
+            start = turned((span[0] - low_m, y), -yaw_rad)
+            end = turned((span[1] + high_m, y), -yaw_rad)
+            left_m = y - (low + (number + 0.5) * width_m)
+            one = Pass(start, end, low_m, high_m, left_m)
+            found.append(Pass(end, start, high_m, low_m, -left_m) if backward else one)
+    return found
+
+
+def rows(
+    rings: Sequence[Ring],
+    spacing_m: float,
+    yaw_rad: float,
+    closed: "BaseGeometry | None" = None,
+) -> list[Row]:
+    """Return the passes of each strip in axes that are turned by `yaw_rad`.
+
+    `closed`: where no pass is besides the holes, in axes that are not turned.
+
+    Raises:
+        ValueError: it would take more than `MAX_STRIPS` passes.
+    """
     level = [[turned(corner, yaw_rad) for corner in ring] for ring in rings]
-    low, strips, width = _strips(level[0], spacing_m)
-    points: list[tuple[float, float]] = []
+    low, strips, width_m = _strips(level[0], spacing_m)
+    found: list[Row] = []
     for strip in range(strips):
-        bottom = low + strip * width
-        passes = _passes(level, bottom, bottom + width)
-        middle = bottom + width / 2
-        row = [((a - overshoot_m, middle), (b + overshoot_m, middle)) for a, b in passes]
-        if strip % 2:
-            row = [(b, a) for a, b in reversed(row)]
-        points.extend(point for pair in row for point in pair)
-    return [turned(point, -yaw_rad) for point in points]
+        bottom = low + strip * width_m
+        spans = _passes(level, bottom, bottom + width_m)
+        found.append([(bottom + width_m / 2, span) for span in spans])
+    if closed is None and len(rings) == 1:
+        return found
+    import shapely  # noqa: PLC0415
+    from shapely import affinity  # noqa: PLC0415
+
+    kept_out = (
+        [] if closed is None else [affinity.rotate(closed, -yaw_rad, (0, 0), use_radians=True)]
+    )
+    holes = _turned_holes(rings[1:], yaw_rad)
+    obstacles = shapely.union_all([*kept_out, *([] if holes is None else [holes])])
+    region = valid(level[0]).difference(obstacles)
+    if region.is_empty:
+        return []
+    return [
+        _beside(row, region, obstacles, low + strip * width_m, width_m)
+        for strip, row in enumerate(found)
+    ]
+
+
+def is_free(closed: "BaseGeometry", y: float, from_x: float, to_x: float) -> bool:
+    """Whether a line along x stays out of what is closed; it may touch it."""
+    import shapely  # noqa: PLC0415
+
+    line = shapely.LineString(((from_x, y), (to_x, y)))
+    return line.length == 0.0 or line.intersection(closed).length < _SHORTEST_M
+
+
+def _turned_holes(holes: Sequence[Ring], yaw_rad: float) -> "BaseGeometry | None":
+    if not holes:
+        return None
+    return Fence.around([[turned(corner, yaw_rad) for corner in ring] for ring in holes]).closed
+
+
+def _beside(
+    row: Row, region: "BaseGeometry", closed: "BaseGeometry", bottom: float, width_m: float
+) -> Row:
+    """Return the passes of a strip that stay out of what is closed, with those beside it."""
+    import shapely  # noqa: PLC0415
+
+    half_m = width_m / 2 + _SEAM_M
+    new = [(y, part) for y, span in row for part in _cut(y, span, closed)]
+    found = list(new)
+    west, _, east, _ = region.bounds
+    left = region.intersection(shapely.box(west, bottom, east, bottom + width_m))
+    for _ in range(_ROUNDS):
+        boxes = [shapely.box(low, y - half_m, high, y + half_m) for y, (low, high) in new]
+        left = left.difference(shapely.union_all(boxes)) if boxes else left
+        new = []
+        for part in polygons(left):
+            if not part.buffer(-_NARROWEST_M / 2).is_empty:
+                new += _longest(part, closed)
+        if not new:
+            break
+        found += new
+    return sorted(found, key=lambda each: each[1])
+
+
+def _longest(part: "BaseGeometry", closed: "BaseGeometry") -> Row:
+    """Return passes along the longest of some lines through a part of a strip."""
+    low_x, low_y, high_x, high_y = part.bounds
+    best: Row = []
+    # From the middle outwards: of lines that are equally long, the one in the middle.
+    for step in sorted(range(1, _TRIED), key=lambda each: abs(each - _TRIED / 2)):
+        y = low_y + (high_y - low_y) * step / _TRIED
+        tried = [(y, span) for span in _cut(y, (low_x, high_x), closed)]
+        if _length_m(tried) > _length_m(best) + _SHORTEST_M:
+            best = tried
+    return best
+
+
+def _length_m(row: Row) -> float:
+    return sum(high - low for _, (low, high) in row)
+
+
+def _cut(y: float, span: Span, closed: "BaseGeometry") -> Iterator[Span]:
+    """Yield the parts of a pass that are free."""
+    import shapely  # noqa: PLC0415
+
+    left = shapely.LineString([(span[0], y), (span[1], y)]).difference(closed)
+    for part in shapely.get_parts(left):
+        if part.length >= _SHORTEST_M:
+            xs = [x for x, *_ in part.coords]
+            yield min(xs), max(xs)
 
 
 def strip_width_m(ring: Ring, spacing_m: float, yaw_rad: float) -> float:
@@ -79,10 +232,10 @@ def _strips(ring: Ring, spacing_m: float) -> tuple[float, int, float]:
     return low, strips, height / strips
 
 
-def _passes(rings: Sequence[Ring], bottom: float, top: float) -> list[tuple[float, float]]:
+def _passes(rings: Sequence[Ring], bottom: float, top: float) -> list[Span]:
     """The spans of x that the polygon takes between two y."""
     corners = sorted({y for ring in rings for _, y in ring if bottom < y < top} | {bottom, top})
-    spans: list[tuple[float, float]] = []
+    spans: list[Span] = []
     for low, high in pairwise(corners):
         middle = (low + high) / 2
         # Between two corners' heights the edges do not cross, so their order in the middle holds.
@@ -94,7 +247,7 @@ def _passes(rings: Sequence[Ring], bottom: float, top: float) -> list[tuple[floa
                     max(_x(right, low), _x(right, high)),
                 )
             )
-    return _merged(spans)
+    return merged(spans)
 
 
 def _edges_at(rings: Sequence[Ring], y: float) -> Iterator[Edge]:
@@ -110,12 +263,12 @@ def _x(edge: Edge, y: float) -> float:
     return ax + (bx - ax) * part
 
 
-def _merged(spans: Iterable[tuple[float, float]]) -> list[tuple[float, float]]:
+def merged(spans: Iterable[Span]) -> list[Span]:
     """Return spans in order, those that touch as one."""
-    merged: list[tuple[float, float]] = []
+    found: list[Span] = []
     for low, high in sorted(spans):
-        if merged and low <= merged[-1][1]:
-            merged[-1] = merged[-1][0], max(merged[-1][1], high)
+        if found and low <= found[-1][1]:
+            found[-1] = found[-1][0], max(found[-1][1], high)
         else:
-            merged.append((low, high))
-    return merged
+            found.append((low, high))
+    return found

@@ -6,17 +6,16 @@ kept out. Several vehicles get passes in a row, by their speeds.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise, product
 from typing import TypeAlias
 
-import shapely
 from shapely.geometry.base import BaseGeometry
 
 from m2pem.geo.fence import Fence, area_in, polygons
 from m2pem.geo.geojson import GeometryError
-from m2pem.geo.lawn_mower import lawn_mower
+from m2pem.geo.lawn_mower import Row, Span, rows
 from m2pem.geo.local_frame import EastNorth, LocalFrame
 from m2pem.geo.polygon import convex_hull, turned
 from m2pem.geo.work_shares import owners, reach_m, split
@@ -27,9 +26,7 @@ MAX_CORNERS = 500
 """Of the area and of all that is kept out together: the way around them is searched."""
 
 _TRIED_HEADINGS = 3
-_SHORTEST_M = 0.01
 _SAME_HEADING_RAD = 1e-6
-_ROW_DIGITS = 4
 
 Pass: TypeAlias = tuple[EastNorth, EastNorth]
 """From its beginning to its end, in metres."""
@@ -192,7 +189,7 @@ def _width_m(hull: Sequence[EastNorth], yaw: float) -> float:
 
 def _passes(pattern: SurveyPattern, ground: _Ground, yaw: float) -> list[Pass]:
     """Return the passes in the order in which they are flown or driven."""
-    cells: list[_Cell] = []
+    cells: list[Row] = []
     for part in polygons(ground.region):
         rings = [[(x, y) for x, y, *_ in ring.coords] for ring in (part.exterior, *part.interiors)]
         if _width_m(rings[0], yaw) > MAX_PASSES * pattern.spacing_m:
@@ -200,38 +197,21 @@ def _passes(pattern: SurveyPattern, ground: _Ground, yaw: float) -> list[Pass]:
                 f"spacing: {pattern.spacing_m:g} m needs more than {MAX_PASSES} passes: "
                 "survey with a wider spacing, or a smaller area"
             )
-        rows: dict[float, list[tuple[float, float]]] = {}
-        points = lawn_mower(rings, pattern.spacing_m, yaw)
-        for a, b in zip(points[::2], points[1::2], strict=True):
-            for start, end in _outside((a, b), ground.fence.closed):
-                (ax, ay), (bx, _) = turned(start, yaw), turned(end, yaw)
-                rows.setdefault(round(ay, _ROW_DIGITS), []).append((min(ax, bx), max(ax, bx)))
-        cells += _cells([(y, sorted(spans)) for y, spans in sorted(rows.items())])
+        closed = None if ground.fence.closed.is_empty else ground.fence.closed
+        cells += _cells(rows(rings[:1], pattern.spacing_m, yaw, closed))
     ordered = _ordered(cells, pattern.corner)
     return [(turned(a, -yaw), turned(b, -yaw)) for a, b in ordered]
 
 
-def _outside(line: Pass, closed: BaseGeometry) -> Iterator[Pass]:
-    """Yield the parts of a pass that are not kept out: a strip is as long as its longest side."""
-    left = shapely.LineString(line).difference(closed)
-    for part in getattr(left, "geoms", [left]):
-        if part.length >= _SHORTEST_M:
-            yield tuple(part.coords[0][:2]), tuple(part.coords[-1][:2])
-
-
-_Cell: TypeAlias = list[tuple[float, tuple[float, float]]]
-"""The y and the span of x of passes side by side."""
-
-
-def _cells(rows: Sequence[tuple[float, Sequence[tuple[float, float]]]]) -> list[_Cell]:
-    """Group passes: a cell ends where a pass has two neighbours, or none, in the next row."""
-    cells: list[_Cell] = []
-    before: list[tuple[_Cell, tuple[float, float]]] = []
-    for y, spans in rows:
-        now: list[tuple[_Cell, tuple[float, float]]] = []
-        for span in spans:
+def _cells(strips: Sequence[Row]) -> list[Row]:
+    """Group passes: a cell ends where a pass has two neighbours, or none, in the next strip."""
+    cells: list[Row] = []
+    before: list[tuple[Row, Span]] = []
+    for row in strips:
+        now: list[tuple[Row, Span]] = []
+        for y, span in row:
             near = [(cell, other) for cell, other in before if _overlap(other, span)]
-            alone = len(near) == 1 and sum(_overlap(near[0][1], each) for each in spans) == 1
+            alone = len(near) == 1 and sum(_overlap(near[0][1], each) for _, each in row) == 1
             cell = near[0][0] if alone else []
             if not alone:
                 cells.append(cell)
@@ -241,11 +221,11 @@ def _cells(rows: Sequence[tuple[float, Sequence[tuple[float, float]]]]) -> list[
     return cells
 
 
-def _overlap(a: tuple[float, float], b: tuple[float, float]) -> bool:
+def _overlap(a: Span, b: Span) -> bool:
     return a[0] < b[1] and b[0] < a[1]
 
 
-def _ordered(cells: Sequence[_Cell], corner: int) -> list[Pass]:
+def _ordered(cells: Sequence[Row], corner: int) -> list[Pass]:
     """Return the passes of all cells, from the corner on: next is the cell that begins nearest."""
     spans = [span for cell in cells for _, span in cell]
     if not spans:
@@ -265,11 +245,11 @@ def _ordered(cells: Sequence[_Cell], corner: int) -> list[Pass]:
     return ordered
 
 
-def _serpentines(cell: _Cell) -> list[list[Pass]]:
+def _serpentines(cell: Row) -> list[list[Pass]]:
     """Return the four ways to cover a cell: from each of its corners."""
     ways = []
-    for rows, first in product((cell, cell[::-1]), (0, 1)):
-        ends = [((span[0], y), (span[1], y)) for y, span in rows]
+    for passes, first in product((cell, cell[::-1]), (0, 1)):
+        ends = [((span[0], y), (span[1], y)) for y, span in passes]
         ways.append([(a, b) if row % 2 == first else (b, a) for row, (a, b) in enumerate(ends)])
     return ways
 

@@ -10,12 +10,15 @@ from collections.abc import Iterable, Sequence
 from itertools import pairwise
 from typing import TypeAlias
 
+from m2pem.geo.fence import Fence, rings_of
+from m2pem.geo.lawn_mower import Ring, Span, merged, passes_over, strip_width_m
 from m2pem.geo.local_frame import EastNorth
 from m2pem.geo.polygon import turned
 from m2pem.geo.polyline import Polyline
 
-Span: TypeAlias = tuple[float, float]
-"""From one x to a greater one."""
+PassAt: TypeAlias = tuple[int, float, float, float]
+"""The index of a pass's first end, how far it goes on beyond its strip there and at the other end,
+and how far it lies to the left of the strip's middle, in metres."""
 
 Slab: TypeAlias = tuple[float, float, Sequence[Span]]
 """From one y to a greater one, and the spans of x between them."""
@@ -27,26 +30,77 @@ else a small error of a corner would lengthen the pass beside it."""
 _SLACK = 0.05
 """Share of a strip's width by which the height of all strips may seem greater than it is."""
 
+_SEAM_M = 1e-3
+"""Strips side by side overlap by so much, whatever the rounding."""
+
 _SHORTEST_M = 0.01
 _DIGITS = 2
 """Of the ends of spans: passes that end on one line get a straight side."""
 
 
 class SurveyTracks:
-    """`points`: in pairs, the ends of each pass, in the order in which they are passed.
+    """`points`: the ends of each pass, in the order in which they are passed, with the places to
+    pass on the way from one to the next around `holes` of the area.
 
-    `width_m`: of a strip. `overshoot_m`: how far a pass goes on beyond its strip at both ends. All
-    passes are parallel. Distances along the tracks are in metres and count the ways between passes.
+    `width_m`: of a strip. `passes`: if none is given, the points are the ends of passes, in pairs,
+    which go on by `overshoot_m`. All passes are parallel. Distances along the tracks are in metres
+    and count the ways between passes.
     """
 
     def __init__(
-        self, points: Sequence[EastNorth], width_m: float, overshoot_m: float = 0.0
+        self,
+        points: Sequence[EastNorth],
+        width_m: float,
+        overshoot_m: float = 0.0,
+        passes: Sequence[PassAt] = (),
+        holes: Sequence[Ring] = (),
     ) -> None:
         self.line = Polyline(points)
         self.width_m = width_m
         self.overshoot_m = overshoot_m
-        first, second = points[:2]
-        self.yaw_rad = math.atan2(second[1] - first[1], second[0] - first[0])
+        self.passes = tuple(passes) or tuple(
+            (index, overshoot_m, overshoot_m, 0.0) for index in range(0, len(points) - 1, 2)
+        )
+        self.holes = tuple(holes)
+        first = self.passes[0][0]
+        (ax, ay), (bx, by) = self.line.points[first : first + 2]
+        self.yaw_rad = math.atan2(by - ay, bx - ax)
+
+    @classmethod
+    def over(
+        cls, rings: Sequence[Ring], spacing_m: float, yaw_rad: float, overshoot_m: float = 0.0
+    ) -> "SurveyTracks":
+        """Return the tracks of `lawn_mower` over an area, with the ways around its holes.
+
+        Raises:
+            ValueError: it would take too many passes, nothing of the area is left beside its holes,
+                or a part of it cannot be reached without crossing one.
+        """
+        found = passes_over(rings, spacing_m, yaw_rad, overshoot_m)
+        if not found:
+            raise ValueError("area: nothing is left beside its holes")
+        fence = Fence.around(rings[1:]) if len(rings) > 1 else None
+        points: list[EastNorth] = []
+        passes: list[PassAt] = []
+        for each in found:
+            if points and fence is not None:
+                way = fence.way(points[-1], each.start)
+                if way is None:
+                    raise ValueError("area: a part cannot be reached without crossing a hole")
+                points += way
+            passes.append((len(points), each.before_m, each.after_m, each.left_m))
+            points += (each.start, each.end)
+        width_m = strip_width_m(rings[0], spacing_m, yaw_rad)
+        return cls(points, width_m, overshoot_m, passes, rings[1:])
+
+    def reversed(self) -> "SurveyTracks":
+        """Return the same tracks from their other end."""
+        last = len(self.line.points) - 2
+        passes = [
+            (last - index, after, before, -left) for index, before, after, left in self.passes[::-1]
+        ]
+        points = self.line.points[::-1]
+        return SurveyTracks(points, self.width_m, self.overshoot_m, passes, self.holes)
 
     def spacing_m(self, rings: Sequence[Sequence[EastNorth]]) -> float:
         """Return the spacing with which tracks over a part are as these, in any local frame."""
@@ -61,33 +115,48 @@ class SurveyTracks:
         or where what they cover is not connected.
         """
         strips = self._strips(from_m, to_m)
-        rings = _outline(_slabs(strips, self.width_m))
-        outer = [ring for ring in rings if _area(ring) > 0]
-        if len(outer) != 1:
-            return []
-        holes = [ring for ring in rings if _area(ring) < 0]
-        return [[turned(corner, -self.yaw_rad) for corner in ring] for ring in (outer[0], *holes)]
+        if self.holes:
+            level = self._beside_holes(strips)
+        else:
+            level = sorted(_outline(_slabs(strips, self.width_m)), key=_area, reverse=True)
+            if sum(_area(ring) > 0 for ring in level) != 1:
+                return []
+        return [[turned(corner, -self.yaw_rad) for corner in ring] for ring in level]
+
+    def _beside_holes(self, strips: Sequence[tuple[float, list[Span]]]) -> list[list[EastNorth]]:
+        """Return strips without the holes of the area, in axes that are turned as the passes."""
+        import shapely  # noqa: PLC0415
+
+        half_m = self.width_m / 2 + _SEAM_M
+        boxes = [
+            shapely.box(low, y - half_m, high, y + half_m)
+            for y, spans in strips
+            for low, high in spans
+        ]
+        holes = [[turned(corner, self.yaw_rad) for corner in ring] for ring in self.holes]
+        return rings_of(shapely.union_all(boxes).difference(Fence.around(holes).closed))
 
     def _strips(self, from_m: float, to_m: float) -> list[tuple[float, list[Span]]]:
         """Return the middle of each strip and its spans, from the lowest strip to the highest."""
         strips: list[tuple[float, list[Span]]] = []
-        for index in range(0, len(self.line.points) - 1, 2):
+        for index, before_m, after_m, left_m in self.passes:
             begin_m, end_m = self.line.marks_m[index], self.line.marks_m[index + 1]
-            low_m = max(from_m, begin_m + self.overshoot_m)
-            high_m = min(to_m, end_m - self.overshoot_m)
+            low_m = max(from_m, begin_m + before_m)
+            high_m = min(to_m, end_m - after_m)
             if high_m - low_m < _SHORTEST_M:
                 continue
             segment = self.line.segments[index]
             (ax, ay), (bx, _) = (
                 turned(segment.at(along_m - begin_m), self.yaw_rad) for along_m in (low_m, high_m)
             )
+            ay -= left_m if math.cos(segment.yaw_rad - self.yaw_rad) > 0 else -left_m
             span = round(min(ax, bx), _DIGITS), round(max(ax, bx), _DIGITS)
             same = next((s for y, s in strips if abs(y - ay) < self.width_m / 2), None)
             if same is None:
                 strips.append((ay, [span]))
             else:
                 same.append(span)
-        return sorted((y, sorted(spans)) for y, spans in strips)
+        return sorted((y, merged(spans)) for y, spans in strips)
 
 
 def _slabs(strips: Sequence[tuple[float, Sequence[Span]]], width_m: float) -> list[Slab]:

@@ -10,7 +10,7 @@ from m2pem.api.remaining import (
     RemainingWork,
     raw_parameters,
 )
-from m2pem.geo.lawn_mower import lawn_mower, longest_edge_yaw, strip_width_m
+from m2pem.geo.lawn_mower import longest_edge_yaw
 from m2pem.geo.polygon import middle_of
 from m2pem.geo.polyline import Polyline
 from m2pem.geo.survey_tracks import SurveyTracks
@@ -155,15 +155,15 @@ def _survey(craft: Craft, parameters: LocalParameters) -> Manoeuvre:
     yaw = longest_edge_yaw(rings[0]) if heading is None else yaw_of(heading)
     spacing, overshoot = parameters.spacing_m or SURVEY_SPACING_M, parameters.overshoot_m
     try:
-        tracks = lawn_mower(rings, spacing, yaw, overshoot)
+        tracks = SurveyTracks.over(rings, spacing, yaw, overshoot)
     except ValueError as error:
-        raise RefusedError(f"parameter 'spacing': {error}") from None
+        raise RefusedError(f"parameter {error}") from None
     up = flying_height(craft, parameters)
-    places: list[Vector] = [(east, north, up) for east, north in tracks]
+    places: list[Vector] = [(east, north, up) for east, north in tracks.line.points]
     course = under_way(craft, up).through(places, parameters.speed_m_s, radius_m=0.0)
     work = RemainingSurvey(
         raw_parameters(parameters.given),
-        SurveyTracks(tracks, strip_width_m(rings[0], spacing, yaw), overshoot),
+        tracks,
         parameters.frame,
         area.rings[0][0][2],
         area.altitude_frame,

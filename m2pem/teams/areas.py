@@ -6,7 +6,8 @@ from itertools import pairwise
 from typing import TypeAlias
 
 from m2pem.fleet.parameters import accepted
-from m2pem.geo.lawn_mower import lawn_mower, longest_edge_yaw, strip_width_m
+from m2pem.geo.fence import Fence, rings_of, valid
+from m2pem.geo.lawn_mower import Ring, longest_edge_yaw
 from m2pem.geo.polygon import middle_of
 from m2pem.geo.survey_tracks import SurveyTracks
 from m2pem.geo.work_shares import owners, reach_m, split
@@ -17,67 +18,50 @@ from m2pem.teams.plan import Leg, Plan, PlanningContext, TeamRefusedError
 Place: TypeAlias = tuple[float, float]
 """East and north in metres."""
 
-Pass: TypeAlias = Sequence[Place]
-"""The two ends of a pass; or the corners of a closed ring, the first one again at the end."""
 
-
-def lanes(passes: Sequence[Pass], shares: Sequence[float]) -> list[list[Pass]]:
-    """Return each member's passes, in their order, so that their lengths are as the shares."""
-    lanes: list[list[Pass]] = [[] for _ in shares]
-    lengths = [math.dist(*each) for each in passes]
-    for each, index in zip(passes, owners(lengths, shares), strict=True):
-        lanes[index].append(each)
-    return lanes
+def lanes(tracks: SurveyTracks, shares: Sequence[float]) -> list[list[Place]]:
+    """Return each member's places to pass, so that the lengths of its passes are as its share."""
+    first: dict[int, int] = {}
+    last: dict[int, int] = {}
+    at = [index for index, *_ in tracks.passes]
+    lengths = [tracks.line.segments[index].length_m for index in at]
+    for index, owner in zip(at, owners(lengths, shares), strict=True):
+        first.setdefault(owner, index)
+        last[owner] = index + 2
+    points = tracks.line.points
+    return [list(points[first.get(each, 0) : last.get(each, 0)]) for each in range(len(shares))]
 
 
 def strips(
-    rings: Sequence[Pass], passes: Sequence[Pass], yaw_rad: float, shares: Sequence[float]
+    rings: Sequence[Ring], tracks: SurveyTracks, shares: Sequence[float]
 ) -> list[list[list[Place]]]:
-    """Return each member's band of an area as rings; an empty list for a member without a pass."""
-    level = [[turned(corner, (0.0, 0.0), yaw_rad) for corner in ring] for ring in rings]
-    low = min(y for _, y in level[0])
-    high = max(y for _, y in level[0])
-    lengths: dict[float, float] = {}
-    for each in passes:
-        y = round(turned(each[0], (0.0, 0.0), yaw_rad)[1], 6)
-        lengths[y] = lengths.get(y, 0.0) + math.dist(*each)
-    whose = owners(list(lengths.values()), shares)
-    middles = list(lengths)
+    """Return each member's band of an area as rings; an empty list for a member without a pass, or
+    whose band is in several pieces."""
+    import shapely  # noqa: PLC0415
+
+    level = [[turned(corner, (0.0, 0.0), tracks.yaw_rad) for corner in ring] for ring in rings]
+    west, east = (extreme(x for x, _ in level[0]) for extreme in (min, max))
+    low, high = (extreme(y for _, y in level[0]) for extreme in (min, max))
+    count = max(1, round((high - low) / tracks.width_m))
+    lengths = [0.0] * count
+    for index, *_ in tracks.passes:
+        y = turned(tracks.line.points[index], (0.0, 0.0), tracks.yaw_rad)[1]
+        strip = min(count - 1, int((y - low) / tracks.width_m))
+        lengths[strip] += tracks.line.segments[index].length_m
+    whose = owners(lengths, shares)
+    area = valid(level[0]).difference(Fence.around(level[1:]).closed)
     parts: list[list[list[Place]]] = []
     for member in range(len(shares)):
-        mine = [y for y, owner in zip(middles, whose, strict=True) if owner == member]
+        mine = [strip for strip, owner in enumerate(whose) if owner == member]
         if not mine:
             parts.append([])
             continue
-        first, last = middles.index(mine[0]), middles.index(mine[-1])
-        bottom = low if first == 0 else (middles[first - 1] + middles[first]) / 2
-        top = high if last == len(middles) - 1 else (middles[last] + middles[last + 1]) / 2
-        cut = [_between(ring, bottom, top) for ring in level]
+        bottom, top = low + mine[0] * tracks.width_m, low + (mine[-1] + 1) * tracks.width_m
+        band = rings_of(area.intersection(shapely.box(west - 1, bottom, east + 1, top)))
         parts.append(
-            [
-                [turned(corner, (0.0, 0.0), -yaw_rad) for corner in [*ring, ring[0]]]
-                for ring in cut
-                if len(ring) > 2
-            ]
+            [[turned(corner, (0.0, 0.0), -tracks.yaw_rad) for corner in ring] for ring in band]
         )
     return parts
-
-
-def _between(ring: Pass, bottom: float, top: float) -> list[Place]:
-    """Return the corners of the part of a closed ring between two y."""
-    kept = _above(list(ring[:-1]), bottom)
-    over = _above([(x, -y) for x, y in kept], -top)
-    return [(x, -y) for x, y in over]
-
-
-def _above(corners: Sequence[Place], bottom: float) -> list[Place]:
-    found: list[Place] = []
-    for a, b in zip(corners, [*corners[1:], *corners[:1]], strict=True):
-        if a[1] >= bottom:
-            found.append(a)
-        if (a[1] >= bottom) != (b[1] >= bottom):
-            found.append((a[0] + (b[0] - a[0]) * (bottom - a[1]) / (b[1] - a[1]), bottom))
-    return found
 
 
 def turned(
@@ -109,38 +93,33 @@ def survey(context: PlanningContext) -> Plan:
     yaw = longest_edge_yaw(rings[0]) if heading is None else math.pi / 2 - heading
     spacing = context.parameters.spacing_m or SURVEY_SPACING_M
     try:
-        tracks = lawn_mower(rings, spacing, yaw, context.parameters.overshoot_m)
+        tracks = SurveyTracks.over(rings, spacing, yaw, context.parameters.overshoot_m)
     except ValueError as error:
-        raise TeamRefusedError(f"parameter 'spacing': {error}") from None
+        raise TeamRefusedError(f"parameter {error}") from None
     speed_m_s = context.parameters.speed_m_s
-    passes = [tracks[index : index + 2] for index in range(0, len(tracks), 2)]
-    shares = context.split or _shares(context, rings[0], passes, speed_m_s)
+    lengths = [tracks.line.segments[index].length_m for index, *_ in tracks.passes]
+    shares = context.split or _shares(context, rings[0], lengths, speed_m_s)
     themselves = all("area_survey" in context.offered[member] for member in context.members)
-    behavior = "area_survey" if themselves else "single_vehicle_routing"
+    bands = strips(rings, tracks, shares) if themselves else [[] for _ in shares]
     legs: list[Leg] = []
-    if themselves:
-        # With the spacing itself, rounding may give a band one pass more than it has here.
-        whole = SurveyTracks(tracks, strip_width_m(rings[0], spacing, yaw))
-        parts = strips(rings, passes, yaw, shares)
-        for member, ring in zip(context.members, parts, strict=True):
-            if ring:
-                own = {
-                    **context.parameters.only("speed", "overshoot"),
-                    "area": _band_area(context, area, ring),
-                    "heading": (math.pi / 2 - yaw) % math.tau,
-                    "spacing": whole.spacing_m(ring),
-                }
-                legs.append(context.leg(member, behavior, own))
-    else:
-        for member, band in zip(context.members, lanes(passes, shares), strict=True):
-            if band:
-                ends = [place for each in band for place in each]
-                here = context.poses[member].place
-                if math.dist(here, ends[-1]) < math.dist(here, ends[0]):
-                    ends.reverse()
-                places = tuple(context.coordinate(place, None) for place in ends)
-                parameters = {"route": Route(places), "speed": speed_m_s}
-                legs.append(context.leg(member, behavior, parameters))
+    for member, band, ends in zip(context.members, bands, lanes(tracks, shares), strict=True):
+        if band:
+            own = {
+                **context.parameters.only("speed", "overshoot"),
+                "area": _band_area(context, area, band),
+                "heading": (math.pi / 2 - yaw) % math.tau,
+                # With the spacing itself, rounding may give a band one pass more than it has here.
+                "spacing": tracks.spacing_m(band),
+            }
+            legs.append(context.leg(member, "area_survey", own))
+        elif ends:
+            here = context.poses[member].place
+            if math.dist(here, ends[-1]) < math.dist(here, ends[0]):
+                ends.reverse()
+            places = tuple(context.coordinate(place, None) for place in ends)
+            parameters = {"route": Route(places), "speed": speed_m_s}
+            legs.append(context.leg(member, "single_vehicle_routing", parameters))
+    behavior = "area_survey" if themselves else "single_vehicle_routing"
     takes = {
         member: frozenset(accepted(context.offered[member][behavior])) for member in context.members
     }
@@ -149,14 +128,13 @@ def survey(context: PlanningContext) -> Plan:
 
 
 def _shares(
-    context: PlanningContext, ring: Pass, passes: Sequence[Pass], requested_m_s: float | None
+    context: PlanningContext, ring: Ring, lengths: Sequence[float], requested_m_s: float | None
 ) -> list[float]:
     """Return each member's share of the passes in metres: by its speed, within its endurance.
 
     Raises:
         TeamRefusedError: the endurance of all members together is too short.
     """
-    lengths = [math.dist(*each) for each in passes]
     corners = ring[:-1]
     middle = tuple(sum(axis) / len(corners) for axis in zip(*corners, strict=True))
     weights, reaches = [], []
@@ -181,7 +159,7 @@ def _shares(
     return shares
 
 
-def _band_area(context: PlanningContext, area: Area, rings: Sequence[Pass]) -> Area:
+def _band_area(context: PlanningContext, area: Area, rings: Sequence[Ring]) -> Area:
     """Return a part of the area, at the area's altitude."""
     up_m = area.rings[0][0][2]
     return Area(

@@ -9,7 +9,7 @@ from m2pem.api.behavior_parameters import BehaviorParameters
 from m2pem.api.remaining import RemainingRoute, RemainingSurvey, RemainingWork, raw_parameters
 from m2pem.fleet.behaviors import SHARED
 from m2pem.fleet.parameters import ParameterError, ResolvedValue, resolve
-from m2pem.geo.lawn_mower import lawn_mower, longest_edge_yaw, strip_width_m
+from m2pem.geo.lawn_mower import longest_edge_yaw
 from m2pem.geo.local_frame import EastNorth, LocalFrame
 from m2pem.geo.polyline import Polyline
 from m2pem.geo.survey_tracks import SurveyTracks
@@ -62,11 +62,9 @@ def work_of(
     yaw = longest_edge_yaw(rings[0]) if given.yaw_rad is None else given.yaw_rad
     spacing = given.spacing_m or SURVEY_SPACING_M
     try:
-        points = lawn_mower(rings, spacing, yaw, given.overshoot_m)
-        width_m = strip_width_m(rings[0], spacing, yaw)
+        tracks = SurveyTracks.over(rings, spacing, yaw, given.overshoot_m)
     except ValueError:
         return None
-    tracks = SurveyTracks(points, width_m, given.overshoot_m)
     return RemainingSurvey(raw, tracks, frame, area.rings[0][0][2], area.altitude_frame)
 
 

@@ -14,6 +14,7 @@ from m2pem.fleet.behaviors import SHARED
 from m2pem.fleet.check import TEAM_NEEDS
 from m2pem.fleet.parameters import accepted
 from m2pem.geo.lawn_mower import lawn_mower
+from m2pem.geo.survey_tracks import SurveyTracks
 from m2pem.mission.behavior import BehaviorType
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.geometry import Point, Route, VehiclePosition
@@ -236,9 +237,7 @@ def test_the_bands_of_an_area_are_all_of_it_and_each_is_within_reach_of_its_own_
     angles = [math.tau * index / len(radii) for index in range(len(radii))]
     corners = [(r * math.cos(a), r * math.sin(a)) for r, a in zip(radii, angles, strict=True)]
     rings = [[*corners, corners[0]]]
-    tracks = lawn_mower(rings, spacing, yaw)
-    passes = [tracks[index : index + 2] for index in range(0, len(tracks), 2)]
-    parts = strips(rings, passes, yaw, [1.0] * members)
+    parts = strips(rings, SurveyTracks.over(rings, spacing, yaw), [1.0] * members)
     sizes = [size_m2(part[0]) for part in parts if part]
     assert sum(sizes) == pytest.approx(size_m2(rings[0]), rel=1e-6)
     assert len(sizes) == min(members, len(sizes))

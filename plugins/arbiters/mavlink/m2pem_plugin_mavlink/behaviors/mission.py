@@ -12,6 +12,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem.api import (
     BehaviorState,
+    EastNorth,
     LatLon,
     LocalFrame,
     RemainingRoute,
@@ -20,10 +21,8 @@ from m2pem.api import (
     Route,
     SurveyTracks,
     Value,
-    lawn_mower,
     longest_edge_yaw,
     raw_parameters,
-    strip_width_m,
 )
 from m2pem_plugin_mavlink.behaviors.arrival import (
     StillnessTimer,
@@ -417,9 +416,10 @@ class Survey(MissionFlight):
     def __init__(self, context: BehaviorContext) -> None:
         super().__init__(context)
         self._width_m = self.parameters.spacing_m or SPACING_M
+        self._passes: Sequence[tuple[int, float, float, float]] = ()
 
     def way(self) -> Sequence[MissionItem]:
-        """Return the ends of the tracks."""
+        """Return the ends of the tracks, and the places on the ways around holes of the area."""
         area = self.parameters.area
         if area is None:
             raise BehaviorFailedError("parameter 'area': there is none")
@@ -429,41 +429,58 @@ class Survey(MissionFlight):
         yaw = longest_edge_yaw(rings[0]) if heading is None else math.pi / 2 - heading
         spacing = self.parameters.spacing_m or SPACING_M
         try:
-            points = lawn_mower(rings, spacing, yaw, self.parameters.overshoot_m)
-            self._width_m = strip_width_m(rings[0], spacing, yaw)
+            tracks = SurveyTracks.over(rings, spacing, yaw, self.parameters.overshoot_m)
         except ValueError as error:
-            raise BehaviorFailedError(f"parameter 'spacing': {error}") from None
-        places = [frame.to_latlon(point) for point in points]
-        if distance_to_m(self.vehicle, places[-1]) < distance_to_m(self.vehicle, places[0]):
-            places.reverse()
+            raise BehaviorFailedError(f"parameter {error}") from None
+        first, last = (frame.to_latlon(tracks.line.points[index]) for index in (0, -1))
+        if distance_to_m(self.vehicle, last) < distance_to_m(self.vehicle, first):
+            tracks = tracks.reversed()
+        self._width_m, self._passes = tracks.width_m, tracks.passes
         height = self.parameters.altitude_to_fly(area.rings[0][0][2], area.altitude_frame)
-        return [waypoint(place, *height) for place in places]
+        return [waypoint(frame.to_latlon(point), *height) for point in tracks.line.points]
 
     def work(self, way: Sequence[MissionItem]) -> RemainingWork:
         """Return the account of the tracks; after a restart of those that are stored."""
-        places = [item.latlon for item in way]
-        frame = LocalFrame(places[0])
-        points = [frame.to_local(place) for place in places]
-        tracks = SurveyTracks(points, self._width_m, self.parameters.overshoot_m)
+        frame = LocalFrame(way[0].latlon)
         area = self.parameters.area
         up_m: float | None = way[0].altitude_m
         up_frame = frame_name(way[0])
+        holes: list[list[EastNorth]] = []
         if area is not None:
             up_m, up_frame = area.rings[0][0][2], area.altitude_frame
+            holes = [[frame.to_local(corner[:2]) for corner in ring] for ring in area.rings[1:]]
+        tracks = SurveyTracks(
+            [frame.to_local(item.latlon) for item in way],
+            self._width_m,
+            self.parameters.overshoot_m,
+            self._passes,
+            holes,
+        )
         given = raw_parameters(self.parameters.given)
         return RemainingSurvey(given, tracks, frame, up_m, up_frame)
 
     def checkpoint(self) -> CheckpointState:
-        return {**super().checkpoint(), "width": self._width_m}
+        return {
+            **super().checkpoint(),
+            "width": self._width_m,
+            "passes": [value for each in self._passes for value in each],
+        }
 
     def restore(self, checkpoint: CheckpointState) -> None:
         super().restore(checkpoint)
-        width = checkpoint.get("width")
+        width, passes = checkpoint.get("width"), checkpoint.get("passes")
         if isinstance(width, int | float):
             self._width_m = float(width)
+        if isinstance(passes, list):
+            quads = zip(*[iter(passes)] * 4, strict=True)
+            self._passes = [(int(at), *metres) for at, *metres in quads]
 
     def named(self, index: int) -> str:
-        return f"{'end' if index % 2 else 'begin'} of pass {index // 2 + 1} of the survey"
+        for number, (first, *_) in enumerate(self._passes, 1):
+            if index <= first + 1:
+                place = {first: "begin of", first + 1: "end of"}.get(index, "the way to")
+                return f"{place} pass {number} of the survey"
+        return super().named(index)
 
 
 class RunOnboardMission(Behavior):

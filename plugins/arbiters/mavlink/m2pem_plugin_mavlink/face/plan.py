@@ -12,10 +12,10 @@ from m2pem.api import (
     LocalFrame,
     Point,
     Route,
+    SurveyTracks,
     UnitError,
     Value,
     distance_m,
-    lawn_mower,
     longest_edge_yaw,
     parse_geojson,
     quantity,
@@ -121,7 +121,8 @@ def _tracks(area: Area, parameters: Mapping[str, Value]) -> list[LatLon]:
     else:
         yaw_rad = math.pi / 2 - quantity(heading, Dimension.ANGLE)
     spacing_m = _number(parameters.get("spacing")) or SPACING_M
-    return [frame.to_latlon(point) for point in lawn_mower(rings, spacing_m, yaw_rad)]
+    tracks = SurveyTracks.over(rings, spacing_m, yaw_rad)
+    return [frame.to_latlon(point) for point in tracks.line.points]
 
 
 def _number(value: Value) -> float | None:
