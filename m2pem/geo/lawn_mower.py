@@ -41,6 +41,9 @@ _SEAM_M = 1e-4
 _TRIED = 8
 """Of so many lines through what is free beside a hole, the longest becomes a pass."""
 
+_ALMOST = 0.95
+"""No line is tried after one that is as long as this share of the part."""
+
 _ROUNDS = 40
 
 
@@ -196,6 +199,8 @@ def _longest(part: "BaseGeometry", closed: "BaseGeometry") -> Row:
         tried = [(y, span) for span in _cut(y, (low_x, high_x), closed)]
         if _length_m(tried) > _length_m(best) + _SHORTEST_M:
             best = tried
+        if _length_m(best) > _ALMOST * (high_x - low_x):
+            break
     return best
 
 

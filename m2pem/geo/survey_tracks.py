@@ -102,6 +102,15 @@ class SurveyTracks:
         points = self.line.points[::-1]
         return SurveyTracks(points, self.width_m, self.overshoot_m, passes, self.holes)
 
+    def approached_from(self, place: EastNorth) -> "SurveyTracks":
+        """Return the tracks with the places to pass on the way to them around the holes."""
+        way = Fence.around(self.holes).way(place, self.line.points[0]) if self.holes else None
+        if not way:
+            return self
+        passes = [(len(way) + index, *metres) for index, *metres in self.passes]
+        points = [*way, *self.line.points]
+        return SurveyTracks(points, self.width_m, self.overshoot_m, passes, self.holes)
+
     def spacing_m(self, rings: Sequence[Sequence[EastNorth]]) -> float:
         """Return the spacing with which tracks over a part are as these, in any local frame."""
         norths = [turned(corner, self.yaw_rad)[1] for corner in rings[0]]

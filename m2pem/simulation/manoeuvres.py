@@ -156,6 +156,7 @@ def _survey(craft: Craft, parameters: LocalParameters) -> Manoeuvre:
     spacing, overshoot = parameters.spacing_m or SURVEY_SPACING_M, parameters.overshoot_m
     try:
         tracks = SurveyTracks.over(rings, spacing, yaw, overshoot)
+        tracks = tracks.approached_from(craft.pose.place[:2])
     except ValueError as error:
         raise RefusedError(f"parameter {error}") from None
     up = flying_height(craft, parameters)

@@ -1,6 +1,7 @@
 import math
 
 import pytest
+from shapely import LineString, Polygon, union_all
 
 from m2pem.api.telemetry import VehicleState
 from m2pem.fleet.behaviors import SHARED
@@ -8,10 +9,21 @@ from m2pem.mission.behavior import BehaviorType
 from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.mission.geometry import Area, Point, Route, VehiclePosition
 from m2pem.simulation.arbiters import SimArbiter
+from m2pem.simulation.frame import FlatFrame
 from m2pem.simulation.manoeuvres import MANOEUVRES
 from m2pem.telemetry.bus import Bus
 from m2pem.testing.contracts.arbiter_harness import ArbiterHarness
-from tests.simulation.conftest import START_US, Fleet, Simulate, area, local, place, position, route
+from tests.simulation.conftest import (
+    ORIGIN,
+    START_US,
+    Fleet,
+    Simulate,
+    area,
+    local,
+    place,
+    position,
+    route,
+)
 
 S = 1_000_000
 UGV: Fleet = {"ugv": ("ground", {}), "lead": ("ground", {})}
@@ -24,6 +36,10 @@ def at(bench: ArbiterHarness, vehicle: str) -> tuple[float, float, float]:
     assert isinstance(state, VehicleState)
     assert state.altitude_above_home_m is not None
     return (*local(state.position), state.altitude_above_home_m)
+
+
+def metres(drawn: Area) -> list[tuple[float, float]]:
+    return [FlatFrame(ORIGIN).to_place(corner[:2]) for corner in drawn.rings[0]]
 
 
 def heading(bench: ArbiterHarness, vehicle: str) -> float:
@@ -382,13 +398,23 @@ def test_a_target_elsewhere_is_followed_as_it_is_heard_on_the_bus(simulate: Simu
     simulate(UGV, main, bus=bus)
 
 
-def test_areas_with_holes_are_read(simulate: Simulate) -> None:
+def test_a_survey_leads_around_the_holes_of_its_area_and_sees_what_is_beside_them(
+    simulate: Simulate,
+) -> None:
     async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
-        hole = area((80, 30), (120, 30), (120, 70), (80, 70))
-        both = Area((*SQUARE.rings, *hole.rings))
-        await do(bench, "r1.b1", "area_survey", "ugv", area=both, spacing=20.0)
+        holes = [area((12, 8), (190, 8), (190, 44), (12, 44)), area((2, 60), (100, 60), (2, 97))]
+        both = Area((*SQUARE.rings, *(each.rings[0] for each in holes)))
+        await do(bench, "r1.b0", "goto", "ugv", target=Point(place(100, 52, 0)))
+        before = len(tracks(bench, "ugv"))
+        await do(bench, "r1.b1", "area_survey", "ugv", area=both, spacing=30.0, heading=1.57079633)
+        driven = LineString([each[:2] for each in tracks(bench, "ugv")[before - 1 :]])
+        kept_out = union_all([Polygon(metres(each)) for each in holes])
+        # Corners are driven in arcs, which cut them by less than this.
+        assert driven.intersection(kept_out.buffer(-0.3)).length == 0.0
+        seen = driven.buffer(15.1)
+        assert Polygon(metres(SQUARE)).difference(kept_out).difference(seen).buffer(-0.05).is_empty
 
-    simulate(UGV, main)
+    simulate(UGV, main, telemetry_hz=50.0)
 
 
 def test_a_vehicle_begins_at_home_and_altitudes_count_from_there(simulate: Simulate) -> None:

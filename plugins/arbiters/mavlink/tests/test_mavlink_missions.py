@@ -10,6 +10,7 @@ from m2pem_plugin_mavlink.vehicle.driver import FlightMode
 from m2pem_plugin_mavlink.vehicle.identity import Firmware
 from mavlink_double import HOME, Body, at
 from mavlink_play import after_a_restart, play
+from shapely import LineString, Polygon, box
 
 from m2pem.api import (
     SHARED,
@@ -40,6 +41,7 @@ def square(east: float, north: float, side: float) -> tuple:
 
 
 FIELD = Area((square(20, 20, 60),))
+PIT = Area((square(20, 20, 60), square(30, 26, 34)))
 
 
 def levels(items) -> list[tuple[float, float]]:
@@ -361,6 +363,7 @@ def test_an_onboard_mission_that_is_not_there_fails(mission, first, said) -> Non
 FOUND = [
     ("single_vehicle_routing", Body().fly(), {"route": L_SHAPE}),
     ("area_survey", Body().fly(), {"area": FIELD}),
+    ("area_survey", Body().fly(), {"area": PIT}),
     ("orbit", Body().fly(), {"target": Point((*at(50, 0), 25.0))}),
     ("orbit", Body(circles=True).fly(), {"target": Point((*at(30, 0), 25.0)), "turns": 2.0}),
     ("area_observe", Body().fly(), {"area": FIELD, "duration": 60.0}),
@@ -412,6 +415,24 @@ def test_what_is_left_of_a_survey_is_told_on_the_way() -> None:
         assert lengths[0] == pytest.approx(180.0 - 12.0, abs=12.0)
         assert lengths[-1] < 30.0
         assert left(said[-1], "area_survey")["altitude"] == 30.0
+
+    play(Body().fly(), main)
+
+
+def test_a_survey_leads_around_a_hole_of_its_area() -> None:
+    async def main(bench) -> None:
+        end = await bench.do("area_survey", area=PIT, spacing=20.1, heading=0.0, altitude=30.0)
+        assert end.state is SUCCEEDED
+        flown = LineString([(0.0, 0.0), *levels(bench.body.mission)])
+        assert flown.intersection(box(30, 26, 64, 60).buffer(-0.05)).length == 0.0
+        assert len(flown.coords) > 1 + 8, "and more than the ends of four passes"
+        said = [left(each, "area_survey") for each in bench.of("r1.b1") if each.remaining]
+        assert said
+        frame = LocalFrame(HOME)
+        for each in said:
+            rings = [[frame.to_local(corner[:2]) for corner in ring] for ring in each["area"].rings]
+            rest = Polygon(rings[0], rings[1:])
+            assert rest.intersection(box(30, 26, 64, 60).buffer(-0.05)).area < 0.1
 
     play(Body().fly(), main)
 

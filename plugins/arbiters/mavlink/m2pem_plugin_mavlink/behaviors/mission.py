@@ -435,6 +435,8 @@ class Survey(MissionFlight):
         first, last = (frame.to_latlon(tracks.line.points[index]) for index in (0, -1))
         if distance_to_m(self.vehicle, last) < distance_to_m(self.vehicle, first):
             tracks = tracks.reversed()
+        if (here := position_of(self.vehicle)) is not None:
+            tracks = tracks.approached_from(frame.to_local(here))
         self._width_m, self._passes = tracks.width_m, tracks.passes
         height = self.parameters.altitude_to_fly(area.rings[0][0][2], area.altitude_frame)
         return [waypoint(frame.to_latlon(point), *height) for point in tracks.line.points]
