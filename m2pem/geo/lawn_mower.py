@@ -172,10 +172,11 @@ def _beside(
     import shapely  # noqa: PLC0415
 
     half_m = width_m / 2 + _SEAM_M
+    west, _, east, _ = region.bounds
+    strip = shapely.box(west - width_m, bottom, east + width_m, bottom + width_m)
+    closed, left = closed.intersection(strip), region.intersection(strip)
     new = [(y, part) for y, span in row for part in _cut(y, span, closed)]
     found = list(new)
-    west, _, east, _ = region.bounds
-    left = region.intersection(shapely.box(west, bottom, east, bottom + width_m))
     for _ in range(_ROUNDS):
         boxes = [shapely.box(low, y - half_m, high, y + half_m) for y, (low, high) in new]
         left = left.difference(shapely.union_all(boxes)) if boxes else left
