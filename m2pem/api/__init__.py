@@ -191,6 +191,8 @@ if TYPE_CHECKING:
     from m2pem.geo.cameras import ImagePlan as ImagePlan
     from m2pem.geo.cameras import SurveyCamera as SurveyCamera
     from m2pem.geo.cameras import image_plan as image_plan
+    from m2pem.geo.elevation_files import TERRAIN_FOLDER as TERRAIN_FOLDER
+    from m2pem.geo.elevation_files import Terrain as Terrain
     from m2pem.geo.elevation_files import TerrainError as TerrainError
     from m2pem.geo.fence import Fence as Fence
     from m2pem.geo.geoid import ellipsoidal_m as ellipsoidal_m
@@ -226,9 +228,7 @@ if TYPE_CHECKING:
     from m2pem.geo.survey_pattern import best_heading_rad as best_heading_rad
     from m2pem.geo.survey_pattern import survey_routes as survey_routes
     from m2pem.geo.survey_tracks import SurveyTracks as SurveyTracks
-    from m2pem.geo.terrain import TERRAIN_FOLDER as TERRAIN_FOLDER
     from m2pem.geo.terrain import ProfilePoint as ProfilePoint
-    from m2pem.geo.terrain import Terrain as Terrain
     from m2pem.geo.terrain import lowest as lowest
     from m2pem.geo.terrain import profile as profile
     from m2pem.geo.terrain_following import TOLERANCE_M as TOLERANCE_M
@@ -356,8 +356,8 @@ _MODULES = {
     "m2pem.geo.polyline": "Polyline Segment",
     "m2pem.geo.survey_pattern": "SurveyPattern SurveyRoute Surveyor best_heading_rad survey_routes",
     "m2pem.geo.survey_tracks": "SurveyTracks",
-    "m2pem.geo.elevation_files": "TerrainError",
-    "m2pem.geo.terrain": "ProfilePoint TERRAIN_FOLDER Terrain lowest profile",
+    "m2pem.geo.elevation_files": "TERRAIN_FOLDER Terrain TerrainError",
+    "m2pem.geo.terrain": "ProfilePoint lowest profile",
     "m2pem.geo.terrain_following": "TOLERANCE_M follow_terrain not_covered",
     "m2pem.suggestions": "did_you_mean",
     "m2pem.units": "US_PER_S Dimension UnitError quantity",

@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from m2pem.findings import Finding, Severity, has_errors
 from m2pem.fleet.allocation import resources_of
@@ -16,7 +17,6 @@ from m2pem.fleet.shortage import Demand, check_shortages
 from m2pem.fleet.space_check import check_space
 from m2pem.fleet.speed_check import check_speeds
 from m2pem.fleet.task_findings import TaskFindings
-from m2pem.fleet.terrain_check import GroundCheck
 from m2pem.geo.positions import NO_ORIGIN, geometry_out_of_reach
 from m2pem.mission.behavior import Behavior, BehaviorType, Role, RoleKind, ServiceCall
 from m2pem.mission.catalogue import BehaviorSpec, ParameterKind, ResourceId
@@ -29,6 +29,9 @@ from m2pem.mission.elements import (
 from m2pem.mission.mission import Mission
 from m2pem.suggestions import did_you_mean, suggest
 from m2pem.units import Dimension, UnitError, article, quantity
+
+if TYPE_CHECKING:
+    from m2pem.fleet.terrain_check import GroundCheck
 
 _ROUTE = ("single_vehicle_routing",)
 
@@ -280,10 +283,13 @@ class _Check:
     demands: dict[Activity, Demand] = field(default_factory=dict)
     """What tasks need whose roles can be filled."""
     known: KnownFits = field(default_factory=dict)
-    ground: GroundCheck = field(init=False)
+    grounds: "list[GroundCheck]" = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "ground", GroundCheck(self.fleet))
+        if self.fleet.clearance_m is not None:
+            from m2pem.fleet.terrain_check import GroundCheck  # noqa: PLC0415  # loads NumPy
+
+            self.grounds.append(GroundCheck(self.fleet))
 
     def task(self, task: Activity) -> list[Finding]:
         findings = TaskFindings(self.mission.file_of(task), task)
@@ -451,7 +457,8 @@ class _Check:
                 message = taker.place + problem.message
                 findings.add(problem.rule, message, problem.remedy, line=line, role=taker.role)
         if not problems:
-            self.ground.check(acting, values, lines, findings)
+            for ground in self.grounds:
+                ground.check(acting, values, lines, findings)
             check_speeds(behavior, taker.spec, taker.place, values, findings)
 
     def _unknown_geometry(

@@ -4,6 +4,7 @@ Of routes and points whose altitude is known before the mission starts. Altitude
 from the ground at the fleet's origin.
 """
 
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,14 +13,14 @@ from m2pem.findings import Severity
 from m2pem.fleet.fleet import Domain, Fleet
 from m2pem.fleet.parameters import ResolvedValue
 from m2pem.fleet.task_findings import TaskFindings
-from m2pem.geo.elevation_files import TerrainError
+from m2pem.geo.elevation_files import Terrain, TerrainError
 from m2pem.geo.positions import NO_ORIGIN
-from m2pem.geo.terrain import Terrain, lowest, profile
+from m2pem.geo.terrain import LONGEST_M, ProfilePoint, lowest, profile
 from m2pem.geo.terrain_following import not_covered
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.geometry import Coordinate, Point, Route
 
-_STEP_M = 30.0
+_SAME_M = 1e-4
 
 
 @dataclass(slots=True)
@@ -49,33 +50,38 @@ class GroundCheck:
         for name, route in _ways(values):
             line = lines.get(name, 0)
             try:
-                low = self._lowest(route)
+                points = self._profile(route)
+                gap = next((each.place for each in points if each.ground_m is None), None)
+                unknown, low = "" if gap is None else not_covered(gap), lowest(points)
             except TerrainError as error:
+                unknown, low = str(error), None
+            if unknown:
                 findings.add(
                     "ground-unknown",
-                    f"parameter '{name}': the height above the ground is not known: {error}",
+                    f"parameter '{name}': the height above the ground is not known: {unknown}",
                     line=line,
                     severity=Severity.WARNING,
                 )
+            if low is None or low.above_ground_m is None:
                 continue
-            if low is None or low[0] >= clearance_m:
+            above_m = math.floor((low.above_ground_m + _SAME_M) * 10) / 10
+            if low.above_ground_m >= clearance_m - _SAME_M:
                 continue
-            above_m, (latitude_deg, longitude_deg) = low
-            where = f"[{latitude_deg:.5f}, {longitude_deg:.5f}]"
+            raised_m = math.ceil(clearance_m - low.above_ground_m - _SAME_M)
+            where = f"[{low.place[0]:.5f}, {low.place[1]:.5f}], {low.along_m:.0f} m along its way"
             height = (
-                f"{-above_m:.0f} m below the ground" if above_m < 0 else f"{above_m:.0f} m above it"
+                f"{-above_m:g} m below the ground" if above_m < 0 else f"{above_m:g} m above it"
             )
             findings.add(
                 "low-over-ground",
                 f"parameter '{name}': {aircraft.id} would be {height} at {where}; the fleet's "
                 f"clearance is {clearance_m:g} m",
-                f"raise it by {clearance_m - above_m:.0f} m, or let the route follow the terrain",
+                f"raise it by {raised_m} m, or let the route follow the terrain",
                 line=line,
                 severity=Severity.WARNING,
             )
 
-    def _lowest(self, route: Route) -> tuple[float, tuple[float, float]] | None:
-        """Return the least height above ground, and where; None: the route has no altitude."""
+    def _profile(self, route: Route) -> list[ProfilePoint]:
         if not self._terrain:
             if self._unusable:
                 raise TerrainError(self._unusable)
@@ -88,14 +94,7 @@ class GroundCheck:
         home_m = None
         if "relative" in route.frames and self.fleet.origin != NO_ORIGIN:
             home_m = terrain.height_m(self.fleet.origin[:2])
-        points = profile(route, terrain, _STEP_M, home_m)
-        unknown = next((each for each in points if each.ground_m is None), None)
-        if unknown is not None:
-            raise TerrainError(not_covered(unknown.place))
-        low = lowest(points)
-        if low is None or low.above_ground_m is None:
-            return None
-        return low.above_ground_m, low.place
+        return profile(route, terrain, LONGEST_M, home_m)
 
 
 def _ways(values: Mapping[str, ResolvedValue]) -> Iterator[tuple[str, Route]]:
@@ -112,5 +111,7 @@ def _ways(values: Mapping[str, ResolvedValue]) -> Iterator[tuple[str, Route]]:
             raised: list[Coordinate] = [(each[0], each[1], float(altitude_m)) for each in waypoints]
             waypoints = tuple(raised)
             frames = (frame if isinstance(frame, str) else "relative",) * len(waypoints)
+        if values.get("loop") is True:
+            waypoints, frames = (*waypoints, waypoints[0]), (*frames, frames[0])
         if any(each[2] is not None for each in waypoints):
             yield name, Route.of(waypoints, frames)

@@ -8,13 +8,18 @@ import math
 from collections.abc import Sequence
 from itertools import pairwise
 
-from m2pem.geo.elevation_files import TerrainError
+import numpy as np
+
+from m2pem.geo.elevation_files import Floats, Terrain, TerrainError
 from m2pem.geo.geojson import GeometryError
 from m2pem.geo.local_frame import LatLon
-from m2pem.geo.terrain import Terrain, along_route
+from m2pem.geo.terrain import LONGEST_M, Parts, each_of, pieces
 from m2pem.mission.geometry import Coordinate, Route
 
 TOLERANCE_M = 2.0
+_CLOSE_M = 0.02
+"""How far the ground that is followed may be from the straight lines it is taken as."""
+
 MOST_WAYPOINTS = 500
 """Of a route that follows the ground: autopilots take few more."""
 
@@ -30,45 +35,58 @@ def follow_terrain(
 
     `height_m`: above the ground, everywhere; None: the altitude of each waypoint counts as its
     height above ground, in whatever frame it is, and changes evenly in between. The ground is
-    looked up every `step_m`. Waypoints of the route stay, with their speeds.
+    that of each sample on the way, and looked up at least every `step_m`. Waypoints of the route
+    stay, with their speeds.
 
     Raises:
         GeometryError: a waypoint has no altitude, or they have different frames, and `height_m` is
             None; or it needs more than `MOST_WAYPOINTS`.
         TerrainError: no elevation file has a place of the route, or one cannot be used.
     """
-    if not (tolerance_m > 0 and step_m > 0):
-        raise GeometryError("the tolerance and the step are above 0")
+    if not (tolerance_m > _CLOSE_M and step_m > 0):
+        raise GeometryError(f"the tolerance is above {_CLOSE_M:g} m, and the step above 0")
     if route.altitude_frames and height_m is None:
         raise GeometryError(
             "the altitudes of the waypoints count from different heights: say a height above ground"
         )
-    places: list[LatLon] = []
-    alongs: list[float] = []
-    wanted: list[float] = []
-    corners: list[int] = []
-    for along_m, place, own_m, waypoint in along_route(route.waypoints, step_m):
-        above_m = own_m if height_m is None else height_m
-        if above_m is None:
-            number = waypoint or 0
-            raise GeometryError(f"waypoint {number + 1} has no altitude: say a height above ground")
-        ground_m = terrain.height_m(place)
-        if ground_m is None:
-            raise TerrainError(not_covered(place))
-        if waypoint is not None:
-            corners.append(len(places))
-        places.append(place)
-        alongs.append(along_m)
-        wanted.append(ground_m + above_m)
-    kept = _kept(alongs, wanted, corners, tolerance_m)
+    own = np.array([each[2] if height_m is None else height_m for each in route.waypoints], float)
+    if np.isnan(own).any():
+        first = np.argmax(np.isnan(own)) + 1
+        raise GeometryError(f"waypoint {first} has no altitude: say a height above ground")
+    parts = Parts.of(route.waypoints, own, min(step_m, LONGEST_M))
+    found = pieces(terrain, *parts.ends)
+    for gap in np.flatnonzero(np.isnan(found.bend_m))[:1]:
+        begin, end = parts.ends[:, :, found.line[gap]]
+        place = begin + (end - begin) * (found.begin[gap] + found.end[gap]) / 2
+        raise TerrainError(not_covered((float(place[0]), float(place[1]))))
+    # Each piece as straight ones, which are near enough to its parabola.
+    counts = np.ceil(np.sqrt(np.abs(found.bend_m) / (2 * _CLOSE_M))).clip(1)
+    piece, number = each_of(counts)
+    at = (np.stack([number, number + 1]) / counts[piece]).T.ravel()
+    piece = piece.repeat(2)
+    line, v = found.line[piece], at - 0.5
+    of_line = found.begin[piece] + (found.end - found.begin)[piece] * at
+    latitudes, longitudes, alongs, heights = (
+        first[line] + (last - first)[line] * of_line
+        for first, last in (*parts.ends.swapaxes(0, 1), parts.alongs_m, parts.heights_m)
+    )
+    grounds = found.middle_m[piece] + found.slope_m[piece] * v + found.bend_m[piece] * v**2
+    wanted = grounds + heights
+    corners = np.searchsorted(parts.leg[line], np.arange(len(route.waypoints) - 1)).tolist()
+    corners.append(len(wanted) - 1)
+    kept = _kept(alongs, wanted, corners, tolerance_m - _CLOSE_M)
     if len(kept) > MOST_WAYPOINTS:
         raise GeometryError(
             f"following the ground takes {len(kept)} waypoints, more than {MOST_WAYPOINTS}: "
             "allow a greater tolerance, or follow shorter routes"
         )
-    waypoints: list[Coordinate] = [(*places[at], round(wanted[at], 1)) for at in kept]
-    own = dict(zip(corners, route.speeds_m_s, strict=False))
-    return Route(tuple(waypoints), "amsl", tuple(own.get(at) for at in kept) if own else ())
+    given = dict(zip(corners, route.waypoints, strict=True))
+    waypoints: list[Coordinate] = []
+    for each in kept:
+        place = given.get(each, (float(latitudes[each]), float(longitudes[each])))
+        waypoints.append((place[0], place[1], round(float(wanted[each]), 2)))
+    speeds = dict(zip(corners, route.speeds_m_s, strict=False))
+    return Route(tuple(waypoints), "amsl", tuple(map(speeds.get, kept)) if speeds else ())
 
 
 def not_covered(place: LatLon) -> str:
@@ -83,22 +101,19 @@ def not_covered(place: LatLon) -> str:
     )
 
 
-def _kept(
-    alongs: Sequence[float], wanted: Sequence[float], corners: Sequence[int], tolerance_m: float
-) -> list[int]:
-    """Return the samples that are needed (Ramer, Douglas and Peucker, by height)."""
+def _kept(alongs: Floats, wanted: Floats, corners: Sequence[int], tolerance_m: float) -> list[int]:
+    """Return the places that are needed (Ramer, Douglas and Peucker, by height)."""
     kept = set(corners)
-    spans = [(a, b) for a, b in pairwise(corners) if b - a > 1]
+    spans = list(pairwise(corners))
     while spans:
         first, last = spans.pop()
-        length_m = alongs[last] - alongs[first]
-        farthest, deviation_m = first, 0.0
-        for at in range(first + 1, last):
-            part = (alongs[at] - alongs[first]) / length_m if length_m > 0 else 0.0
-            straight_m = wanted[first] + (wanted[last] - wanted[first]) * part
-            if abs(wanted[at] - straight_m) > deviation_m:
-                farthest, deviation_m = at, abs(wanted[at] - straight_m)
-        if deviation_m > tolerance_m:
+        if alongs[last] == alongs[first]:
+            continue  # it climbs there
+        part = (alongs[first : last + 1] - alongs[first]) / (alongs[last] - alongs[first])
+        straight = wanted[first] + (wanted[last] - wanted[first]) * part
+        off = np.abs(wanted[first : last + 1] - straight)
+        farthest = first + int(np.argmax(off))
+        if off.max() > tolerance_m and first < farthest < last:
             kept.add(farthest)
-            spans += [(a, b) for a, b in ((first, farthest), (farthest, last)) if b - a > 1]
+            spans += [(first, farthest), (farthest, last)]
     return sorted(kept)

@@ -12,8 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rasterio.transform import Affine, from_origin
 
-from m2pem.geo.elevation_files import TerrainError
-from m2pem.geo.terrain import Terrain
+from m2pem.geo.elevation_files import Terrain, TerrainError
 
 VIRGINIA = 38.1075, -77.3192
 GEOID_M = -33.97

@@ -12,8 +12,8 @@ import tifffile
 from hypothesis import given
 from hypothesis import strategies as st
 
-from m2pem.geo.elevation_files import TerrainError
-from m2pem.geo.terrain import Terrain, lowest, profile
+from m2pem.geo.elevation_files import Terrain, TerrainError
+from m2pem.geo.terrain import lowest, profile
 from m2pem.mission.geometry import Route
 
 SIDE = 1201
