@@ -2,15 +2,15 @@
 `terrain`). Heights are in metres above mean sea level (EGM96).
 
 A file has samples at the nodes of its grid, and heights between four of them. Where some of the
-four are beyond its edge, they come from the files beside it. Arrays of latitudes and longitudes are
-in WGS-84 degrees, those of heights in metres above mean sea level, NaN where they are not known.
+four are beyond its edge, they come from the files beside it. Arrays of places are latitudes and
+longitudes in WGS-84 degrees, (2, n); a height that is not known is NaN.
 """
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from functools import cache, lru_cache, partial
-from itertools import product
+from itertools import chain, product
 from pathlib import Path
 from threading import Lock
 from typing import TYPE_CHECKING, TypeAlias
@@ -24,6 +24,7 @@ from m2pem.geo.local_frame import LatLon
 from m2pem.units import LENGTHS_IN_FILES
 
 if TYPE_CHECKING:
+    from pyproj import Transformer
     from rasterio.io import DatasetReader
 
 TERRAIN_FOLDER = "M2PEM_TERRAIN"
@@ -58,7 +59,7 @@ _EDGE_DEG = 1e-9
 
 Floats: TypeAlias = NDArray[np.float64]
 
-_Beside = Callable[[Floats, Floats], Floats]
+_Beside: TypeAlias = Callable[[Floats], Floats]
 
 
 class TerrainError(M2pemError):
@@ -80,66 +81,80 @@ def corner_of(file: Path) -> tuple[int, int] | None:
 
 
 class ElevationFile:
-    """A grid of samples. `turns`: what may be added to a longitude to find it in the file."""
+    """A grid of samples. `transform`: six coefficients, of columns and rows to the file's x and y;
+    `turns`: whether x is a longitude. Places are latitudes and longitudes, (2, n), also beyond 180
+    degrees; those in the grid are rows and columns, (2, n), from the first sample."""
 
-    rows: int
-    columns: int
-    turns: tuple[float, ...] = (0.0, 360.0, -360.0)
+    _system: "Transformer | None" = None
 
-    def to_grid(self, latitudes: Floats, longitudes: Floats) -> tuple[Floats, Floats]:
-        """Return the rows and columns of places, in samples; some may be beyond the grid."""
-        raise NotImplementedError
+    def __init__(
+        self, shape: tuple[int, int], transform: Sequence[float], *, turns: bool = True
+    ) -> None:
+        self.shape = shape
+        self._last = np.array(shape)[:, None] - 1
+        self._to_file = np.array([*transform[:6], 0, 0, 1]).reshape(3, 3)
+        self._from_file = np.linalg.inv(self._to_file)
+        self._middle = self._to_file[0] @ (shape[1] / 2, shape[0] / 2, 1) if turns else None
 
-    def to_places(self, rows: Floats, columns: Floats) -> tuple[Floats, Floats]:
+    def to_grid(self, places: Floats) -> Floats:
+        """Return places in the grid, also beyond it; NaN: its projection does not have them."""
+        x, y = places[::-1]
+        if self._system is not None:
+            x, y = self._system.transform(x, y, direction="INVERSE")
+        if self._middle is not None:
+            x = turned(x, self._middle)
+        level = np.stack([x, y, np.ones(x.shape)])
+        # A sample is the height in the middle of its cell.
+        grid: Floats = (self._from_file @ np.where(np.isinf(level), np.nan, level))[1::-1] - 0.5
+        return grid
+
+    def to_places(self, grid: Floats) -> Floats:
         """Return the latitudes and longitudes of places in the grid."""
+        x, y, _ = self._to_file @ np.stack([*grid[::-1] + 0.5, np.ones(grid.shape[1])])
+        if self._system is not None:
+            x, y = self._system.transform(x, y)
+        return np.stack([y, x])
+
+    def samples(self, grid: NDArray[np.int64]) -> Floats:
+        """Return the samples at rows and columns, in the file's own datum."""
         raise NotImplementedError
 
-    def samples(self, rows: Floats, columns: Floats) -> Floats:
-        """Return the samples of whole rows and columns of the grid, in the file's own datum."""
-        raise NotImplementedError
-
-    def to_sea_level(self, latitudes: Floats, longitudes: Floats, heights: Floats) -> Floats:
+    def to_sea_level(self, places: Floats, heights: Floats) -> Floats:
         """Return heights in the file's own datum above mean sea level."""
         return heights
 
-    def heights_m(
-        self, latitudes: Floats, longitudes: Floats, beside: _Beside | None = None
-    ) -> Floats:
+    def heights_m(self, places: Floats, beside: _Beside | None = None) -> Floats:
         """Return the heights of the ground.
 
         `beside`: the same by other files, for samples next to the file's edge.
         """
-        found = np.full(latitudes.shape, np.nan)
+        found = np.full(places.shape[1], np.nan)
         edge = _NEAR if beside is None else 1.0 - _NEAR
-        for turn in self.turns:
-            row, column = self.to_grid(latitudes, longitudes + turn)
-            at = (row >= -edge) & (row <= self.rows - 1 + edge) & np.isnan(found)
-            at &= (column >= -edge) & (column <= self.columns - 1 + edge)
-            if at.any():
-                own = self._between(row[at].round(_DIGITS), column[at].round(_DIGITS), beside)
-                found[at] = self.to_sea_level(latitudes[at], longitudes[at], own)
-        found[np.isinf(found)] = np.nan
-        return found
+        grid = self.to_grid(places)
+        at = ((grid >= -edge) & (grid <= self._last + edge)).all(axis=0)
+        if at.any():
+            own = self._between(grid[:, at].round(_DIGITS), beside)
+            found[at] = self.to_sea_level(places[:, at], own)
+        return np.where(np.isinf(found), np.nan, found)
 
-    def _between(self, row: Floats, column: Floats, beside: _Beside | None) -> Floats:
+    def _between(self, grid: Floats, beside: _Beside | None) -> Floats:
         """Return the bilinear means of the four samples around places, as far as they count."""
-        total = np.zeros(row.shape)
-        for more_rows, more_columns in product((0, 1), (0, 1)):
-            at_row, at_column = np.floor(row) + more_rows, np.floor(column) + more_columns
-            weight = (1 - abs(row - at_row)) * (1 - abs(column - at_column))
+        total = np.zeros(grid.shape[1])
+        for more in product((0, 1), (0, 1)):
+            node = np.floor(grid) + np.array(more)[:, None]
+            weight = (1 - abs(grid - node)).prod(axis=0)
             counts = weight > 0
-            values = self._values(at_row[counts], at_column[counts], beside)
-            total[counts] += weight[counts] * values
+            total[counts] += weight[counts] * self._values(node[:, counts], beside)
         return total
 
-    def _values(self, row: Floats, column: Floats, beside: _Beside | None) -> Floats:
-        own = (row >= 0) & (row < self.rows) & (column >= 0) & (column < self.columns)
-        values = np.full(row.shape, np.nan)
-        values[own] = self.samples(row[own], column[own])
+    def _values(self, grid: Floats, beside: _Beside | None) -> Floats:
+        own = ((grid >= 0) & (grid <= self._last)).all(axis=0)
+        values = np.full(grid.shape[1], np.nan)
+        values[own] = self.samples(grid[:, own].astype(int))
         if beside is not None and not own.all():
-            places = self.to_places(row[~own], column[~own])
+            places = self.to_places(grid[:, ~own])
             # Into the datum of this file, in which the samples are put together.
-            values[~own] = beside(*places) - self.to_sea_level(*places, np.zeros(places[0].shape))
+            values[~own] = beside(places) - self.to_sea_level(places, np.zeros(places.shape[1]))
         return values
 
 
@@ -157,21 +172,12 @@ class Tile(ElevationFile):
             self._samples = np.memmap(path, ">i2", "r", shape=(side, side))
         except OSError as error:
             raise TerrainError(f"{path}: cannot be read: {error.strerror}") from None
-        self.rows = self.columns = side
-        self._corner = corner
+        step, (south, west) = 1 / (side - 1), corner
+        transform = (step, 0, west - step / 2, 0, -step, south + 1 + step / 2)
+        super().__init__((side, side), transform)
 
-    def to_grid(self, latitudes: Floats, longitudes: Floats) -> tuple[Floats, Floats]:
-        south, west = self._corner
-        last = self.rows - 1
-        return (south + 1 - latitudes) * last, (longitudes - west) * last
-
-    def to_places(self, rows: Floats, columns: Floats) -> tuple[Floats, Floats]:
-        south, west = self._corner
-        last = self.rows - 1
-        return south + 1 - rows / last, west + columns / last
-
-    def samples(self, rows: Floats, columns: Floats) -> Floats:
-        values = self._samples[rows.astype(int), columns.astype(int)]
+    def samples(self, grid: NDArray[np.int64]) -> Floats:
+        values = self._samples[tuple(grid)]
         return np.where(values == _VOID, np.nan, values)
 
 
@@ -214,46 +220,28 @@ class Raster(ElevationFile):
                 f"{path}: its heights are in '{unit}'; known are metres, feet and US survey feet"
             )
         self._unit_m = LENGTHS_IN_FILES[unit] if unit else unit_m
-        self._to_pixel = ~self._data.transform
-        self.rows, self.columns = self._data.height, self._data.width
-        if not level.is_geographic:
-            self.turns = (0.0,)
+        super().__init__(self._data.shape, self._data.transform, turns=level.is_geographic)
         self._block = lru_cache(_BLOCKS)(self._read)
 
-    def to_grid(self, latitudes: Floats, longitudes: Floats) -> tuple[Floats, Floats]:
-        x, y = self._system.transform(longitudes, latitudes, direction="INVERSE")
-        columns, rows = self._to_pixel @ (x, y)
-        # A sample is the height in the middle of its cell.
-        return rows - 0.5, columns - 0.5
+    def to_sea_level(self, places: Floats, heights: Floats) -> Floats:
+        return np.asarray(np.frompyfunc(self._sea_level_m, 3, 1)(*places, heights), float)
 
-    def to_places(self, rows: Floats, columns: Floats) -> tuple[Floats, Floats]:
-        x, y = self._data.transform @ (columns + 0.5, rows + 0.5)
-        longitudes, latitudes = self._system.transform(x, y)
-        return latitudes, longitudes
-
-    def to_sea_level(self, latitudes: Floats, longitudes: Floats, heights: Floats) -> Floats:
-        convert = np.frompyfunc(self._sea_level_m, 3, 1)
-        return np.asarray(convert(latitudes, longitudes, heights), float)
-
-    def samples(self, rows: Floats, columns: Floats) -> Floats:
-        values = np.empty(rows.shape)
-        blocks = np.stack([rows, columns]).astype(int) // _BLOCK
-        numbers = blocks[0] * self.columns + blocks[1]
+    def samples(self, grid: NDArray[np.int64]) -> Floats:
+        values = np.empty(grid.shape[1])
+        numbers = np.ravel_multi_index(grid // _BLOCK, self.shape)
         for number in np.unique(numbers):
-            at, corner = numbers == number, np.array(divmod(int(number), self.columns)) * _BLOCK
-            block = self._block(*corner.tolist())
-            values[at] = block[
-                (rows[at] - corner[0]).astype(int), (columns[at] - corner[1]).astype(int)
-            ]
+            at = numbers == number
+            block = self._block(*map(int, np.unravel_index(number, self.shape)))
+            values[at] = block[tuple(grid[:, at] % _BLOCK)]
         return values
 
-    def _read(self, row: int, column: int) -> Floats:
-        """Return the block that begins there."""
+    def _read(self, *block: int) -> Floats:
+        """Return the samples of a block."""
         from rasterio.errors import RasterioError  # noqa: PLC0415
 
-        ends = min(row + _BLOCK, self.rows), min(column + _BLOCK, self.columns)
+        window = tuple((_BLOCK * each, _BLOCK * (each + 1)) for each in block)
         try:
-            values = self._data.read(1, window=((row, ends[0]), (column, ends[1])), masked=True)
+            values = self._data.read(1, window=window, masked=True)
         except (RasterioError, OSError) as error:
             raise TerrainError(f"{self._data.name}: is damaged: {error}") from None
         heights = (values.data.astype(float) * self._scale + self._offset) * self._unit_m
@@ -299,53 +287,46 @@ class Terrain:
         Raises:
             TerrainError: the file of that place is damaged, or GeoTIFF cannot be read here.
         """
-        [height_m] = self.heights_m(np.array(place[:1]), np.array(place[1:2]))
+        [height_m] = self.heights_m(np.array(place)[:, None])
         return None if np.isnan(height_m) else float(height_m)
 
-    def heights_m(self, latitudes: Floats, longitudes: Floats) -> Floats:
-        """Return the same for many places; NaN: it is not known."""
+    def heights_m(self, places: Floats) -> Floats:
+        """Return the same for latitudes and longitudes, (2, n); NaN: it is not known."""
         with self._lock:
-            return (
-                latitudes
-                if not latitudes.size
-                else self._heights_m(_FILES_BESIDE, latitudes, longitudes)
-            )
+            return self._heights_m(_FILES_BESIDE, places)
 
-    def files_of(self, latitudes: Floats, longitudes: Floats) -> list[ElevationFile]:
-        """Return the files whose samples may count at places; one that cannot be used is left
-        out."""
+    def files_of(self, places: Floats) -> list[ElevationFile]:
+        """Return the files whose samples may count there, without those that cannot be used."""
         with self._lock:
-            found: list[ElevationFile] = list(self._tiles_of(latitudes, longitudes))
+            found: list[ElevationFile] = [*self._tiles_of(places)]
             for path in self._rasters:
                 with suppress(TerrainError):
                     found.append(self._raster(path))
             return found
 
-    def _heights_m(self, files_beside: int, latitudes: Floats, longitudes: Floats) -> Floats:
+    def _heights_m(self, files_beside: int, places: Floats) -> Floats:
         """Look into the files that have the places, then between those around them."""
-        longitudes = (longitudes + 180.0) % 360.0 - 180.0
-        found = np.full(latitudes.shape, np.nan)
-
-        def look(file: ElevationFile, beside: Callable[[Floats, Floats], Floats] | None) -> None:
-            at = np.isnan(found)
-            found[at] = file.heights_m(latitudes[at], longitudes[at], beside)
-
-        for tile in self._tiles_of(latitudes, longitudes):
-            look(tile, None)
+        found = np.full(places.shape[1], np.nan)
         lookups = (None, partial(self._heights_m, files_beside - 1)) if files_beside else (None,)
-        for beside, path in product(lookups, self._rasters):
-            if not np.isnan(found).any():
-                break
-            look(self._raster(path), beside)
+        files = chain(
+            ((tile, None) for tile in self._tiles_of(places)),
+            ((self._raster(path), beside) for beside, path in product(lookups, self._rasters)),
+        )
+        while (at := np.isnan(found)).any() and (look := next(files, None)):
+            found[at] = look[0].heights_m(places[:, at], look[1])
         return found
 
-    def _tiles_of(self, latitudes: Floats, longitudes: Floats) -> Iterator[Tile]:
+    def _tiles_of(self, places: Floats) -> Iterator[ElevationFile]:
         """Yield the tiles around places; on an edge, those of both sides."""
-        lowest, highest = (
-            [int(np.floor(end(each) + near)) for each in (latitudes, longitudes)]
-            for end, near in ((np.min, -_EDGE_DEG), (np.max, _EDGE_DEG))
-        )
-        for south, west in product(*map(range, lowest, (each + 1 for each in highest))):
-            corner = south, (west + 180) % 360 - 180
-            if corner in self._tiles:
-                yield self._tile(self._tiles[corner], corner)
+        if places.size:
+            south, west = np.floor(places.min(axis=1) - _EDGE_DEG).astype(int).tolist()
+            north, east = np.floor(places.max(axis=1) + _EDGE_DEG).astype(int).tolist()
+            for lowest, leftmost in product(range(south, north + 1), range(west, east + 1)):
+                corner = lowest, (leftmost + 180) % 360 - 180
+                if corner in self._tiles:
+                    yield self._tile(self._tiles[corner], corner)
+
+
+def turned(longitudes: Floats, near: Floats | float) -> Floats:
+    """Return the same longitudes at most 180 degrees from others."""
+    return near + (longitudes - near + 180.0) % 360.0 - 180.0

@@ -127,14 +127,6 @@ def distance_m(a: LatLon, b: LatLon) -> float:
     return 2 * _MEAN_RADIUS_M * math.asin(min(1.0, chord_m / (2 * _MEAN_RADIUS_M)))
 
 
-def metres_per_degree(latitude_deg: float) -> tuple[float, float]:
-    """Return how long a degree of latitude, and one of longitude, is at a latitude."""
-    latitude = math.radians(latitude_deg)
-    bent = 1 - _ECCENTRICITY2 * math.sin(latitude) ** 2
-    normal_m = math.radians(SEMI_MAJOR_M / math.sqrt(bent))
-    return normal_m * (1 - _ECCENTRICITY2) / bent, normal_m * math.cos(latitude)
-
-
 def offset(place: LatLon, east_m: float, north_m: float) -> LatLon:
     """Return the place that lies so far east and north of another."""
     return LocalFrame(place).to_latlon((east_m, north_m))

@@ -4,39 +4,36 @@ Heights are bilinear between the samples of a file. So the ground below a straig
 parabola from one row or column of samples to the next, and of a corridor, the place nearest to its
 vehicle is at a sample or on the rim: the least height that is found is the least there is.
 
-Places are arrays of latitudes and longitudes, (2, n), in WGS-84 degrees. Lines are straight in
-degrees. Heights are in metres above mean sea level; NaN: not known.
+Places are arrays of latitudes and longitudes in WGS-84 degrees, (2, n); a height that is not known
+is NaN.
 """
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
+from pyproj import Geod
 
-from m2pem.geo.elevation_files import ElevationFile, Floats, Terrain
-from m2pem.geo.local_frame import LatLon, LocalFrame, distance_m, metres_per_degree
+from m2pem.geo.elevation_files import Floats, Terrain, turned
+from m2pem.geo.local_frame import LatLon
 from m2pem.mission.geometry import Coordinate, Route
 
 DRIFT_M = 4.0
 """How far from its route an aircraft may be, to both sides and beyond waypoints."""
 
 LONGEST_M = 100.0
-"""Of a line: one that is so long is straight in a file's projection to 1 mm."""
+"""Of a line: one that is so long is straight in degrees, and in a file's projection, to 1 mm."""
 
-_MOST_STEPS = 2_000
-"""Of a profile: over a longer route they are longer, but not longer than a line may be."""
-
-_AT_ONCE_M = 10_000.0
+_AT_ONCE_M = 2_000.0
 """So much of a route is looked at in one piece, for its memory."""
 
 _LEAST_PART = 1e-9
 """Of a line's length, between two of its pieces."""
 
-_SAME_M = 1e-6
+_EARTH = Geod(ellps="WGS84")
 
 Indexes: TypeAlias = NDArray[np.int64]
 
@@ -67,9 +64,9 @@ def profile(
     home_m: float | None = None,
     drift_m: float = DRIFT_M,
 ) -> list[ProfilePoint]:
-    """Return the ground and the altitude along a route: at waypoints and at least every `step_m`;
-    between two, the place nearest to the ground if it is nearer than both, and one where the ground
-    is not known. A long route has 2,000 longer steps.
+    """Return the ground and the altitude along a route: at waypoints, at least every `step_m`, and
+    from each of these places to the next, where the route is nearest to the ground, and one where
+    the ground is not known.
 
     `home_m`: the altitude above mean sea level from which `relative` altitudes count; None: the
     ground at the first waypoint. Altitudes change evenly from one waypoint to the next, those above
@@ -81,41 +78,32 @@ def profile(
     """
     waypoints, frame = route.waypoints, route.altitude_frame
     own = np.array([each[2] for each in waypoints], float)
-    grounds = terrain.heights_m(*np.array([each[:2] for each in waypoints]).T)
+    grounds = terrain.heights_m(np.array([each[:2] for each in waypoints]).T)
     home = grounds[0] if home_m is None else home_m
     if route.altitude_frames:
         bases = zip(route.frames, grounds, strict=True)
         own += [{"amsl": 0.0, "relative": home, "terrain": each}[base] for base, each in bases]
         frame = "amsl"
-    length_m = sum(distance_m(a[:2], b[:2]) for a, b in pairwise(waypoints))
-    parts = Parts.of(waypoints, own, min(max(step_m, length_m / _MOST_STEPS), LONGEST_M))
+    step_m = min(step_m, LONGEST_M)
+    parts = Parts.of(waypoints, own, step_m)
+    count = parts.leg.size
+    # The places as columns: number of the part, along, latitude, longitude, ground, height.
+    ends = np.append(parts.ends[0], np.array([waypoints[-1][:2]]).T, axis=1)
+    alongs = np.append(parts.alongs_m[0], parts.alongs_m[1, -1])
+    opens = parts.of_leg[0] == 0
+    heights = np.append(np.where(opens, own[parts.leg], parts.heights_m[0]), own[-1])
+    found = [np.stack([np.arange(count + 1), alongs, *ends, terrain.heights_m(ends), heights])]
     # A height above ground is the same above any ground.
     weight = 0.0 if frame == "terrain" else 1.0
-    opens = parts.of_leg[0] == 0
-    waypoint = np.append(np.where(opens, parts.leg, -1), len(route.waypoints) - 1)
-    heights = np.append(np.where(opens, own[parts.leg], parts.heights_m[0]), own[-1])
-    places = np.append(parts.ends[0], np.array([waypoints[-1][:2]]).T, axis=1)
-    grounds = terrain.heights_m(*places)
-    above = weight * np.nan_to_num(heights) - grounds
-    alongs = np.append(parts.alongs_m[0], parts.alongs_m[1, -1:])
-    marks = np.stack([np.arange(len(above)), alongs, *places, grounds, heights, above])
-    lows, gaps = [], []
-    size = max(1, int(_AT_ONCE_M / (length_m / len(parts.leg) + 1)))
-    for first in range(0, len(parts.leg), size):
+    size = math.ceil(_AT_ONCE_M / step_m)
+    for first in range(0, count, size):
         some = Parts._make(each[..., first : first + size] for each in parts)
-        found = _nearest(terrain, some, drift_m, weight)
-        found[0] += first
-        lows.append(_least(found))
-        gaps.append(_least(found[:, np.isnan(found[4])]))
-    low, gap = np.concatenate(lows, axis=1), np.concatenate(gaps, axis=1)
-    least = np.fmin(above[:-1], above[1:])[low[0].astype(int)]
-    low = low[:, ~np.isnan(low[6]) & ~(low[6] >= least - _SAME_M)]
-    gap = gap[:, ~np.isnan(above[:-1] + above[1:])[gap[0].astype(int)]]
-    table = np.concatenate([marks, low, gap], axis=1)
-    waypoint = np.append(waypoint, np.full(table.shape[1] - len(waypoint), -1))
+        found += _nearest(terrain, some, first, drift_m, weight)
+    table = np.concatenate(found, axis=1)
+    waypoint = np.full(table.shape[1], -1)
+    waypoint[: count + 1] = [*np.where(opens, parts.leg, -1), len(waypoints) - 1]
     order = np.lexsort((table[1], table[0]))
-    base = {"amsl": 0.0, "relative": home, "terrain": table[4]}[frame]
-    columns = np.stack([*table[1:5], table[5] + base])[:, order].T.tolist()
+    table[5] += {"amsl": 0.0, "relative": home, "terrain": table[4]}[frame]
     return [
         ProfilePoint(
             along_m,
@@ -125,7 +113,7 @@ def profile(
             None if number < 0 else number,
         )
         for number, (along_m, latitude_deg, longitude_deg, ground_m, altitude_m) in zip(
-            waypoint[order].tolist(), columns, strict=True
+            waypoint[order].tolist(), table[1:, order].T.tolist(), strict=True
         )
     ]
 
@@ -140,7 +128,8 @@ class Parts(NamedTuple):
     """A route in n parts. `leg`: the index of the waypoint before. `of_leg`, `alongs_m`: (2, n),
     where each begins and ends, as a part of its leg and from the route's beginning. `ends`: (2, 2,
     n), the places there. `heights_m`: (2, n), in the route's frame; NaN: it has none. `apart_m`:
-    how far the leg and the shortest way are apart in the middle."""
+    how far the shortest way, on which they are, is from the straight line in degrees: autopilots
+    take either."""
 
     leg: Indexes
     of_leg: Floats
@@ -152,45 +141,39 @@ class Parts(NamedTuple):
     @classmethod
     def of(cls, waypoints: Sequence[Coordinate], heights_m: Floats, longest_m: float) -> "Parts":
         """Return those of a route. `heights_m`: at each waypoint."""
-        if len(waypoints) == 1:
-            waypoints, heights_m = [*waypoints] * 2, heights_m.repeat(2)
         places = np.array([each[:2] for each in waypoints]).T
-        way = np.diff(places)
-        way[1] = (way[1] + 180.0) % 360.0 - 180.0
-        lengths = np.array([distance_m(a[:2], b[:2]) for a, b in pairwise(waypoints)])
-        frames = map(LocalFrame, (places[:, :-1] + way / 2).T.tolist())
-        chords = [
-            (frame.to_local(a[:2]), frame.to_local(b[:2]))
-            for frame, (a, b) in zip(frames, pairwise(waypoints), strict=True)
-        ]
+        if len(waypoints) == 1:
+            places, heights_m = places.repeat(2, axis=1), heights_m.repeat(2)
+        begins, ends = places[:, :-1], places[:, 1:]
+        azimuths, _, lengths = _EARTH.inv(*begins[::-1], *ends[::-1])
+        middles = (begins + np.stack([ends[0], turned(ends[1], begins[1])])) / 2
+        *_, apart = _EARTH.inv(*middles[::-1], *_moved(begins, azimuths, lengths / 2)[::-1])
         counts = np.ceil(lengths / longest_m).clip(1)
         leg, number = each_of(counts)
         of_leg = np.stack([number, number + 1]) / counts[leg]
+        ways = lengths[leg] * of_leg
         return cls(
             leg,
             of_leg,
-            (np.cumsum(lengths) - lengths)[leg] + lengths[leg] * of_leg,
-            np.stack([places[:, leg] + way[:, leg] * part for part in of_leg]),
+            (np.cumsum(lengths) - lengths)[leg] + ways,
+            np.stack([_moved(begins[:, leg], azimuths[leg], way) for way in ways]),
             heights_m[leg] + np.diff(heights_m)[leg] * of_leg,
-            np.hypot(*np.mean(chords, axis=1).T)[leg],
+            apart[leg] * (1 - (2 * np.clip(0.5, *of_leg) - 1) ** 2),
         )
 
 
-def _nearest(terrain: Terrain, parts: Parts, drift_m: float, weight: float) -> Floats:
-    """Return places, among them that of each part nearest to the ground, as columns: number of the
-    part, along, latitude, longitude, ground, height in the route's frame, above the ground."""
+def _nearest(
+    terrain: Terrain, parts: Parts, number: int, drift_m: float, weight: float
+) -> list[Floats]:
+    """Return the place of each part's corridor that is nearest to the ground, and one where that is
+    not known. `number`: of the first part; `weight`: of heights, 0: all are as near."""
     begin, end = parts.ends
-    per_degree = np.array([metres_per_degree(each) for each in begin[0].tolist()]).T
-    way_m = (end - begin) * per_degree
-    length_m = np.hypot(*way_m)
-    way = np.where(length_m > 0, way_m, [[1.0], [0.0]]) / np.where(length_m > 0, length_m, 1.0)
-    off = 2 * np.clip(0.5, *parts.of_leg) - 1
-    far_m = drift_m and drift_m + parts.apart_m * (1 - off**2)
-    ahead = way * far_m / per_degree
-    aside = np.stack([-way[1], way[0]]) * far_m / per_degree
-    # Beside the way, and around each waypoint.
-    opens, closes = (np.flatnonzero(far_m * (each == at)) for at, each in enumerate(parts.of_leg))
-    part = np.concatenate([np.arange(len(parts.leg)), opens, closes])
+    azimuths, *_ = _EARTH.inv(*begin[::-1], *end[::-1])
+    far_m = drift_m and drift_m + parts.apart_m
+    ahead, aside = (_moved(begin, azimuths + turn, far_m) - begin for turn in (0, 90))
+    # Corridors around lines: of the parts, and across their waypoints.
+    opens, closes = (np.flatnonzero(each == at) for at, each in enumerate(parts.of_leg))
+    part = np.concatenate([np.arange(parts.leg.size), opens, closes])
     begins, ends = (
         np.concatenate([way, (begin + by)[:, opens], (end + by)[:, closes]], axis=1)
         for way, by in ((begin, -ahead), (end, ahead))
@@ -199,140 +182,109 @@ def _nearest(terrain: Terrain, parts: Parts, drift_m: float, weight: float) -> F
         np.concatenate([each, each[[0, 0]][:, opens], each[[1, 1]][:, closes]], axis=1)
         for each in (parts.alongs_m, parts.heights_m)
     )
-    counted = weight * np.nan_to_num(heights)
-    at, of_part, place, ground = _below(terrain, begins, ends, aside[:, part], counted)
+    counted, aside = weight * np.nan_to_num(heights), aside[:, part]
+    # The line, and the rim of its corridor: over all of the last two, it is at its begin, or end.
+    left, right = (begins - aside, ends - aside), (begins + aside, ends + aside)
+    rims = ((begins, ends), left, right, (left[0], right[0]), (left[1], right[1]))
+    starts, stops = (np.concatenate(each, axis=1) for each in zip(*rims, strict=True))
+    which, first, last, (middle, slope, bend) = pieces(terrain, starts, stops)
+    kind, line = np.divmod(which, part.size)
+    low, high = np.array([0, 0, 0, 0, 1.0])[kind], np.array([1, 1, 1, 0, 1.0])[kind]
+    rise = (counted[1] - counted[0])[line] * (high - low) * (last - first) - slope
+    with np.errstate(divide="ignore", invalid="ignore"):
+        turn = np.where(bend < 0, rise / (2 * bend), 0.5).clip(-0.5, 0.5)
+    looks = np.stack([np.full(turn.shape, -0.5), np.full(turn.shape, 0.5), turn])
+    at = looks[np.argmin(rise * looks - bend * looks**2, axis=0), np.arange(turn.size)]
+    at[np.isnan(bend)] = 0.0
+    of_rim = (first + last) / 2 + (last - first) * at
+    place = starts[:, which] + (stops - starts)[:, which] * of_rim
+    inside, of_line, samples = _samples(terrain, begins, ends, aside)
+    line = np.append(line, inside)
+    of_line = np.append(low + (high - low) * of_rim, of_line)
+    ground = np.append(middle + slope * at + bend * at**2, terrain.heights_m(samples))
     along, height, above = (
-        first[at] + (last - first)[at] * of_part for first, last in (alongs, heights, counted)
+        first[line] + (last - first)[line] * of_line for first, last in (alongs, heights, counted)
     )
-    return np.stack([part[at], along, *place, ground, height, above - ground])
-
-
-def _least(found: Floats) -> Floats:
-    """Return the column of each part that is nearest to the ground."""
-    ordered = found[:, np.lexsort((found[6], found[0]))]
-    return ordered[:, np.unique(ordered[0], return_index=True)[1]]
+    places = np.append(place, samples, axis=1)
+    found = np.stack([part[line] + number, along, *places, ground, height])
+    # The first of each part.
+    order = np.lexsort((above - ground, found[0]))
+    gaps = order[np.isnan(ground[order])]
+    return [
+        found[:, some[np.unique(found[0, some], return_index=True)[1]]] for some in (order, gaps)
+    ]
 
 
 # --- lines and corridors ------------------------------------------------------------------------
 
 
-class Pieces(NamedTuple):
-    """Pieces of lines, in their order. `begin`, `end`: as parts of the line's length. The ground is
-    `middle_m + slope_m * v + bend_m * v**2` for v from -0.5 at the begin to 0.5 at the end."""
-
-    line: Indexes
-    begin: Floats
-    end: Floats
-    middle_m: Floats
-    slope_m: Floats
-    bend_m: Floats
-
-
-def pieces(terrain: Terrain, begins: Floats, ends: Floats) -> Pieces:
+def pieces(
+    terrain: Terrain, begins: Floats, ends: Floats
+) -> tuple[Indexes, Floats, Floats, Floats]:
     """Return the pieces of lines of at most `LONGEST_M` on which the ground is a parabola.
+
+    Of each, in their order: the index of the line; where it begins and ends, as parts of the line's
+    length; and a, b and c, (3, m): the ground is a + b v + c v**2, v from -0.5 to 0.5.
 
     Raises:
         TerrainError: an elevation file cannot be used.
     """
     every = np.arange(begins.shape[1])
     cuts = [(every, np.zeros(every.shape)), (every, np.ones(every.shape))]
-    for file in terrain.files_of(*np.concatenate([begins, ends], axis=1)):
-        for turn in file.turns:
-            grid = _in_grid(file, (begins, ends), turn)
-            size = np.array([[file.rows], [file.columns]])
-            near = ((grid.max(axis=0) >= -1) & (grid.min(axis=0) <= size)).all(axis=0)
-            for (a, b), last in zip(grid.swapaxes(0, 1), size, strict=True):
-                first = np.ceil(np.minimum(a, b)).clip(-1)
-                counts = np.floor(np.maximum(a, b)).clip(max=last) - first + 1
-                line, step = each_of(np.where(near & (a != b), counts, 0))
-                cuts.append((line, (first[line] + step - a[line]) / (b - a)[line]))
+    for file in terrain.files_of(np.append(begins, ends, axis=1)):
+        grid = np.stack([file.to_grid(begins), file.to_grid(ends)])
+        low, high = _bounds(grid, file.shape)
+        size = np.array(file.shape)[:, None]
+        near = ((grid.max(axis=0) >= -1) & (grid.min(axis=0) <= size)).all(axis=0)
+        for (a, b), first, last in zip(grid.swapaxes(0, 1), low, high, strict=True):
+            line, step = each_of(np.where(near & (a != b), last - first + 1, 0))
+            cuts.append((line, (first[line] + step - a[line]) / (b - a)[line]))
     line, part = map(np.concatenate, zip(*cuts, strict=True))
     order = np.lexsort((part, line))
     line, part = line[order], part[order].clip(0, 1)
-    kept = (line[1:] == line[:-1]) & (part[1:] - part[:-1] > _LEAST_PART)
+    kept = (line[1:] == line[:-1]) & (np.diff(part) > _LEAST_PART)
     line, begin, end = line[:-1][kept], part[:-1][kept], part[1:][kept]
     # By three places inside: at the ends, heights may leap from one file to the next.
-    looks = [begin + (end - begin) * each for each in (1 / 6, 1 / 2, 5 / 6)]
-    places = [_at(begins[:, line], ends[:, line], part) for part in looks]
-    before, middle, after = terrain.heights_m(*np.concatenate(places, axis=1)).reshape(3, -1)
-    bend = 4.5 * (before - 2 * middle + after)
-    return Pieces(line, begin, end, middle, 1.5 * (after - before), bend)
+    looks = (begin + (end - begin) * np.array([[1 / 6], [1 / 2], [5 / 6]])).ravel()
+    thrice = np.tile(line, 3)
+    places = begins[:, thrice] + (ends - begins)[:, thrice] * looks
+    before, middle, after = terrain.heights_m(places).reshape(3, -1)
+    curve = np.stack([middle, 1.5 * (after - before), 4.5 * (before - 2 * middle + after)])
+    return line, begin, end, curve
 
 
-def _below(
-    terrain: Terrain, begins: Floats, ends: Floats, asides: Floats, heights: Floats
-) -> tuple[Indexes, Floats, Floats, Floats]:
-    """Return places, among them that of each line's corridor where a vehicle is nearest to the
-    ground: the index of the line, how far along it as a part of its length, the place, the ground.
-
-    `asides`: from the line to the right rim. `heights`: (2, n), of the vehicle at begins and ends.
-    """
-    rims = [(begins, ends)]
-    if asides.any():
-        right, left = (begins + asides, ends + asides), (begins - asides, ends - asides)
-        rims += [right, left, (left[0], right[0]), (left[1], right[1])]
-    starts, stops = (np.concatenate(each, axis=1) for each in zip(*rims, strict=True))
-    found = pieces(terrain, starts, stops)
-    kind, line = np.divmod(found.line, begins.shape[1])
-    # Over the whole of the last two rims, the vehicle is at the line's begin, or at its end.
-    low, high = np.array([0, 0, 0, 0, 1.0])[kind], np.array([1, 1, 1, 0, 1.0])[kind]
-    first, last = (low + (high - low) * each for each in (found.begin, found.end))
-    rise = (heights[1] - heights[0])[line] * (last - first) - found.slope_m
-    with np.errstate(divide="ignore", invalid="ignore"):
-        turn = np.where(found.bend_m < 0, rise / (2 * found.bend_m), 0.5).clip(-0.5, 0.5)
-    looks = np.stack([np.full(turn.shape, -0.5), np.full(turn.shape, 0.5), turn])
-    above = rise * looks - found.bend_m * looks**2
-    at = looks[np.argmin(above, axis=0), np.arange(turn.size)]
-    at[np.isnan(found.bend_m)] = 0.0
-    part = (found.begin + found.end) / 2 + (found.end - found.begin) * at
-    along = (first + last) / 2 + (last - first) * at
-    place = _at(starts[:, found.line], stops[:, found.line], part)
-    ground = found.middle_m + found.slope_m * at + found.bend_m * at**2
-    if len(rims) == 1:
-        return line, along, place, ground
-    corners = np.stack([*right, *left[::-1]])
-    inside, samples = (
-        np.concatenate(each) for each in zip(*_samples(terrain, corners), strict=True)
-    )
-    offset = samples.T - begins[:, inside]
-    offset[1] = (offset[1] + 180.0) % 360.0 - 180.0
-    way, aside = (ends - begins)[:, inside], asides[:, inside]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        parts = np.nan_to_num(_cross(offset, aside) / _cross(way, aside)).clip(0, 1)
-    return (
-        np.concatenate([line, inside]),
-        np.concatenate([along, parts]),
-        np.concatenate([place, begins[:, inside] + offset], axis=1),
-        np.concatenate([ground, terrain.heights_m(*samples.T)]),
-    )
+def _samples(
+    terrain: Terrain, begins: Floats, ends: Floats, asides: Floats
+) -> tuple[Indexes, Floats, Floats]:
+    """Return those in corridors: the index of it, how far along as a part of its length, and the
+    place. `asides`: from the line to its right rim."""
+    found: list[Floats] = [np.zeros((4, 0))]
+    corners = [way + by for way in (begins, ends) for by in (asides, -asides)]
+    way = ends - begins
+    for file in terrain.files_of(np.concatenate(corners, axis=1)):
+        low, high = _bounds(np.stack([file.to_grid(each) for each in corners]), file.shape)
+        rows, columns = (high - low + 1).clip(0)
+        at, number = each_of(rows * columns)
+        row, column = np.divmod(number, columns[at])
+        places = file.to_places(low[:, at] + np.stack([row, column]))
+        places[1] = turned(places[1], begins[1, at])
+        offset = places - begins[:, at]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            along = _cross(offset, asides[:, at]) / _cross(way, asides)[at]
+            aside = _cross(offset, way[:, at]) / _cross(asides, way)[at]
+        inside = (along >= 0) & (along <= 1) & (abs(aside) <= 1)
+        found.append(np.stack([at, along, *places])[:, inside])
+    index, along, *samples = np.concatenate(found, axis=1)
+    return index.astype(int), along, np.stack(samples)
 
 
-def _samples(terrain: Terrain, corners: Floats) -> Iterator[tuple[Indexes, Floats]]:
-    """Yield those in quadrilaterals, (4, 2, n): the index of it, and the places, (m, 2)."""
-    yield np.zeros(0, int), np.zeros((0, 2))
-    for file in terrain.files_of(*np.concatenate(list(corners), axis=1)):
-        for turn in file.turns:
-            rows, columns = _in_grid(file, corners, turn).swapaxes(0, 1)
-            first = np.ceil(rows.min(axis=0)).clip(-1)
-            which, step = each_of(np.floor(rows.max(axis=0)).clip(max=file.rows) - first + 1)
-            row = first[which] + step
-            # Where the row crosses the sides.
-            cuts = []
-            for a, b in pairwise((0, 1, 2, 3, 0)):
-                with np.errstate(divide="ignore", invalid="ignore"):
-                    part = (row - rows[a, which]) / (rows[b] - rows[a])[which]
-                cut = columns[a, which] + (columns[b] - columns[a])[which] * part
-                cuts.append(np.where((part >= 0) & (part <= 1), cut, np.nan))
-            first = np.ceil(np.fmin.reduce(cuts)).clip(-1)
-            counts = np.floor(np.fmax.reduce(cuts)).clip(max=file.columns) - first + 1
-            at, step = each_of(np.nan_to_num(counts))
-            yield which[at], np.stack(file.to_places(row[at], first[at] + step), axis=1)
-
-
-def _in_grid(file: ElevationFile, places: Iterable[Floats], turn: float) -> Floats:
-    """Return rows and columns, (k, 2, n); before the grid, if not all of the k places have one."""
-    grid = np.stack([file.to_grid(each[0], each[1] + turn) for each in places])
-    return np.where(np.isfinite(grid).all(axis=(0, 1)), grid, -9.0)
+def _bounds(grid: Floats, shape: tuple[int, int]) -> tuple[Floats, Floats]:
+    """Return the first and the last rows and columns, (2, n), between places in a grid, (k, 2, n),
+    also one before and one after the grid; none where not all of the k are known."""
+    known = np.isfinite(grid).all(axis=(0, 1))
+    low = np.ceil(grid.min(axis=0)).clip(-1)
+    high = np.floor(grid.max(axis=0)).clip(max=np.array(shape)[:, None])
+    return np.where(known, low, 0), np.where(known, high, -1)
 
 
 def each_of(counts: Floats) -> tuple[Indexes, Indexes]:
@@ -342,8 +294,11 @@ def each_of(counts: Floats) -> tuple[Indexes, Indexes]:
     return index, np.arange(index.size) - np.repeat(np.cumsum(times) - times, times)
 
 
-def _at(begins: Floats, ends: Floats, part: Floats) -> Floats:
-    return begins + (ends - begins) * part
+def _moved(places: Floats, azimuths: Floats, by_m: Floats | float) -> Floats:
+    """Return the places so far in a direction, in degrees from north."""
+    far = np.broadcast_to(by_m, azimuths.shape)
+    longitudes, latitudes, _ = _EARTH.fwd(places[1], places[0], azimuths, far)
+    return np.stack([latitudes, turned(longitudes, places[1])])
 
 
 def _cross(a: Floats, b: Floats) -> Floats:

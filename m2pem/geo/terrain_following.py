@@ -54,23 +54,22 @@ def follow_terrain(
         first = np.argmax(np.isnan(own)) + 1
         raise GeometryError(f"waypoint {first} has no altitude: say a height above ground")
     parts = Parts.of(route.waypoints, own, min(step_m, LONGEST_M))
-    found = pieces(terrain, *parts.ends)
-    for gap in np.flatnonzero(np.isnan(found.bend_m))[:1]:
-        begin, end = parts.ends[:, :, found.line[gap]]
-        place = begin + (end - begin) * (found.begin[gap] + found.end[gap]) / 2
+    line, begins, ends, (middle, slope, bend) = pieces(terrain, *parts.ends)
+    for gap in np.flatnonzero(np.isnan(bend))[:1]:
+        start, stop = parts.ends[:, :, line[gap]]
+        place = start + (stop - start) * (begins[gap] + ends[gap]) / 2
         raise TerrainError(not_covered((float(place[0]), float(place[1]))))
     # Each piece as straight ones, which are near enough to its parabola.
-    counts = np.ceil(np.sqrt(np.abs(found.bend_m) / (2 * _CLOSE_M))).clip(1)
+    counts = np.ceil(np.sqrt(np.abs(bend) / (2 * _CLOSE_M))).clip(1)
     piece, number = each_of(counts)
     at = (np.stack([number, number + 1]) / counts[piece]).T.ravel()
     piece = piece.repeat(2)
-    line, v = found.line[piece], at - 0.5
-    of_line = found.begin[piece] + (found.end - found.begin)[piece] * at
+    line, of_line = line[piece], begins[piece] + (ends - begins)[piece] * at
     latitudes, longitudes, alongs, heights = (
         first[line] + (last - first)[line] * of_line
         for first, last in (*parts.ends.swapaxes(0, 1), parts.alongs_m, parts.heights_m)
     )
-    grounds = found.middle_m[piece] + found.slope_m[piece] * v + found.bend_m[piece] * v**2
+    grounds = middle[piece] + slope[piece] * (at - 0.5) + bend[piece] * (at - 0.5) ** 2
     wanted = grounds + heights
     corners = np.searchsorted(parts.leg[line], np.arange(len(route.waypoints) - 1)).tolist()
     corners.append(len(wanted) - 1)

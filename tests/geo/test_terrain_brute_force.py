@@ -133,34 +133,38 @@ def drawn(world: World, random: Random, altitude: tuple[float, float]) -> Route:
 
 
 def sampled(waypoints: tuple[Coordinate, ...]) -> Iterator[tuple[Any, Any, Any]]:
-    """Yield latitudes, longitudes and altitudes each 0.1 m of each leg, straight in degrees."""
+    """Yield latitudes, longitudes and altitudes each 0.1 m of each leg, the shortest way."""
     for a, b in pairwise(waypoints):
         assert a[2] is not None
         assert b[2] is not None
-        length_m = GEOD.inv(a[1], a[0], b[1], b[0])[2]
+        azimuth, _, length_m = GEOD.inv(a[1], a[0], b[1], b[0])
         part = np.linspace(0, 1, max(2, math.ceil(length_m / STEP_M)))
-        yield a[0] + (b[0] - a[0]) * part, a[1] + (b[1] - a[1]) * part, a[2] + (b[2] - a[2]) * part
+        same = [np.full(part.shape, each) for each in (a[1], a[0], azimuth)]
+        longitudes, latitudes, _ = GEOD.fwd(*same, part * length_m)
+        yield latitudes, longitudes, a[2] + (b[2] - a[2]) * part
 
 
 def least(world: World, route: Route, drift_m: float) -> float:
     """The least height that samples on the way, beside it and around waypoints have."""
     heights = []
     for latitudes, longitudes, altitudes in sampled(route.waypoints):
-        azimuth, *_ = GEOD.inv(longitudes[0], latitudes[0], longitudes[-1], latitudes[-1])
-        many = np.full(latitudes.shape, azimuth)
+        azimuths, *_ = GEOD.inv(longitudes[:-1], latitudes[:-1], longitudes[1:], latitudes[1:])
+        right = np.append(azimuths, azimuths[-1]) + 90
         for off_m in np.linspace(-drift_m, drift_m, 9 if drift_m else 1):
-            places = GEOD.fwd(longitudes, latitudes, many + 90, np.full(latitudes.shape, off_m))
+            places = GEOD.fwd(longitudes, latitudes, right, np.full(latitudes.shape, off_m))
             grounds = world.grounds(np.stack([places[1], places[0]], axis=1))
             heights.append((altitudes - grounds).min())
-        for latitude, longitude, altitude in zip(
-            latitudes[[0, -1]], longitudes[[0, -1]], altitudes[[0, -1]], strict=True
-        ):
+        # The straight line in degrees is up to 0.4 m beside.
+        straight = [np.linspace(each[0], each[-1], each.size) for each in (latitudes, longitudes)]
+        if drift_m:
+            heights.append((altitudes - world.grounds(np.stack(straight, axis=1))).min())
+        for end in (0, -1):
             around = np.arange(0.0, 360.0, 5.0)
+            same = [np.full(around.shape, each[end]) for each in (longitudes, latitudes)]
             for off_m in np.linspace(0, drift_m, 9):
-                same = [np.full(around.shape, each) for each in (longitude, latitude)]
                 places = GEOD.fwd(*same, around, np.full(around.shape, off_m))
                 grounds = world.grounds(np.stack([places[1], places[0]], axis=1))
-                heights.append((altitude - grounds).min())
+                heights.append((altitudes[end] - grounds).min())
     return float(min(heights))
 
 
@@ -215,17 +219,16 @@ def test_a_route_that_follows_the_ground_is_everywhere_within_the_tolerance(
     except GeometryError as error:
         assert "more than 500" in str(error)
         return
-    wanted = list(sampled(route.waypoints))
     legs = iter(followed.waypoints)
     at = next(legs)
-    for (latitudes, longitudes, heights), end in zip(wanted, route.waypoints[1:], strict=True):
-        part, altitudes = [0.0], [at[2]]
-        whole = np.array([end[0] - latitudes[0], end[1] - longitudes[0]])
-        while at[:2] != end[:2] or (whole == 0).all():
+    for (latitudes, longitudes, heights), end in zip(
+        sampled(route.waypoints), route.waypoints[1:], strict=True
+    ):
+        alongs, altitudes = [0.0], [at[2]]
+        while at[:2] != end[:2]:
             at = next(legs)
-            way = np.array([at[0] - latitudes[0], at[1] - longitudes[0]])
-            part.append(float(way @ whole / (whole @ whole)))
+            alongs.append(GEOD.inv(longitudes[0], latitudes[0], at[1], at[0])[2])
             altitudes.append(at[2])
-        flown = np.interp(np.linspace(0, 1, latitudes.size), part, altitudes)
+        flown = np.interp(np.linspace(0, alongs[-1], latitudes.size), alongs, altitudes)
         grounds = world.grounds(np.stack([latitudes, longitudes], axis=1))
         assert np.abs(flown - grounds - heights).max() <= tolerance_m
