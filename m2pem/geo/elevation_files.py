@@ -115,6 +115,13 @@ class ElevationFile:
             x, y = self._system.transform(x, y)
         return np.stack([y, x])
 
+    def is_near(self, places: Floats) -> bool:
+        """Whether the grid may have some of the places: false only if all are far from it."""
+        (south, west), (north, east) = places.min(axis=1), places.max(axis=1)
+        grid = self.to_grid(np.array([[south, south, north, north], [west, east, west, east]]))
+        low, high = 2 * grid.min(axis=1) - grid.max(axis=1), 2 * grid.max(axis=1) - grid.min(axis=1)
+        return not (low > self.shape).any() and not (high < -1).any()
+
     def samples(self, grid: NDArray[np.int64]) -> Floats:
         """Return the samples at rows and columns, in the file's own datum."""
         raise NotImplementedError
@@ -302,7 +309,7 @@ class Terrain:
             for path in self._rasters:
                 with suppress(TerrainError):
                     found.append(self._raster(path))
-            return found
+            return [each for each in found if each.is_near(places)]
 
     def _heights_m(self, files_beside: int, places: Floats) -> Floats:
         """Look into the files that have the places, then between those around them."""
@@ -313,7 +320,8 @@ class Terrain:
             ((self._raster(path), beside) for beside, path in product(lookups, self._rasters)),
         )
         while (at := np.isnan(found)).any() and (look := next(files, None)):
-            found[at] = look[0].heights_m(places[:, at], look[1])
+            if look[0].is_near(places):
+                found[at] = look[0].heights_m(places[:, at], look[1])
         return found
 
     def _tiles_of(self, places: Floats) -> Iterator[ElevationFile]:

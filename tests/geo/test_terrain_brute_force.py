@@ -1,11 +1,13 @@
 """Least heights above the ground, judged by rasterio, SciPy and PROJ each 0.1 m.
 
 Ridges, dams and towers of one sample and more, on the grids that people have: SRTM of 1 and 3
-seconds of arc, GeoTIFF in degrees and in UTM of 1 to 30 m.
+seconds of arc, GeoTIFF in degrees and in UTM of 1 to 30 m. `M2PEM_SRTM` may name a folder with tiles
+of SRTM: the routes are then over these.
 """
 
 import math
-from collections.abc import Iterator
+import os
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -25,7 +27,6 @@ from m2pem.geo.terrain import DRIFT_M, lowest, profile
 from m2pem.geo.terrain_following import follow_terrain
 from m2pem.mission.geometry import Coordinate, Route
 
-SOUTH, WEST = 46, 7
 GEOD = Geod(ellps="WGS84")
 UTM = Transformer.from_crs(4326, 32632, always_xy=True)
 STEP_M = 0.1
@@ -57,10 +58,21 @@ class World:
 
 def hgt(folder: Path, side: int) -> World:
     heights = relief(side, side, side).round().astype(">i2")
-    (folder / f"N{SOUTH}E00{WEST}.hgt").write_bytes(heights.tobytes())
+    path = folder / "N46E007.hgt"
+    path.write_bytes(heights.tobytes())
+    return of_tile(path)
+
+
+def of_tile(path: Path) -> World:
+    heights = np.fromfile(path, ">i2")
+    side = math.isqrt(heights.size)
+    south = int(path.name[1:3]) * (1 if path.name[0] == "N" else -1)
+    west = int(path.name[4:7]) * (1 if path.name[3] == "E" else -1)
     axis = np.linspace(0, 1, side)
-    between = RegularGridInterpolator((SOUTH + axis, WEST + axis), heights[::-1].astype(float))
-    return World(folder, (SOUTH + 0.1, SOUTH + 0.9), (WEST + 0.1, WEST + 0.9), between)
+    rows = heights.reshape(side, side)[::-1].astype(float)
+    between = RegularGridInterpolator((south + axis, west + axis), rows)
+    latitudes, longitudes = (south + 0.1, south + 0.9), (west + 0.1, west + 0.9)
+    return World(path.parent, latitudes, longitudes, between)
 
 
 def geotiff(folder: Path, cell: float, epsg: int) -> World:
@@ -95,7 +107,7 @@ def geotiff(folder: Path, cell: float, epsg: int) -> World:
     return World(folder, (46.5 - reach, 46.5 + reach), (7.5 - wide, 7.5 + wide), grounds)
 
 
-GRIDS = {
+GRIDS: dict[str, Callable[[Path], World]] = {
     "SRTM 3 seconds": lambda folder: hgt(folder, 1201),
     "SRTM 1 second": lambda folder: hgt(folder, 3601),
     "degrees 1 m": lambda folder: geotiff(folder, 1e-5, 4326),
@@ -104,6 +116,10 @@ GRIDS = {
     "UTM 5 m": lambda folder: geotiff(folder, 5.0, 32632),
     "UTM 30 m": lambda folder: geotiff(folder, 30.0, 32632),
 }
+if folder := os.environ.get("M2PEM_SRTM"):
+    GRIDS = {
+        each.name: lambda _, path=each: of_tile(path) for each in sorted(Path(folder).glob("*.hgt"))
+    }
 
 
 @pytest.fixture(scope="module")
@@ -114,14 +130,15 @@ def worlds(tmp_path_factory: pytest.TempPathFactory) -> dict[str, World]:
 def drawn(world: World, random: Random, altitude: tuple[float, float]) -> Route:
     """Of two to five waypoints, legs of 20 m to 3 km; some along the grid."""
     place = random.uniform(*world.latitudes), random.uniform(*world.longitudes)
-    places = []
+    places: list[tuple[float, float, float]] = []
+    middle = float(np.mean(world.latitudes)), float(np.mean(world.longitudes))
     while len(places) < random.randint(2, 5):
         if world.latitudes[0] < place[0] < world.latitudes[1] and (
             world.longitudes[0] < place[1] < world.longitudes[1]
         ):
             places.append((*place, random.uniform(*altitude)))
         else:
-            place = places[-1][:2] if places else (46.5, 7.5)
+            place = places[-1][:2] if places else middle
         azimuth = random.choice((random.uniform(0, 360), 90.0 * random.randrange(4)))
         longitude, latitude, _ = GEOD.fwd(place[1], place[0], azimuth, random.uniform(20, 3000))
         exact = azimuth % 90 == 0
