@@ -113,3 +113,76 @@ def test_ground_that_is_not_known_is_a_warning(tmp_path: Path) -> None:
     findings = check(tmp_path / "m.bpmn", tmp_path / "fleet.yaml")
     assert [each.rule for each in findings] == ["ground-unknown"]
     assert "elevation: cannot be read" in str(findings[0])
+
+
+# --- what one look each 30 m does not see -------------------------------------------------------
+
+CELL = 1e-5
+"""Of a GeoTIFF: 1.1 m to the north, 0.9 m to the east."""
+
+
+def write_fine(folder: Path, *raised: tuple[float, float, float, float, float]) -> None:
+    """A GeoTIFF around `lane`, at 60 m; `raised`: metres north and east of its beginning, how far
+    on, and the height."""
+    rows, columns = 1200, 120
+    heights = np.full((rows, columns), 60.0, "float32")
+    north, east = 1.112, 0.877
+    for from_north, to_north, from_east, to_east, height in raised:
+        row = [rows - 51 - round(each / north) for each in (to_north, from_north)]
+        column = [60 + round(each / east) for each in (from_east, to_east)]
+        heights[row[0] : row[1] + 1, column[0] : column[1] + 1] = height
+    (folder / "elevation").mkdir()
+    with rasterio.open(
+        folder / "elevation" / "dem.tif",
+        "w",
+        width=columns,
+        height=rows,
+        count=1,
+        dtype="float32",
+        crs="EPSG:4326",
+        transform=from_origin(-77.3 - 60.5 * CELL, 38.1 + (rows - 50.5) * CELL, CELL, CELL),
+    ) as data:
+        data.write(heights, 1)
+
+
+def test_a_dam_of_twelve_metres_is_found_with_its_place_and_raising_is_enough(
+    tmp_path: Path,
+) -> None:
+    write_fine(tmp_path, (444, 456, -40, 40, 110))
+    [(rule, _, text)] = found(tmp_path, lane(100, "amsl"))
+    assert rule == "low-over-ground"
+    place, along = re.search(r"\[(38\.\d+), -77\.\d+\], (\d+) m along", text).groups()  # type: ignore[union-attr]
+    assert float(place) == pytest.approx(38.1 + 450 / 111_200, abs=0.0001)
+    assert 430 < int(along) < 460
+    assert "10 m below the ground" in text
+    assert "raise it by 30 m" in text
+    assert len(found(tmp_path, lane(129.9, "amsl"))) == 1
+    assert found(tmp_path, lane(130, "amsl")) == []
+
+
+@pytest.mark.parametrize(("north_m", "east_m"), [(500, 3), (500, -3), (-3, 0)])
+def test_a_mast_beside_the_way_counts_as_far_as_the_vehicle_may_drift(
+    tmp_path: Path, north_m: float, east_m: float
+) -> None:
+    write_fine(tmp_path, (north_m, north_m, east_m, east_m, 110))
+    assert [rule for rule, *_ in found(tmp_path, lane(100, "amsl"))] == ["low-over-ground"]
+
+
+def test_a_mast_out_of_reach_is_not_found(tmp_path: Path) -> None:
+    write_fine(tmp_path, (500, 500, 6, 6, 110), (-20, -20, 0, 0, 110))
+    assert found(tmp_path, lane(100, "amsl")) == []
+
+
+def test_ground_that_is_not_known_hides_no_low_place(tmp_path: Path) -> None:
+    write_fine(tmp_path, (300, 301, 0, 0, -9999), (700, 702, 0, 0, 110))
+    rules = [rule for rule, *_ in found(tmp_path, lane(100, "amsl"))]
+    assert rules == ["ground-unknown", "low-over-ground"]
+
+
+def test_the_way_back_of_a_loop_is_looked_at(tmp_path: Path) -> None:
+    write_fine(tmp_path, (495, 505, 15, 25, 110))
+    corners = "[[-77.3, 38.1, 100], [-77.3, 38.109, 100], [-77.29954, 38.109, 100]]"
+    route = lane(100, "amsl").partition("[[")[0] + corners + "}}"
+    assert found(tmp_path, route) == []
+    loop = '<m2pem:property name="loop" value="true"/>'
+    assert [rule for rule, *_ in found(tmp_path, route, more=loop)] == ["low-over-ground"]

@@ -1,8 +1,8 @@
 """Least heights above the ground, judged by rasterio, SciPy and PROJ each 0.1 m.
 
 Ridges, dams and towers of one sample and more, on the grids that people have: SRTM of 1 and 3
-seconds of arc, GeoTIFF in degrees and in UTM of 1 to 30 m. `M2PEM_SRTM` may name a folder with tiles
-of SRTM: the routes are then over these.
+seconds of arc, GeoTIFF in degrees and in UTM of 1 to 30 m. `M2PEM_SRTM` may name a folder with
+tiles of SRTM: the routes are then over these.
 """
 
 import math
