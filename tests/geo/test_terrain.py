@@ -11,10 +11,12 @@ import rasterio
 import tifffile
 from hypothesis import given
 from hypothesis import strategies as st
+from rasterio.transform import from_origin
 
 from m2pem.geo.elevation_files import Terrain, TerrainError
 from m2pem.geo.terrain import lowest, profile
 from m2pem.mission.geometry import Route
+from tests.geo.test_elevation_files import write
 
 SIDE = 1201
 
@@ -196,6 +198,40 @@ def test_the_lowest_place_is_between_two_waypoints(tmp_path: Path) -> None:
     assert low is not None
     assert low.above_ground_m == pytest.approx(20, abs=4)
     assert low.place[0] == pytest.approx(38.5, abs=0.0004)
+
+
+def test_the_ground_may_be_highest_between_rows_and_columns(tmp_path: Path) -> None:
+    """A tower of 100 m at one sample: in the middle of a cell beside it are 25 m."""
+    transform = from_origin(7.0, 46.0, 0.002, 0.002)
+    heights = np.zeros((9, 9))
+    heights[4, 4] = 100.0
+    write(tmp_path / "dem.tif", heights, transform=transform)
+    # From row 2.7 and column 3.7 over (3.5, 4.5), on the diagonal that does not lead to the tower.
+    north, west = 46.0 - 0.001, 7.0 + 0.001
+    places = [(north - 0.002 * each, west + 0.002 * (each + 1)) for each in (2.7, 3.93)]
+    route = Route(tuple((*each, 60.0) for each in places), "amsl")
+    low = lowest(profile(route, Terrain(tmp_path), 100.0, drift_m=0.0))
+    assert low is not None
+    assert low.above_ground_m == pytest.approx(35, abs=0.01)
+    assert low.place == pytest.approx((north - 0.007, west + 0.009), abs=2e-6)
+
+
+def test_a_route_over_the_date_line_is_looked_at_where_it_is(tmp_path: Path) -> None:
+    for west, height in ((179, 10), (-180, 30)):
+        name = f"S17{'E' if west > 0 else 'W'}{abs(west)}.hgt"
+        (tmp_path / name).write_bytes(struct.pack(f">{SIDE}h", *([height] * SIDE)) * SIDE)
+    route = Route(((-16.5, 179.999, 100.0), (-16.5, -179.999, 100.0)), "amsl")
+    points = profile(route, Terrain(tmp_path))
+    assert points[-1].along_m == pytest.approx(213.7, abs=0.5)
+    assert {round(each.above_ground_m or 0, 3) for each in points} == {90, 70}
+    assert {round(each.place[1]) for each in points} == {180, -180}
+
+
+def test_a_place_and_a_leg_without_a_length_have_a_profile(tile: Path) -> None:
+    for waypoints in (((38.5, -78.0, 700.0),), ((38.5, -77.9, 900.0), (38.5, -77.9, 700.0))):
+        low = lowest(profile(Route(waypoints, "amsl"), Terrain(tile.parent), drift_m=0.0))
+        assert low is not None
+        assert low.above_ground_m == pytest.approx(700 - plane(*waypoints[0][:2]), abs=1)
 
 
 def test_what_has_no_altitude_has_no_height_above_ground(tile: Path) -> None:
