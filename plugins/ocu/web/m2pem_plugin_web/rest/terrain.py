@@ -29,8 +29,8 @@ from m2pem_plugin_web.rest.models import Answer, Body
 
 
 class ProfileModel(Body):
-    """A route, by its name or as GeoJSON. `home_m`: what relative altitudes count from, in metres
-    above mean sea level; null: the ground at the first waypoint."""
+    """A route, by its name or as GeoJSON. `step_m`: more than 100 is 100. `home_m`: what relative
+    altitudes count from, in metres above mean sea level; null: the ground at the first waypoint."""
 
     route: GivenGeometry
     step_m: Annotated[float, Field(ge=1.0, le=10_000.0, strict=False)] = 30.0

@@ -116,7 +116,7 @@ function Words({ profile: { points, lowest, clearance_m, missing } }: { profile:
   const at = lowest === null ? null : points[lowest];
   if (!at || at.above_ground_m === null) return <p class="terrain-words">{words.noAltitude}</p>;
   const values = {
-    height: Math.round(Math.abs(at.above_ground_m)),
+    height: Math.abs(Math.floor((at.above_ground_m + 1e-4) * 10) / 10),
     along: writtenLength(at.along_m),
     clearance: clearance_m ?? 0,
   };
