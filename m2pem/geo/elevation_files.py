@@ -115,12 +115,11 @@ class ElevationFile:
             x, y = self._system.transform(x, y)
         return np.stack([y, x])
 
-    def is_near(self, places: Floats) -> bool:
-        """Whether the grid may have some of the places: false only if all are far from it."""
-        (south, west), (north, east) = places.min(axis=1), places.max(axis=1)
-        grid = self.to_grid(np.array([[south, south, north, north], [west, east, west, east]]))
-        low, high = 2 * grid.min(axis=1) - grid.max(axis=1), 2 * grid.max(axis=1) - grid.min(axis=1)
-        return not (low > self.shape).any() and not (high < -1).any()
+    def is_near(self, corners: Floats) -> bool:
+        """Whether the grid may have places between the corners: false only if all are far."""
+        grid = self.to_grid(corners)
+        low, high = grid.min(axis=1), grid.max(axis=1)
+        return not (2 * low - high > self.shape).any() and not (2 * high - low < -1).any()
 
     def samples(self, grid: NDArray[np.int64]) -> Floats:
         """Return the samples at rows and columns, in the file's own datum."""
@@ -309,30 +308,39 @@ class Terrain:
             for path in self._rasters:
                 with suppress(TerrainError):
                     found.append(self._raster(path))
-            return [each for each in found if each.is_near(places)]
+            corners = _corners(places)
+            return [each for each in found if each.is_near(corners)]
 
     def _heights_m(self, files_beside: int, places: Floats) -> Floats:
         """Look into the files that have the places, then between those around them."""
         found = np.full(places.shape[1], np.nan)
+        if not places.size:
+            return found
+        corners = _corners(places)
         lookups = (None, partial(self._heights_m, files_beside - 1)) if files_beside else (None,)
         files = chain(
             ((tile, None) for tile in self._tiles_of(places)),
             ((self._raster(path), beside) for beside, path in product(lookups, self._rasters)),
         )
         while (at := np.isnan(found)).any() and (look := next(files, None)):
-            if look[0].is_near(places):
+            if look[0].is_near(corners):
                 found[at] = look[0].heights_m(places[:, at], look[1])
         return found
 
     def _tiles_of(self, places: Floats) -> Iterator[ElevationFile]:
         """Yield the tiles around places; on an edge, those of both sides."""
-        if places.size:
-            south, west = np.floor(places.min(axis=1) - _EDGE_DEG).astype(int).tolist()
-            north, east = np.floor(places.max(axis=1) + _EDGE_DEG).astype(int).tolist()
-            for lowest, leftmost in product(range(south, north + 1), range(west, east + 1)):
-                corner = lowest, (leftmost + 180) % 360 - 180
-                if corner in self._tiles:
-                    yield self._tile(self._tiles[corner], corner)
+        south, west = np.floor(places.min(axis=1) - _EDGE_DEG).astype(int).tolist()
+        north, east = np.floor(places.max(axis=1) + _EDGE_DEG).astype(int).tolist()
+        for lowest, leftmost in product(range(south, north + 1), range(west, east + 1)):
+            corner = lowest, (leftmost + 180) % 360 - 180
+            if corner in self._tiles:
+                yield self._tile(self._tiles[corner], corner)
+
+
+def _corners(places: Floats) -> Floats:
+    """Return the corners of the least rectangle with all places, (2, 4)."""
+    (south, west), (north, east) = places.min(axis=1), places.max(axis=1)
+    return np.array([[south, south, north, north], [west, east, west, east]])
 
 
 def turned(longitudes: Floats, near: Floats | float) -> Floats:

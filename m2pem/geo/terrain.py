@@ -27,6 +27,9 @@ DRIFT_M = 4.0
 LONGEST_M = 100.0
 """Of a line: one that is so long is straight in degrees, and in a file's projection, to 1 mm."""
 
+_MOST_STEPS = 2_000
+"""Of a profile: over a longer route they are longer, but not longer than a line may be."""
+
 _AT_ONCE_M = 2_000.0
 """So much of a route is looked at in one piece, for its memory."""
 
@@ -84,7 +87,8 @@ def profile(
         bases = zip(route.frames, grounds, strict=True)
         own += [{"amsl": 0.0, "relative": home, "terrain": each}[base] for base, each in bases]
         frame = "amsl"
-    step_m = min(step_m, LONGEST_M)
+    length_m = float(Parts.of(waypoints, own, math.inf).alongs_m[1, -1])
+    step_m = min(max(step_m, length_m / _MOST_STEPS), LONGEST_M)
     parts = Parts.of(waypoints, own, step_m)
     count = parts.leg.size
     # The places as columns: number of the part, along, latitude, longitude, ground, height.
