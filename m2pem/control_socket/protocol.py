@@ -128,7 +128,9 @@ def result_of(answer: bytes) -> Any:
         ControlSocketError: it went away, or did not understand, or is not understood.
     """
     if not answer:
-        raise ControlSocketError("the executive closed the connection; has it just ended?")
+        raise ControlSocketError(
+            "the executive has ended: it may have done what it was asked, or not"
+        )
     try:
         response = msgspec.json.decode(answer, type=Response)
     except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:

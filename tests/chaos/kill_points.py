@@ -324,6 +324,26 @@ def die_at(point: KillPoint, passage: int) -> None:
     install(point, passed)
 
 
+def die_when(names: Iterable[str], points: Mapping[str, KillPoint], armed: Path) -> None:
+    """Have this process killed at a point when a file arms it: the name of the point, and in the
+    next line the passage, counted from when it is armed."""
+    left: dict[str, int] = {}
+
+    def passed(name: str) -> None:
+        try:
+            point, passage = armed.read_text(encoding="utf-8").splitlines()
+        except (FileNotFoundError, ValueError):  # it is not armed, or just being so
+            left.clear()
+            return
+        if point == name:
+            left[name] = left.get(name, int(passage)) - 1
+            if not left[name]:
+                os.kill(os.getpid(), signal.SIGKILL)
+
+    for name in names:
+        install(points[name], functools.partial(passed, name))
+
+
 def count(points: Iterable[KillPoint], into: Path) -> None:
     """Have the passages of points counted, and written to a file when this process ends."""
     counts: Counter[str] = Counter()

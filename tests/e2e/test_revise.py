@@ -8,6 +8,7 @@ import pytest
 
 from m2pem.mission.mission import version_of_files
 from tests.command_line import CommandLine
+from tests.faults import Faults
 
 _FLEET = """
 version: 1
@@ -146,6 +147,22 @@ def test_an_executive_that_is_killed_right_after_it_resumes_with_the_new_version
     resumed.until_record("RunEnded", outcome="completed")
     status, replayed, _ = m2pem.run("replay", "r1", "--verify")
     assert status == 0, replayed
+
+
+def test_a_revision_is_acknowledged_when_it_is_on_the_disk(
+    faulty: CommandLine, faults: Faults, tmp_path: Path
+) -> None:
+    fleet, long, short = _files(tmp_path)
+    at = ("--journal", "journal.db")
+    program = faulty.start("run", long, "--fleet", fleet, "--format", "json", "--ocu", "none", *at)
+    program.until_record("BehaviorProgressed", state="RUNNING")
+    faults.hang("sync", name="journal.db")
+    revising = faulty.start("revise", "r1", short, "--yes", "--by", "anna", *at)
+    program.until_said("the journal has not written for")
+    assert revising.process.poll() is None
+    faults.clear()
+    assert revising.rest()[0] == 0
+    program.until_record("MissionRevised", by="anna")
 
 
 _MESSAGE = '<messageEventDefinition messageRef="M"/>'

@@ -18,6 +18,7 @@ from m2pem.errors import PluginError
 from m2pem_plugin_web.access.requests import SafeHeaders
 from m2pem_plugin_web.live.standbys import with_page
 from m2pem_plugin_web.probes import LIVE, PROBE_HEADERS, READY
+from m2pem_plugin_web.problems import METHODS, problem
 from m2pem_plugin_web.server import Server
 from m2pem_plugin_web.settings import read_settings
 
@@ -26,6 +27,7 @@ log = logging.getLogger("m2pem.ocu")
 ServedBy = Callable[[], ExecutiveAddress | None]
 
 _RELOAD_S = 2
+_HEADERS = {"cache-control": "no-store", "retry-after": str(_RELOAD_S)}
 _PAGE = """<!doctype html>
 <html lang="en"><meta charset="utf-8"><meta http-equiv="refresh" content="{reload_s}">
 <meta name="viewport" content="width=device-width"><title>m2pem: standby</title>
@@ -56,19 +58,28 @@ def create_app(fleet: str, served_by: ServedBy) -> ASGIApp:
     async def live(_: Request) -> Response:
         return JSONResponse({"status": "live"}, headers=PROBE_HEADERS)
 
-    async def ready(_: Request) -> Response:
+    def serves() -> dict[str, object] | None:
         server = served_by()
-        serves = server and {"host": server.host, "pid": server.pid, "page": server.page}
-        said = {"status": "standby", "served_by": serves}
+        return server and {"host": server.host, "pid": server.pid, "page": server.page}
+
+    async def ready(_: Request) -> Response:
+        said = {"status": "standby", "served_by": serves()}
         return JSONResponse(said, status_code=503, headers=PROBE_HEADERS)
+
+    async def api(_: Request) -> Response:
+        detail = f"this executive stands by for {fleet}, and does nothing: ask the one that serves"
+        return problem(503, detail, _HEADERS, served_by=serves())
 
     async def page(_: Request) -> Response:
         text = _said(fleet, served_by())
         content = _PAGE.format(fleet=escape(fleet), text=text, reload_s=_RELOAD_S)
-        headers = {"cache-control": "no-store", "retry-after": str(_RELOAD_S)}
-        return HTMLResponse(content, status_code=503, headers=headers)
+        return HTMLResponse(content, status_code=503, headers=_HEADERS)
 
-    routes = [Route(LIVE, live), Route(READY, ready), Route("/{path:path}", page)]
+    routes = [
+        *(Route(LIVE, live), Route(READY, ready)),
+        Route("/api/{path:path}", api, methods=METHODS),
+        Route("/{path:path}", page),
+    ]
     return SafeHeaders(Starlette(routes=routes))
 
 

@@ -33,6 +33,12 @@ async def test_a_standby_is_live_and_not_ready_and_tells_who_serves() -> None:
         assert page.status_code == 503
         assert "Process 4711 on gcs1 serves north &lt;1&gt;" in page.text
         assert '<a href="https://gcs1:8700/">' in page.text
+        for method, path in (("GET", "/api/runs/r1"), ("POST", "/api/runs/r1/revision")):
+            refused = await http.request(method, path, json={} if method == "POST" else None)
+            assert refused.status_code == 503
+            assert refused.headers["content-type"] == "application/problem+json"
+            assert "this executive stands by for north <1>" in refused.json()["detail"]
+            assert refused.json()["served_by"]["pid"] == 4711
         served_by.append(ExecutiveAddress("gcs1", 4711, "javascript:alert(1)"))
         assert "href" not in (await http.get("/")).text
         served_by.append(None)
