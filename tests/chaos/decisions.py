@@ -14,7 +14,7 @@ import signal
 import sys
 import tempfile
 from collections import Counter
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -62,7 +62,6 @@ from pathlib import Path
 from tests.chaos import kill_points
 points = kill_points.points_of(kill_points.JOURNALS[{journal!r}], {arbiter!r})
 kill_points.die_when({points!r}, points, Path({armed!r}))
-{spoil}
 sys.argv = ["m2pem", *{words!r}]
 runpy.run_module("m2pem", run_name="__main__", alter_sys=True)
 """
@@ -107,10 +106,8 @@ class Round:
 class Play:
     """One round while it is played."""
 
-    def __init__(
-        self, seed: int, after: After, journal: str, folder: Path, spoil: str = ""
-    ) -> None:
-        self.seed, self._after, self._folder, self._spoil = seed, after, folder, spoil
+    def __init__(self, seed: int, after: After, journal: str, folder: Path) -> None:
+        self.seed, self._after, self._folder = seed, after, folder
         self._chance = Random(f"kills {seed}")
         self._ways = Random(f"ways {seed}")
         self._kind = JOURNALS[journal]
@@ -144,7 +141,6 @@ class Play:
             arbiter=SimulatedVehicles.arbiter,
             points=self._points(POINTS) + (OF_RESUME if words[-1] != "--standby" else ()),
             armed=str(self._armed),
-            spoil=self._spoil,
             words=words,
         )
         streams = [
@@ -329,8 +325,10 @@ class Play:
                 raise AssertionError(f"{decision}: {outcome}")
 
     def _looks(self, decision: Decision) -> bool:
-        """Whether the operator looks first if a lost decision was done; a signal has no id."""
-        return decision.kind in ("signal", "message") or self._chance.random() < 0.4
+        """Whether the operator looks first if a lost decision was done. Signals, messages and data
+        may be sent again, and come again then."""
+        again = decision.kind in ("signal", "message") or decision.value == "set_data"
+        return again or self._chance.random() < 0.4
 
     async def _was_done(self, attempts: list[tuple[str, str]]) -> bool:
         names = {by for by, _ in attempts}
@@ -495,14 +493,8 @@ class Play:
         reader = Reader(records)
         faults += reader.faults
         for number, attempts in self._done.items():
-            faults += self._of_attempts(self.script.decisions[number], attempts, records)
-        found, wanted = (Counter(map(_plain, each)) for each in (records, self.script.records))
-        for each, count in (found - wanted).items():
-            if each:
-                faults.append(f"{count} times more than without kills: {each}")
-        for each, count in (wanted - found).items():
-            if each:
-                faults.append(f"{count} times less than without kills: {each}")
+            faults += faults_of(self.script.decisions[number], attempts, records)
+        faults += differences(records, self.script.records)
         starts = Counter(
             each.behavior
             for each in (recorded_effects(self._state) if self._state.exists() else ())
@@ -515,23 +507,6 @@ class Play:
                 faults.append(f"{behavior} began {count} times, restarted {again[behavior]}")
         if "Traceback" in self.said():
             faults.append(self.said())
-
-    @staticmethod
-    def _of_attempts(
-        decision: Decision, attempts: list[tuple[str, str]], records: list[r.Record]
-    ) -> list[str]:
-        faults, total = [], 0
-        for by, outcome in attempts:
-            # A choice may have written several values.
-            those = [each for each in records if getattr(each, "by", "") == by]
-            count = len(those)
-            total += count
-            allowed = {"done": (1,), "lost": (0, 1)}.get(outcome, (0,))
-            if count not in allowed:
-                faults.append(f"{decision}, {by}: {outcome}, and {count} records: {those}")
-        if total != 1:
-            faults.append(f"{decision}: {attempts}, and {total} records")
-        return faults
 
     def close(self) -> None:
         """Leave nothing running."""
@@ -546,6 +521,29 @@ async def _read(control: MissionControl, known: list[r.Record]) -> list[r.Record
     while page := await control.records(RUN, after_seq=len(known)):
         known += [each.record for each in page]
     return known
+
+
+def faults_of(
+    decision: Decision, attempts: list[tuple[str, str]], records: list[r.Record]
+) -> list[str]:
+    """Compare what came of each attempt at a decision, by whom it was made, with the records."""
+    faults, total = [], 0
+    for by, outcome in attempts:
+        those = [each for each in records if getattr(each, "by", "") == by]
+        total += len(those)
+        if len(those) not in {"done": (1,), "lost": (0, 1)}.get(outcome, (0,)):
+            faults.append(f"{decision}, {by}: {outcome}, and {len(those)} records: {those}")
+    if total != 1:
+        faults.append(f"{decision}: {attempts}, and {total} records")
+    return faults
+
+
+def differences(records: Iterable[r.Record], wanted: Iterable[r.Record]) -> list[str]:
+    """Compare the records of a run with those of the run without kills."""
+    found, without = (Counter(filter(None, map(_plain, each))) for each in (records, wanted))
+    more = [f"{n} times more than without kills: {each}" for each, n in (found - without).items()]
+    less = [f"{n} times less than without kills: {each}" for each, n in (without - found).items()]
+    return more + less
 
 
 def _plain(record: r.Record) -> str:
@@ -573,11 +571,10 @@ _COMPARED = (
 )
 
 
-def play_round(seed: int, after: After, journal: str, spoil: str = "") -> Round:
-    """Play a round and judge it. `spoil`: Python code that makes executives worse, to see that the
-    judge finds it."""
+def play_round(seed: int, after: After, journal: str) -> Round:
+    """Play a round and judge it."""
     with tempfile.TemporaryDirectory(prefix="m2pem-decisions-") as folder:
-        play = Play(seed, after, journal, Path(folder), spoil)
+        play = Play(seed, after, journal, Path(folder))
         try:
             asyncio.run(play.whole())
             asyncio.run(play.judge())

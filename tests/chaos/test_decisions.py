@@ -5,9 +5,8 @@ from msgspec.structs import replace
 
 from m2pem.engine import records as r
 from m2pem.engine.records import TokenOutcome
-from tests.chaos.decision_missions import Reader
-from tests.chaos.decisions import After, play_round, way_of
-from tests.chaos.kill_points import SQLITE
+from tests.chaos.decision_missions import Decision, Reader
+from tests.chaos.decisions import differences, faults_of, play_round, way_of
 
 SHORT = (2, 3, 8, 10, 14, 107)
 """With few kills each: `way_of` has both ways to go on, and both kinds of journals among them."""
@@ -20,26 +19,6 @@ SHORT = (2, 3, 8, 10, 14, 107)
 def test_each_decision_around_a_kill_is_in_force_once(seed: int) -> None:
     played = play_round(seed, *way_of(seed))
     assert not played.faults, f"{played.kills}: {played.faults}"
-
-
-_TOO_EARLY = """
-import asyncio
-from m2pem.executive.runner import Runner
-commit = Runner._commit
-
-async def answers_first(self, steps):
-    for step in steps:
-        self._answer_asker(step)
-    await asyncio.sleep(0.1)  # the answer goes out
-    await commit(self, steps)
-
-Runner._commit = answers_first
-"""
-
-
-def test_the_judge_finds_what_was_acknowledged_too_early() -> None:
-    played = play_round(9, After.RESTART, SQLITE.name, _TOO_EARLY)
-    assert any("set_data" in each and "0 records" in each for each in played.faults), played
 
 
 ENTERED = r.TokenEntered(1, "P", "Job", 1)
@@ -57,3 +36,23 @@ def test_the_reader_finds_what_happens_twice() -> None:
     assert "was over" in Reader([THROWN, AWAITED, TAKEN, TAKEN]).faults[0]
     again = [replace(each, wait=2) for each in (AWAITED, TAKEN)]
     assert "more often" in Reader([THROWN, AWAITED, TAKEN, *again]).faults[0]
+
+
+def test_the_judge_finds_what_was_acknowledged_and_is_lost_or_was_done_twice() -> None:
+    skip = Decision("resolve", "Job", "skip")
+    once, again = (
+        r.IncidentResolved(1, "P", "Job", 1, "r1.i1", "skip", by) for by in ("d0a0", "d0a1")
+    )
+    assert faults_of(skip, [("d0a0", "done")], [once]) == []
+    assert faults_of(skip, [("d0a0", "lost"), ("d0a1", "refused: late")], [once]) == []
+    assert faults_of(skip, [("d0a0", "lost"), ("d0a1", "done")], [again]) == []
+    assert "0 records" in faults_of(skip, [("d0a0", "done")], [])[0]
+    assert "2 records" in faults_of(skip, [("d0a0", "lost"), ("d0a1", "done")], [once, again])[0]
+    assert "1 records" in faults_of(skip, [("d0a0", "refused: no")], [once])[0]
+
+
+def test_the_judge_compares_with_the_run_without_kills() -> None:
+    claimed = r.RunClaimed(2)
+    assert differences([ENTERED, claimed, LEFT], [ENTERED, LEFT]) == []
+    assert "1 times more" in differences([ENTERED, LEFT, ENTERED], [ENTERED, LEFT])[0]
+    assert "1 times less" in differences([ENTERED], [ENTERED, LEFT])[0]
