@@ -60,7 +60,9 @@ def create_app(fleet: str, served_by: ServedBy) -> ASGIApp:
 
     def serves() -> dict[str, object] | None:
         server = served_by()
-        return server and {"host": server.host, "pid": server.pid, "page": server.page}
+        if server is None:
+            return None
+        return {"host": server.host, "pid": server.pid, "page": server.page}
 
     async def ready(_: Request) -> Response:
         said = {"status": "standby", "served_by": serves()}
