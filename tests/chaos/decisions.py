@@ -81,7 +81,7 @@ OF_RESUME = ("resume: claimed", "resume: replayed", "resume: posted", "resume: t
 
 _GONE = (
     *("the executive has ended", "does not answer", "is gone", "no executive"),
-    *("was interrupted", "is just taken up"),
+    "was interrupted, and",
 )
 """What the command line says of an executive that was killed."""
 
