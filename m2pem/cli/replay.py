@@ -170,16 +170,14 @@ def replay_counterexample(
 
     report = _read(file)
     violation = _violation(file, report, number)
-    if together := report.get("together"):
-        raise UnusableError(
-            f"{file} is of a search in which all pools begin with the run ({', '.join(together)}); "
-            "the engine begins a run with one process, and cannot play that"
-        )
     mission = _mission(file, report, mission_file)
     fleet = fleet_of(fleet_file or DEFAULT_FLEET, mission)
     ways = known_ways(fleet, mission)
     steps = [*violation["steps"], *violation["loop"]]
-    player = ConformanceRun(mission, fleet, report["process"], report["data"], ways, steps)
+    together = report.get("together", ())
+    player = ConformanceRun(
+        mission, fleet, report["process"], report["data"], ways, steps, together
+    )
     lines = LineFormatter(lambda _: mission, colour=wants_colour(sys.stdout))
     _say(output, f"{violation['property']}: {violation['text']}")
     _show(player.steps, lines, output)

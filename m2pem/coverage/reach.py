@@ -12,7 +12,7 @@ from m2pem.mission.values import Value
 from m2pem.verify.check import search, size_limit_of
 from m2pem.verify.net.petri_net import Action, Flag, PetriNet
 from m2pem.verify.net.simplify import simplify
-from m2pem.verify.report.run_steps import ElementNames, RunStep, describe_run
+from m2pem.verify.report.run_steps import ElementNames, RunStep, describe_run, encoding_of
 from m2pem.verify.search.explore import Exploration, Limits
 from m2pem.verify.translate import Options, TooLargeError, translate
 
@@ -90,7 +90,7 @@ class Reach:
             return
         for index in islice(self._by_key.get(item.key, ()), MOST_RUNS):
             run = [*self._found.run_to(self._found.fired[index]), index]
-            steps, _ = describe_run(self._net, self._names, run)
+            steps, _ = describe_run(encoding_of(self._net), self._names, run)
             yield steps
 
 

@@ -64,6 +64,8 @@ def may_wait_for_space(
 
 def without_space(fleet: Fleet) -> Fleet:
     """Return a fleet in which no task waits for space."""
+    if not fleet.shared_space and fleet.on_conflict is OnConflict.REFUSE:
+        return fleet
     return replace(fleet, shared_space={}, on_conflict=OnConflict.REFUSE)
 
 

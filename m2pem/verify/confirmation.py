@@ -17,6 +17,7 @@ from m2pem.verify.conformance_run import ConformanceRun, NotPlayableError
 from m2pem.verify.net.petri_net import Kind, PetriNet, Role
 from m2pem.verify.report.run_steps import ElementNames, describe_run, encoding_of
 from m2pem.verify.translate.options import Options
+from m2pem.verify.translate.participants import participants
 
 MOST_STATES = 2_000
 """Most states after internal steps with which the end of a run is compared."""
@@ -32,33 +33,36 @@ class Confirmation:
         self, mission: Mission, fleet: Fleet, process: str | None, options: Options
     ) -> None:
         self._mission, self._fleet, self._options = mission, fleet, options
-        self._process = mission.process(process).id
+        root = mission.process(process)
+        self._process = root.id
+        together = participants(mission, root) if options.all_pools else ()
+        self._together = [each.id for each in together]
         self._names = ElementNames(mission)
-        self._net: PetriNet | None = None
-        self._followed: _Followed | None = None
+        self._followed: dict[int, _Followed] = {}  # by identity of the net
         self._known: dict[tuple[int, ...], str] = {}
 
     def doubt(self, net: PetriNet, run: Sequence[int]) -> str:
-        """Return where the engine does not follow a run; "": it does.
-
-        Where all pools begin together, the engine has no such run, and there is no doubt.
-        """
-        if self._options.all_pools:
-            return ""
-        if self._net is not net or self._followed is None:
-            self._net, self._followed, self._known = net, _Followed(net), {}
-        key = tuple(run)
+        """Return where the engine does not follow a run; "": it does."""
+        key = (id(net), *run)
         if key not in self._known:
-            self._known[key] = self._execute(self._followed, key)
+            if id(net) not in self._followed:
+                self._followed[id(net)] = _Followed(net)
+            self._known[key] = self._execute(self._followed[id(net)], run)
         return self._known[key]
 
     def _execute(self, followed: "_Followed", run: Sequence[int]) -> str:
         net, encoding = followed.net, followed.encoding
-        described, _ = describe_run(net, self._names, run, encoding=encoding)
+        described, _ = describe_run(encoding, self._names, run, for_people=False)
         steps = [each.as_data() for each in described]
         mission, options = self._mission, self._options
         player = ConformanceRun(
-            mission, self._fleet, self._process, options.data, options.ways, steps
+            mission,
+            self._fleet,
+            self._process,
+            options.data,
+            options.ways,
+            steps,
+            self._together,
         )
         before: list[int] = []
         state = encoding.initial

@@ -32,6 +32,7 @@ from m2pem.engine.state import (
     Wait,
 )
 from m2pem.engine.steps import Steps
+from m2pem.engine.triggering import arm_event_subprocesses, take_kept_messages
 from m2pem.errors import ExpressionError
 from m2pem.fleet.fleet import Fleet
 from m2pem.fleet.space import without_space
@@ -44,6 +45,7 @@ from m2pem.mission.values import ReadValue, Value
 from m2pem.verify.net import choices
 from m2pem.verify.net.petri_net import REASSIGNED, Action, Trigger
 from m2pem.verify.translate.domains import constants, representatives
+from m2pem.verify.translate.participants import untriggered
 from m2pem.verify.translate.pools import candidates_of
 from m2pem.verify.translate.sequence_flows import is_free_choice
 from m2pem.verify.translate.space import SpacePlan, space_plan
@@ -69,17 +71,35 @@ class _StepsWithOpenConditions(Steps):
     """Steps of a run into which data of unknown origin may still be written.
 
     `choices`: by element, the sequence flows by which its next tokens leave, where neither the
-    mission nor its data decides; `made`: names of the data that was written for that.
+    mission nor its data decides; `made`: names of the data that was written for that. `together`:
+    the processes that are still to begin, with the run.
     """
 
-    __slots__ = ("choices", "made")
+    __slots__ = ("choices", "made", "together")
 
     def __init__(
-        self, state: RunState, fleet: Fleet | None, choices: Mapping[str, deque[tuple[str, ...]]]
+        self,
+        state: RunState,
+        fleet: Fleet | None,
+        choices: Mapping[str, deque[tuple[str, ...]]],
+        together: Sequence[str],
     ) -> None:
         super().__init__(state, fleet, _BATCH)
         self.choices = choices
         self.made: set[str] = set()
+        self.together = [self.mission.process(each) for each in together]
+
+    def finish(self) -> list[r.Record]:
+        """Begin first what begins with the run."""
+        while self.together and self.state.status is RunStatus.RUNNING:
+            process, number = self.together.pop(0), self.state.last_scope + 1
+            self.emit(r.ScopeOpened(number, process.id, process.id))
+            scope = self.state.scopes[number]
+            if arm_event_subprocesses(self, scope):
+                for entry in untriggered(process):
+                    self.spawn(entry, scope)
+                take_kept_messages(self, scope)
+        return super().finish()
 
     def emit(self, record: r.Record) -> None:
         super().emit(record)
@@ -131,9 +151,10 @@ class _Run(MissionRun):
         mission: Mission,
         fleet: Fleet | None,
         choices: Mapping[str, deque[tuple[str, ...]]],
+        together: Sequence[str],
     ) -> None:
         super().__init__(mission, fleet, "r1")
-        self._x = _StepsWithOpenConditions(self.state, fleet, choices)
+        self._x = _StepsWithOpenConditions(self.state, fleet, choices, together)
 
     def write(self, wait: Wait, data: dict[str, Value], now_us: int) -> Step:
         """Write data where an element waits for a condition that reads it."""
@@ -155,14 +176,18 @@ class ConformanceRun:
         data: Mapping[str, Value] | None = None,
         ways: KnownWays | None = None,
         steps: Sequence[Mapping[str, Any]] = (),
+        together: Sequence[str] = (),
     ) -> None:
-        """`ways`: those with which the net was made. `steps`: those that are going to be played."""
+        """`ways`: those with which the net was made. `steps`: those that are going to be played.
+        `together`: processes that begin with the run, as other runs never do.
+        """
         self._space: SpacePlan | None = None
-        if fleet is not None:
+        if fleet is not None and fleet.shared_space:
             candidates = candidates_of(mission, fleet, None)
             self._space = space_plan(mission, mission.process(process), fleet, candidates, ways)
+        if fleet is not None:
             fleet = without_space(fleet) if self._space is None else self._space.fleet
-        self.run = _Run(mission, fleet, _choices(mission, steps))
+        self.run = _Run(mission, fleet, _choices(mission, steps), together)
         self.steps: list[Step] = []
         self._now_us = _START_US
         self._reports: Counter[str] = Counter()

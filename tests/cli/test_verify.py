@@ -10,6 +10,8 @@ from m2pem.verify.search.explore import Progress
 from tests.cli.conftest import Invoke
 from tests.command_line import FLEET, MISSION, REPOSITORY, CommandLine
 from tests.engine.notation import xml
+from tests.verify.test_all_pools import STUCK
+from tests.verify.test_all_pools import mission as mission_of_pools
 from tests.verify.test_fairness import AGREE
 from tests.verify.test_timers import WARNED_FIRST
 
@@ -161,13 +163,14 @@ def test_a_run_that_the_engine_does_not_follow_ends_with_1(invoke: Invoke, repor
     assert "the engine does not follow" in err
 
 
-def test_a_run_in_which_all_pools_begin_is_not_played(invoke: Invoke, report: Path) -> None:
-    found = json.loads(report.read_bytes())
-    found["together"] = ["Other"]
-    report.write_text(json.dumps(found), encoding="utf-8")
-    status, _, err = invoke("replay", "--counterexample", report)
-    assert status == 2
-    assert "all pools begin with the run (Other)" in err
+def test_a_run_in_which_all_pools_begin_is_played(invoke: Invoke, tmp_path: Path) -> None:
+    file, report = tmp_path / "pools.bpmn", tmp_path / "pools.json"
+    file.write_bytes(mission_of_pools(STUCK).source)
+    assert invoke("verify", file, "--all-pools", "--report", report)[0] == 1
+    assert json.loads(report.read_bytes())["together"] == ["B"]
+    status, out, _ = invoke("replay", "--counterexample", report)
+    assert status == 0
+    assert "tokens are at reply" in out
 
 
 @pytest.mark.parametrize(("text", "why"), [("[]", "no report"), ("{", "no JSON")])

@@ -325,33 +325,30 @@ _Decided = tuple[object, ...]
 
 
 def with_outcomes(transitions: Sequence[Transition]) -> list[Transition]:
-    """Return the same transitions, each with its outcome."""
+    """Return the same transitions, where those that are alike have one outcome."""
     alike: dict[_Decided, list[tuple[Transition, int]]] = {}
-    count = 0
     made: list[Transition] = []
     for transition in transitions:
-        if only_waits(transition):
-            made.append(transition)
-            continue
-        others = alike.setdefault(_decided(transition), [])
-        taken = {outcome for other, outcome in others if not _exclude(transition, other)}
-        free = [outcome for _, outcome in others if outcome not in taken]
-        outcome = free[0] if free else count
-        count += not free
-        others.append((transition, outcome))
-        made.append(replace(transition, outcomes=(outcome,)))
+        outcome = transition.index
+        if transition.kind is Kind.EXTERNAL:
+            others = alike.setdefault(_decided(transition), [])
+            taken = {outcome for other, outcome in others if not _exclude(transition, other)}
+            outcome = next((each for _, each in others if each not in taken), outcome)
+            others.append((transition, outcome))
+        same = outcome == transition.index
+        made.append(transition if same else replace(transition, outcomes=(outcome,)))
     return made
 
 
-def only_waits(transition: Transition) -> bool:
-    """Whether a transition is a join, which decides nothing."""
-    allocates = any(step.action is Action.ALLOCATED for step in transition.steps)
-    return transition.kind is Kind.JOIN and not allocates
+def own_outcome(index: int, kind: Kind, steps: Sequence[Step]) -> tuple[int, ...]:
+    """Return the outcome of a transition that is like no other: none of a join, which decides
+    nothing."""
+    if kind is Kind.JOIN and not any(step.action is Action.ALLOCATED for step in steps):
+        return ()
+    return (index,)
 
 
 def _decided(transition: Transition) -> _Decided:
-    if transition.kind is not Kind.EXTERNAL:
-        return (transition.index,)
     return (
         transition.trigger,
         transition.detail,
@@ -376,4 +373,4 @@ def outcomes_of(net: PetriNet) -> Mapping[int, tuple[int, ...]]:
     """The outcomes of each transition: several, where it was fused from several transitions."""
     if any(transition.outcomes for transition in net.transitions):
         return {transition.index: transition.outcomes for transition in net.transitions}
-    return {r.index: () if only_waits(r) else (r.index,) for r in net.transitions}
+    return {r.index: own_outcome(r.index, r.kind, r.steps) for r in net.transitions}

@@ -76,6 +76,8 @@ def _trim(transition: Transition, concurrency: Concurrency) -> Transition:
     )
     if len(reset) > len(transition.reset) * _WORTH_TRIMMING:
         reset = transition.reset
+    if (inhibit, reset, copies) == (transition.inhibit, transition.reset, transition.copies):
+        return transition
     return replace(transition, inhibit=inhibit, reset=reset, copies=copies)
 
 
@@ -111,7 +113,9 @@ def renumbered(net: PetriNet, transitions: list[Transition]) -> PetriNet:
     return replace(
         net,
         places=tuple(
-            replace(
+            place
+            if place.index == n and not place.returns and place.holder is None
+            else replace(
                 place,
                 index=n,
                 returns=tuple(number[p] for p in place.returns if p in number),

@@ -10,6 +10,7 @@ from m2pem.mission.mission import Mission
 from m2pem.mission.values import Value
 from m2pem.verify.assumptions import NOTHING, Assumptions
 from m2pem.verify.check import Report
+from m2pem.verify.net.encoding import Encoding
 from m2pem.verify.net.petri_net import Action, PetriNet
 from m2pem.verify.properties.results import Result, Verdict, Violation
 from m2pem.verify.report.run_steps import (
@@ -111,10 +112,13 @@ def findings_of(
 ) -> Findings:
     """Describe the runs of all violations: causes first, then consequences, then warnings."""
     element_names = ElementNames(mission)
+    encodings: dict[int, Encoding] = {}
     run_step = []
     for result in report.results:
         net = report.transitions_of(result)
-        run_step += [_describe(net, element_names, result, each) for each in result.violations]
+        run_step += [
+            _describe(net, element_names, result, each, encodings) for each in result.violations
+        ]
     run_step.sort(key=lambda each: (each.answer.warning, _follows(each.answer)))
     found, plain = report.found, report.without or report
     stopped = found.stopped.value if found.stopped is not None else ""
@@ -137,7 +141,7 @@ def findings_of(
         given or {},
         report.assumed,
         tuple(
-            _describe(each.net, element_names, each, each.violations[0])
+            _describe(each.net, element_names, each, each.violations[0], encodings)
             for result in report.results
             if (each := result.without) is not None and each.violations and each.net is not None
         ),
@@ -185,15 +189,25 @@ def marks_of(violation: DescribedViolation, unreached: frozenset[str] = frozense
 
 
 def _describe(
-    net: PetriNet, element_names: ElementNames, answer: Result, found: Violation
+    net: PetriNet,
+    element_names: ElementNames,
+    answer: Result,
+    found: Violation,
+    encodings: dict[int, Encoding],
 ) -> DescribedViolation:
+    """Describe a violation. `encodings`: by identity of the net, those that were made before."""
     if not found.run and not found.cycle:
         return DescribedViolation(answer, found, (), (), ())
-    run_steps, state = describe_run(net, element_names, found.run)
-    loop, state = describe_run(net, element_names, found.cycle, begin=len(run_steps), at=state)
-    tokens = tokens_of(encoding_of(net), state)
+    if id(net) not in encodings:
+        encodings[id(net)] = encoding_of(net)
+    encoding = encodings[id(net)]
+    run_steps, state = describe_run(encoding, element_names, found.run)
+    begin = len(run_steps)
+    loop, state = describe_run(encoding, element_names, found.cycle, begin=begin, at=state)
+    marking = encoding.marking(state)
+    tokens = tokens_of(net, marking)
     deadlock = answer.property == DEADLOCK and not answer.required
-    waiting = waits_for_resources(net, element_names, encoding_of(net).marking(state))
+    waiting = waits_for_resources(net, element_names, marking)
     stuck = why_stuck(element_names, run_steps, tokens, waiting) if deadlock else []
     missing = tuple(flow for each in stuck for flow in each.missing)
     if stuck:

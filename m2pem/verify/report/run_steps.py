@@ -11,7 +11,7 @@ from m2pem.mission.events import RootElement
 from m2pem.mission.mission import Mission
 from m2pem.mission.values import Value
 from m2pem.verify.net import choices
-from m2pem.verify.net.encoding import Encoding
+from m2pem.verify.net.encoding import Encoding, Marking
 from m2pem.verify.net.petri_net import (
     BEGINS,
     COMPENSATION_BEGINS,
@@ -160,24 +160,24 @@ class RunStep:
 
 
 def describe_run(
-    net: PetriNet,
+    encoding: Encoding,
     element_names: ElementNames,
     run: Sequence[int],
     *,
     begin: int = 0,
     at: int | None = None,
-    encoding: Encoding | None = None,
+    for_people: bool = True,
 ) -> tuple[tuple[RunStep, ...], int]:
     """Describe a run, and return the state in which it ends too.
 
-    `begin`: how many steps were described before; `at`: the state that those led to, None for the
-    first. `encoding`: that of `encoding_of`, if it was made before.
+    `encoding`: that of `encoding_of`. `begin`: how many steps were described before; `at`: the
+    state that those led to, None for the first. `for_people`: else the steps have neither texts nor
+    tokens.
     """
-    encoding = encoding or encoding_of(net)
     state = encoding.initial if at is None else at
     run_step: list[RunStep] = []
     waiting: list[Transition] = []
-    transitions = [part for index in run for part in _parts(net.transitions[index])]
+    transitions = [part for index in run for part in _parts(encoding.net.transitions[index])]
     commanded = _commanded_later(transitions)
     for number, transition in enumerate(transitions):
         if transition.index != _SAME:
@@ -190,8 +190,9 @@ def describe_run(
         if number + 1 < len(transitions) and _same_step(transition, transitions[number + 1]):
             continue
         if any(each.steps for each in waiting):
+            after = begin + len(run_step) + 1
             run_step.append(
-                _run_step(begin + len(run_step) + 1, waiting, element_names, encoding, state)
+                _run_step(after, waiting, element_names, encoding, state, for_people=for_people)
             )
             waiting = []
     return tuple(run_step), state
@@ -256,11 +257,11 @@ def encoding_of(net: PetriNet) -> Encoding:
     return Encoding(net, {place.index: _ROOM_BITS for place in net.places})
 
 
-def tokens_of(encoding: Encoding, state: int) -> tuple[Token, ...]:
+def tokens_of(net: PetriNet, marking: Marking) -> tuple[Token, ...]:
     """Return the mission's tokens, without those that only the net needs."""
     found: dict[tuple[str, str], int] = {}
-    for index, count in encoding.marking(state).tokens.items():
-        place = encoding.net.places[index]
+    for index, count in marking.tokens.items():
+        place = net.places[index]
         if place.role in ("control", "end"):
             continue
         known = place.element
@@ -269,12 +270,12 @@ def tokens_of(encoding: Encoding, state: int) -> tuple[Token, ...]:
     return tuple(Token(element, count, flow) for (element, flow), count in found.items())
 
 
-def data_of(encoding: Encoding, state: int) -> dict[str, Value]:
+def _data_of(net: PetriNet, marking: Marking) -> dict[str, Value]:
     """The values of all followed names."""
-    values = encoding.marking(state).values
+    values = marking.values
     return {
         variable.name: variable.values[values[variable.index]]
-        for variable in encoding.net.variables
+        for variable in net.variables
         if variable.index in values
     }
 
@@ -297,24 +298,26 @@ def _run_step(
     element_names: ElementNames,
     encoding: Encoding,
     state: int,
+    *,
+    for_people: bool,
 ) -> RunStep:
     transition = next((each for each in transitions if each.trigger is not None), transitions[-1])
     actions = tuple(dict.fromkeys(step for each in transitions for step in each.steps))
     element = next(each for each in transitions if each.steps).element
     taken = [step.element for step in actions if step.action in _PASSED]
     others = [step.element for step in actions if step.action not in _PASSED]
-    writes = _writes(transition, element_names, encoding.net)
+    writes, marking = _writes(transition, element_names, encoding.net), encoding.marking(state)
     return RunStep(
         number,
-        _sentence(transition, actions, element_names, writes),
+        _sentence(transition, actions, element_names, writes) if for_people else "",
         element,
         tuple(dict.fromkeys([*taken, *others])),
         tuple(each.index for each in transitions if each.index != _SAME),
         transition.trigger.value if transition.trigger is not None else "",
         transition.detail,
         actions,
-        tokens_of(encoding, state),
-        data_of(encoding, state),
+        tokens_of(encoding.net, marking) if for_people else (),
+        _data_of(encoding.net, marking),
         writes,
     )
 

@@ -33,6 +33,7 @@ from m2pem.verify.net.petri_net import (
     Transition,
     Trigger,
     Variable,
+    own_outcome,
     with_outcomes,
 )
 from m2pem.verify.net.size_limit import SizeLimit
@@ -384,6 +385,7 @@ class NetBuilder:
             bool(effect.empty_scopes),
             draft.due_us,
             tuple(sorted(dict(sorted(effect.at_most, reverse=True)).items())),
+            own_outcome(number, draft.kind, effect.steps),
         )
 
     def _given_back(self, effect: Effect, reset: tuple[int, ...]) -> tuple[tuple[int, int], ...]:

@@ -185,6 +185,8 @@ def follow_order(context: TranslationContext, initial: tuple[int, ...]) -> tuple
     Tasks that begin at one moment ask in any order, each in a step of its own. Returns the places
     that have a token at first.
     """
+    if not (context.before or context.passed_over):
+        return initial
     net = context.net
     asking = {each.place: each for each in context.asking}
     due: dict[int, int] = {}
