@@ -59,6 +59,7 @@ class Encoding:
         self.offset: list[int] = []
         self.width: list[int] = []
         self.mask: list[int] = []
+        self._place_of_bit: list[int] = []
         at = 0
         for place in net.places:
             width = self.wider.get(place.index, SEVERAL_BITS if place.several else 1)
@@ -67,6 +68,7 @@ class Encoding:
             self.offset.append(at)
             self.width.append(width)
             self.mask.append(((1 << width) - 1) << at)
+            self._place_of_bit += [place.index] * width
             at += width
         self.value_bit: list[int] = []
         for variable in net.variables:
@@ -240,17 +242,17 @@ class Encoding:
 
     def marking(self, state: int) -> Marking:
         """Decode a state into a marking."""
-        tokens = {
-            place.index: count
-            for place in self.net.places
-            if (count := (state & self.mask[place.index]) >> self.offset[place.index])
-        }
+        tokens: dict[int, int] = {}
+        rest = state & (1 << len(self._place_of_bit)) - 1
+        while rest:  # most places have none
+            place = self._place_of_bit[(rest & -rest).bit_length() - 1]
+            tokens[place] = (state & self.mask[place]) >> self.offset[place]
+            rest &= ~self.mask[place]
         values: dict[int, int] = {}
         for variable in self.net.variables:
-            base = self.value_bit[variable.index]
-            for number in range(len(variable.values)):
-                if state >> (base + number) & 1:
-                    values[variable.index] = number
+            bits = state >> self.value_bit[variable.index] & (1 << len(variable.values)) - 1
+            if bits:
+                values[variable.index] = bits.bit_length() - 1
         return Marking(tokens, values)
 
     def value(self, state: int, variable: int) -> Value:

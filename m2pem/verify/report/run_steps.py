@@ -31,6 +31,7 @@ class ElementNames:
 
     def __init__(self, mission: Mission) -> None:
         self.mission = mission
+        self._with_id: dict[str, str] = {}
 
     def name(self, element: str) -> str:
         """A name for a text: that of the diagram, else of the flow's ends, else kind and id."""
@@ -45,10 +46,11 @@ class ElementNames:
 
     def with_id(self, element: str) -> str:
         """The name, and the id where the name does not contain it."""
-        name = self.name(element)
-        if name.endswith(f" {element}") or _letters(name) == _letters(element):
-            return name
-        return f"{name} ({element})"
+        if element not in self._with_id:
+            name = self.name(element)
+            same = name.endswith(f" {element}") or _letters(name) == _letters(element)
+            self._with_id[element] = name if same else f"{name} ({element})"
+        return self._with_id[element]
 
     def all_of(self, elements: Sequence[str]) -> str:
         """Several names in a text."""
