@@ -55,6 +55,22 @@ def test_an_alarm_that_the_engine_does_not_follow_is_not_certain() -> None:
     assert doubts[0] == caught.covered
 
 
+TWICE = """
+<startEvent id="s"/><exclusiveGateway id="m"/><endEvent id="e"/>
+<userTask id="A">ask a<loop loopMaximum="2"> </loop></userTask>
+s -> m -> A -> e
+s -> m
+"""
+"""Two tokens work in one loop, whose rounds are counted once."""
+
+
+def test_no_end_is_said_to_be_out_of_reach_for_certain_where_the_engine_goes_on() -> None:
+    results = {each.property: each for each in check(mission(TWICE)).results}
+    assert results["no-deadlock"].verdict is Verdict.MAY_BE_VIOLATED
+    for name in ("can-complete", "completes-if-fair"):
+        assert results[name].verdict is not Verdict.VIOLATED
+
+
 def test_a_run_that_the_mission_does_not_have_is_doubted() -> None:
     text = mission(FREE)
     report = check(text)

@@ -117,21 +117,21 @@ UNEXPLAINED = (
 def judged(
     violations: Iterable[Violation],
     encoding: Encoding,
-    approximations: Sequence[Approximation],
     confirm: Confirm | None,
     *,
+    explained: bool,
     begins: bool = False,
 ) -> tuple[Violation, ...]:
     """Return violations, the certain ones first, each with its doubt. `encoding`: with which they
-    were found; `approximations`: those that may explain false alarms. `begins`: a violation without
-    a run is one of the state in which the mission begins."""
+    were found; `explained`: something explains false alarms. `begins`: a violation without a run is
+    one of the state in which the mission begins."""
     known = []
     for each in islice(violations, MOST_VIOLATIONS):
         doubt, run = each.doubt, (*each.run, *each.cycle)
         if not doubt and confirm is not None and (run or begins):
             doubt = BEYOND if _loses(encoding, run) else ""
             if not doubt and (where := confirm(encoding.net, run)):
-                why = "" if approximations else f"; {UNEXPLAINED}"
+                why = "" if explained else f"; {UNEXPLAINED}"
                 doubt = f"the engine does not follow its run: {where}{why}"
         known.append(replace(each, doubt=doubt))
     return tuple(sorted(known, key=lambda each: bool(each.doubt)))
@@ -221,8 +221,10 @@ class SearchedMission:
         """
         found = found or self.found
         if violations:
-            approximations = bounded(self.found)
-            known = judged(violations, found.encoding, approximations, self.confirm, begins=begins)
+            explained = bool(bounded(self.found) or self.found.overflows)
+            known = judged(
+                violations, found.encoding, self.confirm, explained=explained, begins=begins
+            )
             doubt = known[0].doubt
             verdict = Verdict.MAY_BE_VIOLATED if doubt else Verdict.VIOLATED
             return Result(name, text, verdict, known, warning, doubt)

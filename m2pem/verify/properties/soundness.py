@@ -187,8 +187,12 @@ def can_complete(searched: SearchedMission) -> Result:
 
 
 def _of_all_runs(searched: SearchedMission, violations: list[Violation]) -> list[Violation]:
-    """Say of violations that no run ends after them whether that is certain beyond a bound."""
+    """Say of violations that no run ends after them whether that is certain: not beyond a bound,
+    and not if the engine goes on where the net is stuck."""
+    stuck = no_deadlock(searched) if violations else None
     doubt = BEYOND if searched.is_bounded else ""
+    if stuck is not None and stuck.verdict is Verdict.MAY_BE_VIOLATED:
+        doubt = doubt or stuck.covered
     return [replace(each, doubt=doubt) for each in violations]
 
 

@@ -183,7 +183,8 @@ def _result(
     if verdict is Verdict.VIOLATED:
         assert net is not None
         room = encoding_of(net)
-        violations = judged([_violation(answer, mission)], room, net.approximations, confirm)
+        explained = bool(net.approximations)
+        violations = judged([_violation(answer, mission)], room, confirm, explained=explained)
         if covered := violations[0].doubt:
             verdict = Verdict.MAY_BE_VIOLATED
     return Result(
