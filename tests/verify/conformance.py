@@ -72,6 +72,7 @@ def play(
             continue
         if engine.state.status is RunStatus.ENDED:
             return Played(tuple(inputs), tuple(steps), f"the run is over before {transition.name}")
+        now_us += 1  # no two timers are due at one moment
         if transition.trigger is Trigger.TIMER:
             due_us = _due_us(engine.state, transition)
             if due_us is None:
