@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import partial
-from typing import Any, get_type_hints
+from typing import Any, Self, get_type_hints
 
 import msgspec
 
@@ -217,6 +217,9 @@ class Fleet:
     clearance_m: float | None = None
     debugging: bool = False
     warnings: tuple[Finding, ...] = ()
+
+    def __deepcopy__(self, memo: object) -> Self:
+        return self  # it never changes
 
     @property
     def detectors(self) -> tuple[ResourceId, ...]:

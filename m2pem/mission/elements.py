@@ -11,7 +11,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import TypeAlias, Union
+from typing import Self, TypeAlias, Union
 
 from m2pem.mission.behavior import Behavior, Mappings, Prompt, Script, ServiceCall
 from m2pem.mission.events import (
@@ -36,6 +36,9 @@ class Element:
     line: int
     qualifier: str = field(init=False, repr=False, default="")
     """What the id begins with, before a colon; "" in the mission's own file."""
+
+    def __deepcopy__(self, memo: object) -> Self:
+        return self  # it never changes
 
     @property
     def local_id(self) -> str:

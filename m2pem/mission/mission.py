@@ -4,6 +4,7 @@ version of it: a hash of these files."""
 import hashlib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import Self
 
 from m2pem.findings import Finding
 from m2pem.mission.elements import Activity, CallActivity, Element, FlowNode, Process, SequenceFlow
@@ -78,6 +79,9 @@ class Mission:
     geometries: Mapping[str, Geometry] = field(default_factory=dict, repr=False)
     """Routes, areas and points that the files have themselves, in place of the fleet's."""
     library: tuple[Source, ...] = field(repr=False, default=())
+
+    def __deepcopy__(self, memo: object) -> Self:
+        return self  # it never changes
 
     def process(self, process_id: str | None = None) -> Process:
         """The process a run begins with: the one named, else the file's main one.

@@ -150,7 +150,6 @@ class _Judge:
                 continue
             if run >= explored.expanded or run in explored.undecided:
                 self._unexplored.append(pair)
-                continue
             for step in explored.transitions[run]:
                 after = state
                 for letter in step.letters:

@@ -6,9 +6,9 @@ step an input that may come. What is explored is what would happen, and nothing 
 translated. States that differ only in ids and in the time of day are one.
 
 Behaviors succeed, or fail with an error that some event catches; prompts get any answer; timers
-come in any order with the ends of behaviors; operators may send signals. Incidents that were open
-before are skipped, or tried again if that helps; what else operators decide about them is not
-known. A new one ends its path.
+come in any order with the ends of behaviors; what is awaited of signals and messages may come, and
+operators may begin other processes by theirs. Incidents that were open before are skipped, or tried
+again if that helps; what else operators decide about them is not known. A new one ends its path.
 
 What is true on the way is read by a `MomentReader`, for requirements.
 """
@@ -19,29 +19,20 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any, Protocol, TypeAlias
+from typing import Any, Protocol
 
-import msgspec
-
+from m2pem.bpmn.data_names import unwritten
 from m2pem.engine import inputs as i
-from m2pem.engine.execution import received_messages
+from m2pem.engine.execution import definitions_of, triggered_starts
 from m2pem.engine.records import IncidentOpened, Record, RunOutcome, Trigger
 from m2pem.engine.run import MissionRun
-from m2pem.engine.state import (
-    BehaviorPhase,
-    Incident,
-    KeptMessage,
-    RunState,
-    RunStatus,
-    Scope,
-    Token,
-    Wait,
-)
+from m2pem.engine.state import BehaviorPhase, Incident, RunState, RunStatus, Token
 from m2pem.engine.throwing import catcher_of_error
 from m2pem.mission.catalogue import BehaviorState
-from m2pem.mission.mission import version_of
-
-Key: TypeAlias = tuple[Any, ...]
+from m2pem.mission.elements import Activity, Event, FlowNode
+from m2pem.mission.events import Message, Signal
+from m2pem.mission.mission import Mission, version_of
+from m2pem.verify.state_key import NotKnownError, state_key
 
 MAX_CONTINUES = 100
 """Batches of steps after which an input counts as one that never comes to an end."""
@@ -148,10 +139,6 @@ class OutlookLimits:
     seconds: float = 4.0
 
 
-class _NotKnownError(Exception):
-    """The exploration cannot say what follows; the text says why."""
-
-
 def outlook(
     run: MissionRun,
     now_us: int,
@@ -168,9 +155,11 @@ def outlook(
     explorer = _Explorer(run, limits or OutlookLimits(), writers, reader or _NoReader())
     try:
         return explorer.explore(now_us, choice)
-    except _NotKnownError as error:
-        explorer.found.why_incomplete = str(error)
-        return Outlook(Verdict.UNKNOWN, str(error), explorer.found)
+    except (NotKnownError, RecursionError) as error:
+        deep = isinstance(error, RecursionError)
+        reason = "its subprocesses are too deep in each other" if deep else str(error)
+        explorer.found.why_incomplete = reason
+        return Outlook(Verdict.UNKNOWN, reason, explorer.found)
 
 
 class _Explorer:
@@ -193,15 +182,10 @@ class _Explorer:
         """Explore all states, breadth first, and judge them."""
         self._choose(choice, now_us)
         run = self._first
-        mission = run.state.mission
-        shared = [mission, *mission.elements.values()]
-        self._shared = {id(each): each for each in shared}
-        self._labels = {node.id: node.label for node in mission.nodes}
-        self._alike = Counter(self._labels.values())
-        self._codes = list(dict.fromkeys(["FAILED", *(e.code for e in mission.errors.values())]))
+        self._read_mission(run)
         found, letter = self.found, self._reader.reading(run.state).letter
         found.add(letter)
-        numbers = {(_key(run.state, now_us), letter): 0}
+        numbers = {(self._key(run, now_us), letter): 0}
         good: list[int] = []
         bad: dict[int, str] = {}
         waiting = deque([(0, run, now_us)])
@@ -219,25 +203,27 @@ class _Explorer:
             steps = self._steps(run, now_us)
             incidents = list(run.state.incidents.values())
             opened = [each for each in incidents if each.id not in self._open_before]
-            if not steps and incidents and not opened:
+            decided = {item.incident for item, _ in steps if isinstance(item, i.ResolveIncident)}
+            if left := [each for each in incidents if each.id in self._open_before - decided]:
                 found.undecided.add(number)
-                stopped = incidents[0].token.node.label
                 found.why_incomplete = (
-                    f"operators must decide about {stopped}, too: {incidents[0].code}"
+                    f"operators must decide about {left[0].token.node.label}, too: {left[0].code}"
                 )
             elif not steps:
                 found.final.add(number)
                 bad[number] = _where_it_stops(run.state, opened)
-            texts = [self._said(run.state, item) for item, _ in steps]
-            for (item, at_us), text in zip(steps, texts, strict=True):
-                following = copy.deepcopy(run, dict(self._shared)) if len(steps) > 1 else run
+            for item, at_us in steps:  # grows
+                text = self._said(run.state, item)
+                following = copy.deepcopy(run) if len(steps) > 1 else run
                 reading = self._reader.reading(following.state)
                 self._receive(following, item, at_us, reading.read)
-                key = (_key(following.state, at_us), reading.letter)
+                if at_us == now_us:
+                    steps += [(item, later_us) for later_us in _later(run, following, now_us)]
+                key = (self._key(following, at_us), reading.letter)
                 known = numbers.setdefault(key, len(found.letters))
                 if known == len(found.letters):
                     if known >= self._limits.states:
-                        raise _NotKnownError(f"there are more than {self._limits.states} states")
+                        raise NotKnownError(f"there are more than {self._limits.states} states")
                     found.add(reading.letter)
                     waiting.append((known, following, at_us))
                 step = Transition(known, tuple(reading.letters), text)
@@ -245,13 +231,30 @@ class _Explorer:
         found.expanded = len(found.letters)
         return _judge(found, good, bad)
 
+    def _read_mission(self, run: MissionRun) -> None:
+        """Read the version of the mission that holds now."""
+        mission = run.state.mission
+        known = {name for each in run.state.scopes.values() for name in each.data}
+        self._reads_more = any(unwritten(mission, known, {}, {}))
+        self._bringing = _bringing(mission)
+        root = run.state.root.container.process if run.state.root else mission.process()
+        self._begun = [
+            (Trigger.SIGNAL if isinstance(each, Signal) else Trigger.MESSAGE, each.id, start)
+            for start in triggered_starts(mission, root)
+            for each in _roots(start)
+            if each.from_operator
+        ]
+        self._labels = {node.id: node.label for node in mission.nodes}
+        self._alike = Counter(self._labels.values())
+        self._codes = list(dict.fromkeys(["FAILED", *(e.code for e in mission.errors.values())]))
+
     def _choose(self, choice: i.ResolveIncident | i.Revise, now_us: int) -> None:
         """Carry out the choice, and let the run go on if it is paused."""
         run, observe = self._first, self._reader.observe
         if isinstance(choice, i.Revise):  # its plan is that of the run as it is
             self._receive(run, choice, now_us, observe)
             if version_of(run.state.mission) != choice.version:
-                raise _NotKnownError("the run has gone on since the plan of the revision was made")
+                raise NotKnownError("the run has gone on since the plan of the revision was made")
         self._receive(run, i.SetBreakpoints(), now_us, observe)  # an author lets it go on
         if run.state.status is RunStatus.PAUSED:
             self._receive(run, i.ResumeRun(), now_us, observe)
@@ -262,7 +265,7 @@ class _Explorer:
         """Return the inputs that may come next, each with its time."""
         state = run.state
         if state.allocations:
-            raise _NotKnownError("a task chooses its vehicles or payloads when it starts")
+            raise NotKnownError("a task chooses its vehicles or payloads when it starts")
         for behavior in state.behaviors.values():
             if behavior.phase is BehaviorPhase.CANCELLING:  # whatever else comes, this does
                 ended = BehaviorState.CANCELLED
@@ -272,7 +275,7 @@ class _Explorer:
             if behavior.phase is BehaviorPhase.UNSETTLED:
                 continue  # its prompt is answered
             if behavior.name in self._writers:
-                raise _NotKnownError(f"what {behavior.name} writes is not known")
+                raise NotKnownError(f"what {behavior.name} writes is not known")
             number = behavior.number + 1
             items.append(i.BehaviorReported(behavior.id, number, BehaviorState.SUCCEEDED))
             items += [
@@ -282,17 +285,20 @@ class _Explorer:
         for prompt in state.prompts.values():
             items += [i.PromptAnswer(prompt.id, each["value"]) for each in prompt.decisions]
         for service in state.services.values():
-            raise _NotKnownError(f"what {service.name} writes is not known")
-        for trigger, ref in list(state.catchers):
-            if trigger is Trigger.MESSAGE:
-                raise _NotKnownError("what messages from outside bring is not known")
-            items.append(i.SignalReceived(ref))
+            raise NotKnownError(f"what {service.name} writes is not known")
+        active = {scope.container for scope in state.scopes.values()}
+        begun = [(what, ref) for what, ref, start in self._begun if start.container not in active]
+        for trigger, ref in dict.fromkeys((*state.catchers, *begun)):
+            if self._reads_more or ref in self._bringing:
+                raise NotKnownError(f"what {trigger.value}s from outside bring is not known")
+            came = i.SignalReceived if trigger is Trigger.SIGNAL else i.MessageReceived
+            items.append(came(ref))
         for incident in state.incidents.values():
             if incident.id not in self._open_before:
                 continue
             if i.IncidentChoice.SKIP in incident.choices:
                 items.append(i.ResolveIncident(incident.id, i.IncidentChoice.SKIP))
-            elif self._can_retry(run, incident, now_us):
+            if self._can_retry(run, incident, now_us):
                 items.append(i.ResolveIncident(incident.id, i.IncidentChoice.RETRY))
         found = [(item, now_us) for item in items]
         due_us = run.next_due_us
@@ -302,7 +308,7 @@ class _Explorer:
 
     def _can_retry(self, run: MissionRun, incident: Incident, now_us: int) -> bool:
         """Whether the element of an incident succeeds with the data as it is now."""
-        tried = copy.deepcopy(run, dict(self._shared))
+        tried = copy.deepcopy(run)
         records: list[Record] = []
         retry = i.ResolveIncident(incident.id, i.IncidentChoice.RETRY)
         self._receive(tried, retry, now_us, records.extend)
@@ -320,14 +326,18 @@ class _Explorer:
                 return f"{label} {'succeeds' if done else 'is cancelled'}"
             case i.PromptAnswer(prompt, value):
                 return f"{self._label(state.prompts[prompt].token.node.id)} is answered {value}"
-            case i.SignalReceived(ref):
-                signal = state.mission.signals.get(ref)
-                return f"signal {signal.name if signal else ref} comes"
+            case i.SignalReceived(ref) | i.MessageReceived(ref):
+                signal = isinstance(item, i.SignalReceived)
+                root = (state.mission.signals if signal else state.mission.messages).get(ref)
+                return f"{'signal' if signal else 'message'} {root.name if root else ref} comes"
             case i.ResolveIncident(incident, choice):
                 how = "skipped" if choice is i.IncidentChoice.SKIP else "tried again"
                 return f"{self._label(state.incidents[incident].token.node.id)} is {how}"
             case _:
                 return "a timer ends"
+
+    def _key(self, run: MissionRun, now_us: int) -> tuple[Any, ...]:
+        return state_key(run.state, now_us, self._open_before)
 
     def _label(self, element: str) -> str:
         """Return what to call an element of the run; with its id where others are called so."""
@@ -351,11 +361,46 @@ class _Explorer:
                 return
             self._check_time()
             read(run.receive(i.Continue(), at_us).records)
-        raise _NotKnownError("a loop of the mission does not wait")
+        raise NotKnownError("a loop of the mission does not wait")
 
     def _check_time(self) -> None:
         if time.monotonic() > self._until:
-            raise _NotKnownError(f"more than {self._limits.seconds:g} s are needed")
+            raise NotKnownError(f"more than {self._limits.seconds:g} s are needed")
+
+
+def _roots(node: FlowNode) -> list[Signal | Message]:
+    """Return the signals and messages that an element throws or catches."""
+    of_events = [getattr(each, name, None) for each in definitions_of(node) for name in _KINDS]
+    return [each for each in (*of_events, getattr(node, "message", None)) if each is not None]
+
+
+_KINDS = ("signal", "message")
+
+
+def _bringing(mission: Mission) -> frozenset[str]:
+    """Return the ids of what brings data, or is for those receivers whose keys it matches."""
+    keyed = [ref for ref, each in mission.messages.items() if each.correlation_key is not None]
+    keyed += [ref for each in mission.correlation_properties for ref in each.retrieve]
+    return frozenset(keyed) | {
+        root.id
+        for node in mission.nodes
+        if isinstance(node, Activity | Event) and (node.data_flow.inputs or node.data_flow.outputs)
+        for root in _roots(node)
+    }
+
+
+def _later(run: MissionRun, following: MissionRun, now_us: int) -> set[int]:
+    """Return later times at which an input would come before the next timer, too, and the timers
+    that it begins are due after others that run already: those would be due first."""
+    old = [each for each in run.state.waits.values() if each.trigger is Trigger.TIMER]
+    new = [
+        each
+        for each in following.state.waits.values()
+        if each.trigger is Trigger.TIMER and each.id not in run.state.waits and not each.calendar
+    ]
+    due_us = run.next_due_us or 0
+    times = {now_us + o.due_us - n.due_us + 1 for o in old for n in new if not o.calendar}
+    return {each for each in times if now_us < each < due_us}
 
 
 def _where_it_stops(state: RunState, opened: Sequence[Incident]) -> str:
@@ -396,94 +441,3 @@ def leading_to(states: Iterable[int], following: Sequence[Sequence[int]]) -> set
                 reaches.add(earlier)
                 waiting.append(earlier)
     return reaches
-
-
-# --- states ---------------------------------------------------------------------------------------
-
-
-def _key(state: RunState, now_us: int) -> Key:
-    """Return what distinguishes states: everything but ids and the time of day."""
-    if state.status is RunStatus.ENDED:
-        return ("ended", state.outcome, state.detail)
-    roots = [scope for scope in state.scopes.values() if scope.parent is None]
-    return (
-        state.status,
-        tuple(_scope(state, scope, now_us) for scope in roots),
-        _encoded(state.shared.data),
-        _encoded({ref: [(m.data, m.keys) for m in kept] for ref, kept in _receivable(state)}),
-        tuple(state.taken),
-        tuple(sorted((b.name, b.element, b.phase) for b in state.behaviors.values())),
-    )
-
-
-def _receivable(state: RunState) -> Iterable[tuple[str, list[KeptMessage]]]:
-    """Return the kept messages that something can receive; others are for a later revision."""
-    received = received_messages(state.mission)
-    return [each for each in state.kept_messages.items() if each[0] in received]
-
-
-def _encoded(data: object) -> bytes:
-    return msgspec.json.encode(data, order="deterministic")
-
-
-def _scope(state: RunState, scope: Scope, now_us: int) -> Key:
-    if scope.compensations:
-        raise _NotKnownError("something is being compensated")
-    places = {token.id: place for place, token in enumerate(scope.tokens.values())}
-    loop = scope.loop
-    return (
-        scope.container.id,
-        _encoded(scope.data),
-        tuple(_token(state, token, now_us) for token in scope.tokens.values()),
-        tuple(
-            (node.id, flow.id, tuple(places[token.id] for token in tokens))
-            for node, join in scope.joins.items()
-            for flow, tokens in join.by_flow.items()
-        ),
-        _waits(state, scope.waits, now_us),
-        loop
-        and (
-            *(loop.total, loop.started, loop.completed, loop.terminated),
-            _encoded(sorted(loop.outputs.items())),  # JSON has no numbers as keys
-        ),
-        tuple((node.id, tuple(places[t.id] for t in ts)) for node, ts in scope.gathered.items()),
-        tuple((node.id, tuple(f.id for f in flows)) for node, flows in scope.activated.items()),
-        tuple(node.id for node in scope.chosen),
-        tuple(node.id for node in scope.begun),
-        (scope.completing, scope.interrupted, scope.cancelled, scope.reopened),
-        tuple((done.node.id, done.instance) for done in (scope.compensable or {}).values()),
-    )
-
-
-def _token(state: RunState, token: Token, now_us: int) -> Key:
-    behavior = state.behaviors.get(token.behavior)
-    return (
-        token.node.id,
-        token.flow.id if token.flow is not None else "",
-        token.instance,
-        _encoded(token.own),
-        (behavior.name, behavior.phase, behavior.resources) if behavior is not None else (),
-        bool(token.prompt),
-        bool(token.service),
-        state.incidents[token.incident].code if token.incident else "",
-        (token.armed, token.ended_early),
-        _waits(state, token.waits, now_us),
-        _scope(state, token.inner, now_us) if token.inner is not None else (),
-    )
-
-
-def _waits(state: RunState, waits: dict[int, Wait] | None, now_us: int) -> Key:
-    mission_time_us = state.mission_time_us(now_us)
-    return tuple(
-        (
-            wait.node.id,
-            wait.trigger,
-            wait.ref,
-            (wait.due_us - (now_us if wait.calendar else mission_time_us))
-            if wait.trigger is Trigger.TIMER
-            else 0,
-            wait.left,
-            state.conditions.get(wait.id, False),
-        )
-        for wait in (waits or {}).values()
-    )

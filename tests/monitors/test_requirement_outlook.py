@@ -288,8 +288,6 @@ def all_runs(play: Play, item: i.Revise) -> Iterator[list[tuple[i.Input, int]]]:
     ended = 0
     while waiting:
         run, inputs = waiting.pop()
-        now = run.state.mission
-        shared = {id(each): each for each in (now, *now.elements.values())}
         over = run.state.status is RunStatus.ENDED
         coming = [] if over else what_can_come(run, inputs[-1][1])
         if not coming:
@@ -298,7 +296,7 @@ def all_runs(play: Play, item: i.Revise) -> Iterator[list[tuple[i.Input, int]]]:
         if run.wants_continue or len(inputs) > MOST_INPUTS or ended > MOST_RUNS:
             raise TooManyError
         for each, at_us in coming:
-            following = copy.deepcopy(run, dict(shared))
+            following = copy.deepcopy(run)
             following.receive(each, at_us)
             waiting.append((following, [*inputs, (each, at_us)]))
 

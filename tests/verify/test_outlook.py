@@ -99,7 +99,15 @@ def test_loops_and_timers_have_few_states() -> None:
             '<scriptTask id="next">do goto need:requires=true</scriptTask>',
             "chooses its vehicles",
         ),
-        ('<receiveTask id="next" messageRef="M"/>', "what messages from outside bring"),
+        (
+            '<receiveTask id="next" messageRef="M"><loop>x == 1</loop></receiveTask>',
+            "what messages from outside bring",
+        ),
+        (
+            '<intermediateCatchEvent id="next">signal S</intermediateCatchEvent>'
+            ' <scriptTask id="later">y = x</scriptTask>',
+            "what signals from outside bring",
+        ),
     ],
 )
 def test_what_the_outside_brings_is_never_called_complete(task: str, why: str) -> None:
@@ -209,3 +217,149 @@ def test_states_that_differ_only_in_the_key_of_a_kept_message_are_two() -> None:
     fleet = replace(fleet_for(parsed), on_error=ErrorPolicy.INCIDENT)
     found = seen(Play(parsed, fleet=fleet).start().report("go", FAILED), "skip")
     assert found == Outlook(Verdict.UNKNOWN, "what messages from outside bring is not known")
+
+
+def test_a_message_that_brings_nothing_may_come() -> None:
+    play = stopped("""
+        <startEvent id="start"/> <scriptTask id="go">do goto uav1</scriptTask> <endEvent id="end"/>
+        <receiveTask id="next" messageRef="M"/>
+        start -> go -> next -> end
+    """)
+    assert seen(play, "skip") == Outlook(Verdict.COMPLETES)
+
+
+RACE = """
+    <startEvent id="start"/> <endEvent id="end"/> <endEvent id="off">terminate</endEvent>
+    <scriptTask id="go">do goto uav1</scriptTask> <userTask id="ask"/> <parallelGateway id="fork"/>
+    <scriptTask id="init">late = 0</scriptTask> <scriptTask id="then">early = late</scriptTask>
+    <intermediateCatchEvent id="five">timer PT5S</intermediateCatchEvent>
+    <intermediateCatchEvent id="other">timer {other}</intermediateCatchEvent>
+    <scriptTask id="late">late = 1</scriptTask> <exclusiveGateway id="gate"/>
+    start -> init -> go -> fork -> five -> late -> end
+    fork -> ask -> then -> other -> gate
+    gate -> off if early == late
+"""
+
+
+@pytest.mark.parametrize(
+    ("other", "verdict"),
+    [("PT4S", Verdict.MAY_NOT_COMPLETE), ("PT6S", Verdict.MAY_NOT_COMPLETE), ("PT0S", "")],
+)
+def test_an_answer_may_come_so_late_that_timers_are_due_in_the_other_order(
+    other: str, verdict: Verdict | str
+) -> None:
+    """That of 4 s is due behind that of 5 s where the answer comes after a second."""
+    found = seen(stopped(RACE.format(other=other)), "skip")
+    assert found.verdict is (verdict or Verdict.COMPLETES)
+
+
+UNDONE = """
+    <startEvent id="start"/> <endEvent id="end"/> <scriptTask id="go">do goto uav1</scriptTask>
+    <userTask id="ask">ask yes no</userTask>
+    <scriptTask id="init">x = 0; user.decision = ''</scriptTask>
+    <subProcess id="work"> <startEvent id="s"/> <exclusiveGateway id="which" default="other"/>
+      <task id="a"/> <task id="b"/> <scriptTask id="unA" isForCompensation="true">x = 1</scriptTask>
+      <scriptTask id="unB" isForCompensation="true">x = 2</scriptTask>
+      s -> which -> a if user.decision == 'yes'
+      other: which -> b
+      a undo unA
+      b undo unB
+    </subProcess>
+    <scriptTask id="forget">user.decision = ''</scriptTask>
+    <intermediateThrowEvent id="undo">compensate</intermediateThrowEvent>
+    <userTask id="wait"/> <exclusiveGateway id="gate"/>
+    start -> init -> go -> ask -> work -> forget -> wait -> undo -> gate
+    gate -> end if x == 1
+"""
+
+
+def test_states_that_differ_in_what_will_be_undone_are_two() -> None:
+    found = seen(stopped(UNDONE), "skip")
+    assert found == Outlook(Verdict.MAY_NOT_COMPLETE, "it stops at gate: NO_FLOW")
+
+
+def test_what_waits_while_something_is_undone_is_explored() -> None:
+    play = stopped("""
+        <startEvent id="start"/> <endEvent id="end"/> <scriptTask id="go">do goto uav1</scriptTask>
+        <task id="a"/> <userTask id="b" isForCompensation="true"/>
+        <intermediateThrowEvent id="undo">compensate</intermediateThrowEvent>
+        start -> a -> go -> undo -> end
+        a undo b
+    """)
+    assert seen(play, "skip") == Outlook(Verdict.COMPLETES)
+
+
+OTHERS = """
+    <signal id="S" name="S" m2pem:from="operator"/>
+    <process id="MAIN" isExecutable="true">
+      <startEvent id="start"/> <scriptTask id="go">do goto uav1</scriptTask> <userTask id="ask"/>
+      start -> go -> ask
+    </process>
+    <process id="OTHER"> <startEvent id="begin">signal S</startEvent>
+      <exclusiveGateway id="gate"/> <task id="never"/>
+      begin -> gate
+      gate -> never if 1 == 2
+    </process>
+"""
+
+
+def test_operators_may_begin_another_process_by_their_signal() -> None:
+    found = seen(stopped(OTHERS), "skip")
+    assert found == Outlook(Verdict.MAY_NOT_COMPLETE, "it stops at gate: NO_FLOW")
+    thrown = OTHERS.replace(' m2pem:from="operator"', "")
+    assert seen(stopped(thrown), "skip") == Outlook(Verdict.COMPLETES)
+
+
+def test_an_incident_that_was_open_before_may_be_tried_again_as_well_as_skipped() -> None:
+    play = stopped("""
+        <startEvent id="start"/> <endEvent id="end"/>
+        <parallelGateway id="fork"/> <exclusiveGateway id="gate"/>
+        <scriptTask id="go">do goto uav1</scriptTask>
+        <scriptTask id="spare">do goto uav2</scriptTask>
+        <boundaryEvent id="seen" attachedToRef="spare" cancelActivity="false">signal S
+          </boundaryEvent>
+        <scriptTask id="init">x = 0</scriptTask> <scriptTask id="one">x = 1</scriptTask>
+        <intermediateThrowEvent id="tell">signal S</intermediateThrowEvent>
+        <boundaryEvent id="failed" attachedToRef="spare">error BLOCKED</boundaryEvent>
+        start -> init -> fork -> go
+        fork -> spare -> gate
+        failed -> one -> gate
+        gate -> end if x == 1
+    """).report("spare", FAILED, "OTHER")
+    assert seen(play, "skip", incident="go").verdict is Verdict.MAY_NOT_COMPLETE
+
+
+def test_a_way_to_go_round_beside_an_incident_that_operators_must_decide_about() -> None:
+    """It is not known whether the mission completes: operators may move the token of the other."""
+    play = stopped(
+        TWO_STOPS.replace(
+            "start -> fork",
+            '<subProcess id="watch" triggeredByEvent="true">'
+            '<startEvent id="seen" isInterrupting="false">signal S</startEvent></subProcess>\n'
+            "start -> fork",
+        ),
+        {"z": 0},
+    )
+    others = Outlook(Verdict.UNKNOWN, "operators must decide about gate, too: NO_FLOW")
+    assert seen(play, "skip", incident="go") == others
+
+
+def test_processes_that_call_themselves_for_long_are_not_known() -> None:
+    play = stopped(
+        """
+        <process id="MAIN" isExecutable="true">
+          <startEvent id="start"/> <scriptTask id="go">do goto uav1</scriptTask>
+          <callActivity id="call" calledElement="DEEP">in n as n</callActivity>
+          start -> go -> call
+        </process>
+        <process id="DEEP"> <startEvent id="s"/> <exclusiveGateway id="more" default="no"/>
+          <scriptTask id="count">n = n + 1</scriptTask> <userTask id="ask"/>
+          <callActivity id="again" calledElement="DEEP">in n as n</callActivity>
+          s -> count -> more -> again if n < 400
+          no: more -> ask
+        </process>
+    """,
+        {"n": 0},
+    )
+    found = seen(play, "skip")
+    assert found == Outlook(Verdict.UNKNOWN, "its subprocesses are too deep in each other")
