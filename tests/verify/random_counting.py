@@ -72,7 +72,7 @@ class Draft:
     def in_turn(self, depth: int) -> list[str]:
         kind = self.dice.choice(("sendTask", "receiveTask"))
         count = self.dice.choice((*TIMES, 20))
-        parallel = kind == "sendTask" and count < 4 and self.dice.random() < 0.4
+        parallel = count < 4 and self.dice.random() < 0.4
         turn = "false" if parallel else "true"
         return [
             f'<{kind} id="{self.name()}" messageRef="{self.message()[8:]}">'
