@@ -209,7 +209,7 @@ class _Explorer:
                 found.why_incomplete = (
                     f"operators must decide about {left[0].token.node.label}, too: {left[0].code}"
                 )
-            elif not steps:
+            if not steps and (opened or not left):
                 found.final.add(number)
                 bad[number] = _where_it_stops(run.state, opened)
             for item, at_us in steps:  # grows

@@ -173,6 +173,12 @@ def test_another_incident_at_a_gateway_is_for_operators_to_decide() -> None:
     assert seen(play, "end", incident="go").verdict is Verdict.CANNOT_COMPLETE
 
 
+def test_a_retry_that_fails_again_is_said_beside_another_incident() -> None:
+    again = TWO_STOPS.replace("do goto uav1", "throw error X")
+    play = Play(mission(again), fleet=stopped(TWO_STOPS, {"z": 0}).fleet).start({"z": 0})
+    assert seen(play, "retry") == Outlook(Verdict.MAY_NOT_COMPLETE, "it stops at go: X")
+
+
 def test_a_gateway_is_tried_again_where_its_data_has_become_right() -> None:
     play = stopped(TWO_STOPS, {"z": 0}).resolve("set_data", "gate", data={"z": 1})
     assert seen(play, "skip", incident="go") == Outlook(Verdict.COMPLETES)
