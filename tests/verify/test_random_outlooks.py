@@ -10,7 +10,7 @@ from m2pem.verify.outlook import Verdict
 from tests.seeds import named
 from tests.verify.outlook_plays import BAD, GOOD, Case
 
-FEW = 120
+FEW = 100
 MANY = 5_000
 
 
