@@ -17,6 +17,7 @@ from m2pem.errors import MissionError
 from m2pem.fleet.fleet import Fleet
 from m2pem.mission.catalogue import BehaviorState
 from m2pem.mission.elements import ErrorPolicy
+from m2pem.mission.values import Value
 from m2pem.verify.outlook import Outlook, OutlookLimits, outlook
 from tests.engine.invariants import check_state
 from tests.engine.kit import Play
@@ -78,7 +79,8 @@ class Case:
         dice, state = self._dice, self.run.state
         incident = dice.choice(list(state.incidents.values()))
         choice = dice.choice([each for each in incident.choices if each != "retry_with"])
-        to, data = "", {}
+        to = ""
+        data: dict[str, Value] = {}
         if choice is i.IncidentChoice.MOVE:
             targets = list(move_targets(incident.token))
             if not targets:
@@ -208,10 +210,11 @@ class Playing:
         elif dice is not None and (due_us or 0) > self.now_us + 1 and dice.random() < 0.3:
             self.now_us = dice.randrange(self.now_us, due_us or 0)
         opened = set(self.run.state.incidents)
-        at = isinstance(item, i.ResolveIncident) and self.run.state.incidents[item.incident].token
+        resolved = item.incident if isinstance(item, i.ResolveIncident) else ""
+        at = self.run.state.incidents[resolved].token if resolved else None
         self.give(item)
         news = [each for each in self.run.state.incidents.values() if each.id not in opened]
-        self.undecided = bool(at) and any(each.token.node is at.node for each in news)
+        self.undecided = at is not None and any(each.token.node is at.node for each in news)
 
     def ends(self, dice: Random) -> Iterator[str]:
         """Yield how it ends: all ways where there are few, else some."""
