@@ -56,9 +56,10 @@ _START_US = 1_767_225_600 * _SECOND_US  # 2026-01-01, as of rehearsals
 _MOST_TIMERS = 1_000
 """Most other timers that may fire before the timer of a step."""
 _BY = "counterexample"
-_BATCH = 1_000
-_MOST_BATCHES = 5
-"""Batches of steps after which a run counts as one that never waits."""
+_BATCH = 250
+_MOST_BATCHES = 20
+_MOST_TOKENS = 200
+"""Batches of steps, and tokens then, after which a run counts as one that never waits."""
 
 
 class NotPlayableError(Exception):
@@ -380,7 +381,7 @@ class ConformanceRun:
         before = len(self.steps)
         self.steps.append(step)
         for _ in range(_MOST_BATCHES):
-            if not self.run.wants_continue:
+            if not self.run.wants_continue or len(self.run.state.tokens) > _MOST_TOKENS:
                 break
             self.steps.append(self.run.receive(i.Continue(), self._now_us))
         if not isinstance(item, i.BehaviorReported) or item.state is not BehaviorState.CANCELLED:

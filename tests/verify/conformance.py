@@ -21,6 +21,8 @@ from tests.verify.trace_mapping import Follower
 START_US = 1_767_225_600_000_000
 """When a run is played: 2026-01-01T00:00:00Z, in microseconds since the Unix epoch."""
 _MOST_CONTINUES = 100
+_MOST_TOKENS = 200
+"""With more, a run that does not wait is one that never will."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +51,7 @@ def play(
     data: Mapping[str, Value] | None = None,
 ) -> Played:
     """Play the transitions of a run, one after the other, to a new run of the engine."""
-    engine = MissionRun(mission, fleet, "r1")
+    engine = MissionRun(mission, fleet, "r1", 200)
     follower = Follower(net)
     inputs: list[tuple[int, i.Input]] = []
     steps: list[Step] = []
@@ -59,7 +61,7 @@ def play(
         inputs.append((now_us, item))
         steps.append(engine.receive(item, now_us))
         for _ in range(_MOST_CONTINUES):
-            if not engine.wants_continue:
+            if not engine.wants_continue or len(engine.state.tokens) > _MOST_TOKENS:
                 break
             steps.append(engine.receive(i.Continue(), now_us))
         return follower.step(engine.state)

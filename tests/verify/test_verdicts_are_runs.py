@@ -36,6 +36,7 @@ LIMITS = Limits(states=2_000, seconds=10.0, tokens=3)
 LONG_S = 900.0
 FEW = 120
 MOST_INPUTS = 40
+MOST_TOKENS = 200
 PLAYS = 2
 STUCK = frozenset({"no-deadlock", "can-complete", "completes-if-fair", "no-livelock"})
 LEFT_OPEN = frozenset(
@@ -63,7 +64,8 @@ class Engine:
         for record in step.records:
             if isinstance(record, r.FlowTaken):
                 self.reached |= {record.flow, self.source[record.flow]}
-        if self.run.wants_continue and self.steps < MOST_INPUTS:
+        few = len(self.run.state.tokens) < MOST_TOKENS
+        if self.run.wants_continue and self.steps < MOST_INPUTS and few:
             self.give(i.Continue(), self.now_us)
 
     @property
