@@ -30,6 +30,7 @@ from m2pem.mission.expression import Expression, parse
 from m2pem.mission.expression.temporal import NOW
 from m2pem.mission.loops import INSTANCE_COUNTS, LOOP_COUNTER, MultiInstance, StandardLoop
 from m2pem.mission.mission import Mission
+from m2pem.mission.remaining import GEOMETRIES, split_name
 from m2pem.suggestions import suggest_or
 
 
@@ -139,6 +140,19 @@ def _findings(mission: Mission, process: Process, store: _Store) -> Iterator[Fin
             )
 
 
+def remaining_names(nodes: Iterable[FlowNode]) -> frozenset[str]:
+    """Return the names that elements read of what is left of tasks."""
+    found: set[str] = set()
+    for node in nodes:
+        conditions = _conditions(node) if isinstance(node, Event) else ()
+        inputs = node.mappings.inputs if isinstance(node, CallActivity) else ()
+        for each in (*_reads(node), *conditions):
+            found |= each.expression.names
+        for mapping in (*_data_mappings(node), *inputs):
+            found |= mapping.source.names
+    return frozenset(filter(split_name, found))
+
+
 def _data_mappings(node: FlowNode) -> tuple[DataMapping, ...]:
     if isinstance(node, Activity | Event):
         return (*node.data_flow.inputs, *node.data_flow.outputs)
@@ -236,6 +250,8 @@ def written_by(node: FlowNode) -> set[str]:
     behavior = getattr(node, "behavior", None)
     if isinstance(behavior, Behavior):
         written.update(role.need.store for role in behavior.roles if role.need is not None)
+        if any(parameter.name in GEOMETRIES for parameter in behavior.parameters):
+            written.add(f"{node.local_id}.remaining")
     return written - {""}
 
 

@@ -20,6 +20,7 @@ from lxml import etree
 
 from m2pem.bpmn.activities import read_global_task
 from m2pem.bpmn.context import PendingCall, ReadingContext
+from m2pem.bpmn.data_names import remaining_names
 from m2pem.bpmn.definitions import read_roots
 from m2pem.bpmn.file_findings import FileFindings
 from m2pem.bpmn.rules.activities import AMBIGUOUS_CALL, NO_CALLED_ELEMENT
@@ -412,6 +413,7 @@ def merge(files: Files, reached: set[Process]) -> Mission:
         warnings=tuple(each for part in files.parts for each in part.context.findings.sorted()),
         elements=_elements(nodes, flows, processes),
         associated=frozenset().union(*(context.written_keys for context in contexts)),
+        remaining_names=remaining_names(nodes),
         data_stores=frozenset(
             context.data_key(store) for context in contexts for store in context.data_stores
         ),

@@ -9,6 +9,7 @@ from m2pem.engine import records as r
 from m2pem.engine.execution import Execution
 from m2pem.engine.keeping import end_keepings_of
 from m2pem.engine.records import RunOutcome, TokenOutcome
+from m2pem.engine.remaining import note_remaining
 from m2pem.engine.state import Scope, Token
 from m2pem.mission.elements import Activity, BoundaryEvent, Container, StartEvent, SubProcess
 from m2pem.mission.events import CompensateEventDefinition
@@ -43,6 +44,7 @@ def stop_activity(
     """End the work of the activity that a token is on: its behavior, the request for its resources,
     its prompt, service or scope."""
     if token.behavior:
+        note_remaining(x, token, x.state.behaviors[token.behavior])
         x.emit(r.BehaviorCancelRequested(token.behavior))
     if token.allocation:
         x.emit(r.AllocationEnded(token.allocation))

@@ -6,6 +6,7 @@ its records: nothing here changes a run that is under way.
 """
 
 import asyncio
+import json
 import logging
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -213,6 +214,10 @@ def own_geometries(
         if name in used or latest is None or latest.geometry != geometry:
             with suppress(GeometryError):  # one of an older release, which this one does not read
                 used[name] = parse_geojson(geometry)
+    for scope in state.scopes.values():
+        for name in state.mission.remaining_names & scope.data.keys():
+            with suppress(GeometryError, ValueError, TypeError):  # the name of one, or nothing left
+                used[name] = parse_geojson(json.loads(scope.data[name]))  # type: ignore[arg-type]
     return {
         name: geometry
         for name, geometry in used.items()

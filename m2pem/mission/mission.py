@@ -73,6 +73,8 @@ class Mission:
     """Processes, flow nodes and sequence flows by id."""
     associated: frozenset[str] = frozenset()
     """Keys that data output associations name as written; without an effect on execution."""
+    remaining_names: frozenset[str] = frozenset()
+    """Names that are read of what is left of tasks (`m2pem.mission.remaining`)."""
     data_stores: frozenset[str] = frozenset()
     """Keys of the data stores, which all processes of a run share (clause 10.4.1)."""
     correlation_properties: tuple[CorrelationProperty, ...] = ()

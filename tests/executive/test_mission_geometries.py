@@ -6,8 +6,8 @@ from dataclasses import replace
 import pytest
 
 from m2pem.api import BehaviorState, shown_geometries
-from m2pem.mission.geometry import Point
-from tests.executive.conftest import World, behavior, fleet, mission, question, sequence
+from m2pem.mission.geometry import Point, Route
+from tests.executive.conftest import World, behavior, fleet, flow, mission, question, sequence
 
 GATE = '{"type": "Point", "coordinates": [7.002, 50]}'
 OWN = f'<extensionElements><m2pem:geometry name="gate">{GATE}</m2pem:geometry></extensionElements>'
@@ -105,3 +105,41 @@ def test_what_a_run_has_alone_is_shown_with_its_id_until_it_ends(play):
         "one, which keeps what was deleted": {"gate": 7.001, "r2/gate": 7.005},
         "none": {"gate": 7.001},
     }
+
+
+def test_what_is_left_of_a_task_that_another_one_names_is_shown(play):
+    left = {"type": "LineString", "coordinates": [[7.001, 50], [7.002, 50]]}
+    lane = '<m2pem:property name="route" value="{}"/>'
+    fly = behavior("Fly", "single_vehicle_routing", "ugv1", parameters=lane.format("lane"))
+    rest = lane.format("${Fly.remaining}")
+    tasks = sequence(
+        ("Fly", fly),
+        ("Rest", behavior("Rest", "single_vehicle_routing", "ugv1", parameters=rest)),
+    )
+    caught = (
+        '<boundaryEvent id="B" attachedToRef="Fly"><errorEventDefinition/></boundaryEvent>'
+        f"{question('Ask')}{flow('B', 'Ask')}{flow('Ask', 'Rest')}"
+    )
+    source = mission(tasks.replace("</process>", f"{caught}</process>"))
+    line = Route(((50.0, 7.0, None), (50.0, 7.002, None)))
+
+    async def story(world: World):
+        control = world.executive.control
+        run = await control.start(source)
+        await world.fake.until_called("start", f"{run}.b1")
+        world.fake.report(f"{run}.b1", BehaviorState.RUNNING, remaining={"route": left})
+        world.fake.report(f"{run}.b1", BehaviorState.FAILED)
+        runner = world.executive.runner(run)
+        async with asyncio.timeout(10):
+            while not runner.run.state.prompts:  # noqa: ASYNC110
+                await asyncio.sleep(0)
+        shown = shown_geometries(control)
+        await control.answer(run, "p1", "yes", by="anna")
+        await world.fake.until_called("start", f"{run}.b2")
+        await control.stop(run)
+        await control.wait(run)
+        return shown[f"{run}/Fly.remaining"], world.fake.requests[f"{run}.b2"].parameters["route"]
+
+    shown, given_ = play(story, fleet=replace(fleet("ugv1"), geometries={"lane": line}))
+    assert shown == given_
+    assert [place[:2] for place in shown.waypoints] == [(50.0, 7.001), (50.0, 7.002)]

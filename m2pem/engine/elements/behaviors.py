@@ -27,6 +27,7 @@ from m2pem.engine.elements.losses import end_work, what_is_done
 from m2pem.engine.execution import Execution
 from m2pem.engine.keeping import end_keeping
 from m2pem.engine.records import RequestOutcome, RunOutcome, Trigger
+from m2pem.engine.remaining import is_nothing_left, note_remaining
 from m2pem.engine.scopes import end_run
 from m2pem.engine.state import Behavior, BehaviorPhase, RunState, Token
 from m2pem.engine.throwing import catcher_of_error, throw_error
@@ -56,6 +57,9 @@ def request_behavior(x: Execution, token: Token, behavior: BehaviorOfTask) -> No
     """
     parameters = _evaluate(x, token, behavior)
     if parameters is None:
+        return
+    if is_nothing_left(behavior, parameters):
+        complete(x, token)
         return
     if token.lost_work is not None:  # an operator has it start again, with what was left
         parameters |= token.lost_work.remaining
@@ -224,6 +228,7 @@ def _ended(
     )
     if token is None:
         return
+    note_remaining(x, token, behavior, succeeded=state is BehaviorState.SUCCEEDED)
     x.write_all(token, outputs or {})  # also those of a failed behavior, such as pictures
     if state is BehaviorState.SUCCEEDED:
         complete(x, token)
@@ -281,6 +286,7 @@ def recovery_answered(x: Execution, behavior: Behavior, answer: i.PromptAnswer) 
             x.emit(r.BehaviorRestarted(behavior.id, x.state.epoch, answer.by))
     elif answer.decision == "skip":
         token = x.state.tokens[behavior.token]
+        note_remaining(x, token, behavior)
         x.emit(r.BehaviorCancelRequested(behavior.id, "", f"skipped by {answer.by}"))
         complete(x, token)
     else:
@@ -324,6 +330,7 @@ def fail_behavior(x: Execution, behavior: Behavior, code: str, reason: str, reso
     token = x.state.tokens[behavior.token]
     if token.prompt:
         x.emit(r.PromptWithdrawn(token.prompt))
+    note_remaining(x, token, behavior)
     x.emit(r.BehaviorCancelRequested(behavior.id, code, reason))
     end_work(x, token, behavior, code, reason, (resource,))
 
