@@ -77,6 +77,7 @@ class TeamBehavior:
         self._ending: tuple[BehaviorState, str, str] | None = None
         self._ending_due_us = 0
         self._led_around: dict[ResourceId, str] = {}
+        self._withdrawn: set[str] = set()
         self._stayed_s = 0.0
         self._stirred_us = clock.now_us()
         self._over = False
@@ -258,6 +259,7 @@ class TeamBehavior:
             for name in self._controller.drop(member.id):
                 _log.warning("%s: %s goes around %s", self.id, name, member.id)
                 self._led_around[name] = member.id
+                self._withdrawn.add(self.members[name].part.removeprefix(f"{self.id}."))
                 self._shares.withdraw(name)
                 self.members[name].cancel(self.epoch)
         elif self._on_the_way(member):
@@ -332,7 +334,7 @@ class TeamBehavior:
         for member in self.members.values():
             if member.part and member.state is not None:
                 begun[member.part.removeprefix(f"{self.id}.")] = member.native_ref
-        return begun
+        return {part: ref for part, ref in begun.items() if part not in self._withdrawn}
 
     def _unnoted(self) -> bool:
         return self._parts() != self._reference.begun

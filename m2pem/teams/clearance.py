@@ -255,8 +255,8 @@ def _nears(a: Polyline, b: Polyline, apart_m: float, most_m: float) -> Iterator[
         west, south, east, north = _box(own, 0.0)
         for second, box in enumerate(boxes):
             if box[0] < east and box[2] > west and box[1] < north and box[3] > south:
-                between = sorted((first, second))
-                missed_m = max(_missed_m(line, *between, apart_m) for line in (a, b))
+                low, high = min(first, second), max(first, second)
+                missed_m = max(_missed_m(line, low, high, apart_m) for line in (a, b))
                 least_m = min(apart_m + missed_m, most_m)
                 if first_within_m(own, b.segments[second], least_m) < math.inf:
                     yield _Near(first, second, least_m)

@@ -140,6 +140,7 @@ class Partition:
         share = self._shares.get(rest.partition("/")[0] or doer)
         if share is not None:
             share.by, share.part, share.done = ResourceId(doer), part, done
+            share.begins = sum(map(int, filter(str.isdigit, rest.split("/"))))
         return ResourceId(doer)
 
     def restore(self, kept: Reference) -> None:

@@ -124,7 +124,8 @@ async def look_for_parts(
     A part that the journal does not know may have begun just before the crash; if its arbiter does
     not know it either, it has not.
     """
-    planned = dict.fromkeys(leg.member for leg in plan.legs if leg.member not in kept.lost)
+    known = {*kept.lost, *map(_doer, kept.begun)}
+    planned = dict.fromkeys(leg.member for leg in plan.legs if leg.member not in known)
     given = [f"{each.member}/{key}" for key, each in kept.transfers.items()]
     parts = dict.fromkeys([*kept.begun, *planned, *given])
     asked = [part for part in parts if _doer(part) not in kept.lost and part not in kept.done]

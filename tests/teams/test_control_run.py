@@ -203,7 +203,7 @@ def test_a_team_may_go_on_without_a_lost_member_and_closes_its_gap(
     (status, ended), gap = play(story, yard, geometries=ROAD, policy=GO_ON, watch_links=watch_links)
     assert (status, ended.state) == (RunStatus.COMPLETED, BehaviorState.SUCCEEDED)
     assert ended.reason.startswith(f"without {victim} (LINK_LOST")
-    assert 10 < gap < 30, "one spacing, not two"
+    assert 10 < gap < 36, "one spacing, not two; those that went around may lag a little"
     assert math.dist(yard["c"].place, (410, 0)) < 0.5
 
 
