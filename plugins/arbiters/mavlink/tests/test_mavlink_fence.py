@@ -1,3 +1,5 @@
+import math
+
 import pytest
 import shapely
 from mavlink_double import Body, at
@@ -53,6 +55,21 @@ def test_what_would_leave_the_fence_is_rejected_before_anything_is_sent(
         assert bench.told == []
 
     play(Body(east=10.0, north=50.0).fly(), main, fence=FIELD)
+
+
+def test_a_circle_is_checked_between_the_corners_of_its_polygon() -> None:
+    """Of 16 sides, which keep within 29.5 m of the centre to the south; the circle does not."""
+
+    async def main(bench) -> None:
+        end = await bench.do("orbit", target=Point((*at(50, 29.7), None)), radius=30.0)
+        assert end.state is BehaviorState.REJECTED
+        assert "a point of the circle" in end.reason
+        assert bench.told == []
+
+    angle = math.pi / 2 + math.tau / 32
+    start = (50 + 35 * math.cos(angle), 29.7 + 35 * math.sin(angle))
+    hole_free = Area(FIELD.rings[:1])
+    play(Body(east=start[0], north=start[1]).fly(), main, fence=hole_free)
 
 
 def test_a_reverse_out_of_the_fence_is_rejected() -> None:

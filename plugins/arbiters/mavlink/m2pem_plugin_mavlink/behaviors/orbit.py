@@ -104,7 +104,13 @@ class Orbit(MissionFlight):
     def refusal(self) -> str:
         if self._turns == 0 or self._seconds == 0:
             return takeoff_required(self.vehicle)
-        return super().refusal()
+        reason, fence = super().refusal(), self.context.fence
+        if reason or fence is None or (self._turns or 1.0) < 1.0:
+            return reason
+        # The autopilot's own circle passes outside of the polygon's edges.
+        frame, angles = LocalFrame(self.center.latlon), (math.radians(each) for each in range(361))
+        circle = [(self._radius_m * math.cos(a), self._radius_m * math.sin(a)) for a in angles]
+        return fence.breach([frame.to_latlon(level) for level in circle], None, self.named)
 
     async def begin(self) -> None:
         """Start by the autopilot's command, else by a mission."""
