@@ -188,9 +188,8 @@ class Fence:
 
     def _worst(self, way: Sequence[EastNorth]) -> str:
         """Of the parts of a way that lie outside, how far the farthest point is out, and where."""
-        parts = (
-            _lines(self._shapely.LineString(way).intersection(self._deep)) if len(way) > 1 else ()
-        )
+        line = self._shapely.LineString(way) if len(way) > 1 else self._shapely.Point(way[0])
+        parts = _lines(line.intersection(self._deep))
         legs = (self._deepest(*leg) for part in parts for leg in pairwise(part.coords))
         place, by_m = max(legs, key=lambda deepest: deepest[1], default=((0.0, 0.0), 0.0))
         return f"by {_by(by_m)} at {_text(self.frame.to_latlon(place))}" if by_m > 0 else ""
@@ -279,19 +278,11 @@ def rings_of(area: "BaseGeometry") -> list[list[EastNorth]]:
 
 def polygons(geometry: "BaseGeometry") -> list[Any]:
     """Return the polygons that a geometry is made of."""
-    return [
-        part
-        for part in getattr(geometry, "geoms", [geometry])
-        if part.geom_type == "Polygon" and not part.is_empty
-    ]
+    return [part for part in getattr(geometry, "geoms", [geometry]) if part.area > 0]
 
 
 def _lines(geometry: "BaseGeometry") -> list[Any]:
-    return [
-        part
-        for part in getattr(geometry, "geoms", [geometry])
-        if part.geom_type == "LineString" and part.length > 0
-    ]
+    return [part for part in getattr(geometry, "geoms", [geometry]) if part.length > 0]
 
 
 def _eroded(geometry: "BaseGeometry", by_m: float) -> Iterator["BaseGeometry"]:
@@ -308,9 +299,7 @@ def _corners(kept_out: "BaseGeometry") -> list[EastNorth]:
     for part in map(orient, polygons(kept_out)):  # what is kept out is to the left
         for ring in (part.exterior, *part.interiors):
             coords = ring.coords[:-1]
-            for a, b, c in zip(
-                (coords[-1], *coords), coords, (*coords[1:], coords[0]), strict=False
-            ):
+            for a, b, c in zip(coords[-1:] + coords, coords, coords[1:] + coords[:1], strict=False):
                 turn = (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0])
                 if turn > 0 and max(map(abs, b)) < _FAR_M / 2:
                     corners.append(b)

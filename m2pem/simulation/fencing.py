@@ -114,6 +114,8 @@ class _Fenced:
             findings = TaskFindings(self._mission.file_of(task), task)
             for name in self._who(behavior):
                 self._check(task, behavior, values, name, findings)
+                if behavior.type is BehaviorType.TEAM and findings.found:
+                    break  # of the others is the same
             yield from findings.found
 
     def _check(
