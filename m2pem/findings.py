@@ -29,7 +29,8 @@ class Finding:
     `rule` is a short stable kebab-case name ("dangling-reference"), which docs and tests use;
     `number` is that of the rule in docs/rules.md ("B15301"), if it is one of mission files.
     `line` counts from 1; 0 means that no line applies. `element` is an id of the mission, or a
-    path into a fleet file ("vehicles.evsg1.arbiter"), or "".
+    path into a fleet file ("vehicles.evsg1.arbiter"), or "". `place`: latitude and longitude of
+    what is wrong, in degrees (WGS-84), where it has a place.
     """
 
     severity: Severity
@@ -40,6 +41,7 @@ class Finding:
     message: str
     remedy: str = ""
     number: str = ""
+    place: tuple[float, float] | None = None
 
     def __str__(self) -> str:
         file = escaped(self.file)

@@ -23,11 +23,12 @@ class TaskFindings:
         line: int,
         role: str = "",
         severity: Severity = Severity.ERROR,
+        place: tuple[float, float] | None = None,
     ) -> Finding:
         """Note a finding at `line` of the mission, once, and return it."""
         where = f"{self.task.id} (line {self.task.line})" + (f", role '{role}'" if role else "")
         finding = Finding(
-            severity, self.file, line, self.task.id, rule, f"{where}: {message}", remedy
+            severity, self.file, line, self.task.id, rule, f"{where}: {message}", remedy, "", place
         )
         if finding not in self.found:
             self.found.append(finding)

@@ -121,6 +121,7 @@ def test_findings_as_json(invoke: Invoke, doubtful: Path) -> None:
         "element",
         "rule",
         "message",
+        "place",
         "remedy",
         "number",
     }

@@ -32,9 +32,8 @@ def misread(
     if "\n" in formula.strip():
         column += f" of line {before.count(chr(10)) + 1} of the formula"
     said = f"{message} at {column}"
-    return Misread(
-        Severity.ERROR, file, line, element, "requirement", said, "", "", formula, position
-    )
+    where = (Severity.ERROR, file, line, element, "requirement", said)
+    return Misread(*where, formula=formula, position=position)
 
 
 def pointed_at(text: str, position: int) -> str:

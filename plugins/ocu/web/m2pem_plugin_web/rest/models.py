@@ -108,7 +108,8 @@ class PromptModel(BaseModel):
 
 
 class FindingModel(Answer):
-    """What is wrong, or doubtful: where, and what would be right. `line` 0: none applies."""
+    """What is wrong, or doubtful: where, and what would be right. `line` 0: none applies.
+    `place`: its latitude and longitude in degrees, if it has one."""
 
     severity: Severity
     rule: str
@@ -118,6 +119,7 @@ class FindingModel(Answer):
     element: str
     message: str
     remedy: str
+    place: tuple[float, float] | None = None
 
 
 async def find_run(control: MissionControl, run: str) -> RunSummary:

@@ -35,6 +35,8 @@ export interface Finding {
   element: string;
   message: string;
   remedy: string;
+  /** Latitude and longitude in degrees, of what has a place. */
+  place?: [number, number] | null;
 }
 
 export interface Parameter {

@@ -89,7 +89,12 @@ export default function MapPanel({ editor }: { editor: EditorContext }) {
       const geometry = command && plan.find(command.geometry);
       if (geometry) made.look(geometry);
     };
+    const mark = () => {
+      const chosen = editor.selected.value.map(({ id }) => id);
+      made.mark(editor.checks.findings.value.filter(({ element }) => chosen.includes(element)));
+    };
     const stops = [
+      ...[editor.selected, editor.checks.findings].map((each) => each.subscribe(mark)),
       ...[plan.commands, plan.selected, plan.draft, catalogue.geometries].map((each) =>
         each.subscribe(show),
       ),

@@ -16,7 +16,7 @@ import { markCrowded } from "../../map/labels";
 import { distance_m, legs_m, middleOf, writtenLength } from "../../map/measure";
 import { snapped } from "../../map/snap";
 import { VehicleLayer } from "../../operate/map/vehicleLayer";
-import type { Fleet, Geometry } from "../../shared/types";
+import type { Finding, Fleet, Geometry } from "../../shared/types";
 import { strings } from "../../strings";
 import { colourOf } from "./colours";
 import type { MapCommand } from "./commands";
@@ -67,6 +67,7 @@ export class PlanMap {
   private readonly badges = L.layerGroup();
   private readonly handles = L.layerGroup();
   private readonly preview = L.featureGroup();
+  private readonly found = L.featureGroup();
   private readonly band: L.Polyline;
   private readonly observer: ResizeObserver;
   private draft: Draft | null = null;
@@ -85,7 +86,7 @@ export class PlanMap {
   ) {
     this.map = baseMap(host, fleet, tiles);
     this.map.doubleClickZoom.disable(); // two clicks end a drawing
-    for (const layer of [this.geometries, this.preview, this.badges, this.handles]) {
+    for (const layer of [this.geometries, this.preview, this.badges, this.handles, this.found]) {
       layer.addTo(this.map);
     }
     this.vehicles = new VehicleLayer(this.map, fleet);
@@ -176,6 +177,17 @@ export class PlanMap {
       }).addTo(this.preview);
     }
     if (features.length > 0) this.fitTo(this.preview.getBounds());
+  }
+
+  /** Marks where something is wrong, and brings that into view. */
+  mark(findings: readonly Finding[]): void {
+    this.found.clearLayers();
+    for (const { place, message } of findings) {
+      const style = { className: "plan-finding", color: "#c62828", radius: 9, weight: 3 };
+      if (place) L.circleMarker(place, style).bindTooltip(message).addTo(this.found);
+    }
+    const bounds = this.found.getBounds();
+    if (bounds.isValid() && !this.isSeen(bounds)) this.fitTo(bounds);
   }
 
   fit(): void {
