@@ -184,7 +184,9 @@ if TYPE_CHECKING:
     from m2pem.findings import Severity as Severity
     from m2pem.fleet.approval import file_digest as file_digest
     from m2pem.fleet.approval import person_of as person_of
+    from m2pem.fleet.behaviors import FLOWN as FLOWN
     from m2pem.fleet.behaviors import SHARED as SHARED
+    from m2pem.fleet.behaviors import takeoff_first as takeoff_first
     from m2pem.fleet.endurance import lasts_s as lasts_s
     from m2pem.fleet.fleet import Fleet as Fleet
     from m2pem.geo.cameras import KNOWN_CAMERAS as KNOWN_CAMERAS
@@ -337,7 +339,7 @@ _MODULES = {
     "m2pem.mission.mission": "Mission",
     "m2pem.mission.geometry": "Area Point Route VehiclePosition",
     "m2pem.mission.values": "Value",
-    "m2pem.fleet.behaviors": "SHARED",
+    "m2pem.fleet.behaviors": "FLOWN SHARED takeoff_first",
     "m2pem.geo.cameras": "ImagePlan KNOWN_CAMERAS SurveyCamera image_plan",
     "m2pem.geo.fence": "Fence",
     "m2pem.api.fence_check": "BEHIND_RAD FenceCheck OFFSET_M known_yaw_rad stance_on",

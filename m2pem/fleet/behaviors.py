@@ -26,6 +26,11 @@ ADJUSTABLE = frozenset({"single_vehicle_routing", "goto", "area_survey", "revers
 """Behaviors of a vehicle whose speed can be changed on the way, if its arbiter adjusts: they are
 over at a place, not after a time."""
 
+FLOWN = frozenset(
+    {"single_vehicle_routing", "goto", "change_altitude", "area_survey", "orbit", "follow"}
+) | {"area_observe"}
+"""Behaviors of a vehicle that an aircraft on the ground refuses: only `takeoff` takes it off."""
+
 _SLOWEST_M_S = 0.01
 _SHORTEST_M = 0.1
 _RIGHT_ANGLE = math.pi / 2
@@ -77,6 +82,11 @@ def _behavior(
     if takes_altitude(parameters):
         parameters = (*parameters, ALTITUDE_FRAME)
     return BehaviorSpec(name, type_, parameters, required_one_of, resume, ends, doc, writes)
+
+
+def takeoff_first(aircraft: str) -> str:
+    """Return why an aircraft on the ground refuses a behavior."""
+    return f"{aircraft} is on the ground: take off first (takeoff)"
 
 
 def takes_altitude(parameters: tuple[ParameterSpec, ...]) -> bool:

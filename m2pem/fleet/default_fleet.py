@@ -33,7 +33,7 @@ NEAR_M = 10_000.0
 MOST_INSTANCES = 100
 """Instances of a task that get vehicles of their own."""
 
-_AIR_BEHAVIORS = frozenset({"takeoff", "land", "return_to_launch", "change_altitude", "orbit"})
+_AIR_BEHAVIORS = frozenset({"takeoff", "land", "change_altitude", "orbit"})
 _KIND_BY_NAME = {
     "route": ParameterKind.ROUTE,
     "area": ParameterKind.AREA,

@@ -66,6 +66,7 @@ class Settings:
     kinematics: Kinematics
     gimbal: Gimbal = field(default_factory=Gimbal)
     home: Coordinates | None = None
+    altitude_m: float = 0.0
     heading_rad: float = 0.0
     battery: float = 1.0
     kind: str = ""
@@ -107,12 +108,13 @@ _GIMBAL = {
     "shutter": ("shutter_s", Dimension.DURATION),
 }
 _MAY_BE_ZERO = {"turn_radius", "climb_rate", "default_altitude", "tilt_low", "tilt_high", "shutter"}
+_MAY_BE_ZERO |= {"altitude"}
 
 
 SETTING_KEYS = (
     *_KINEMATICS,
     *_GIMBAL,
-    *("home", "heading", "battery", "kind", "range", "detections", "targets", "faults"),
+    *("home", "altitude", "heading", "battery", "kind", "range", "detections", "targets", "faults"),
     *("link_lost", "wind", "wind_from", "telemetry_hz", "reports_left", "footprints", "state"),
 )
 """Every setting of a simulated vehicle or payload."""
@@ -133,6 +135,7 @@ def read_settings(connection: Connection, origin: Origin) -> Settings:
         kinematics=dataclasses.replace(default, **moves),
         gimbal=Gimbal(**reader.numbers(_GIMBAL)),
         home=reader.position("home"),
+        **reader.numbers({"altitude": ("altitude_m", Dimension.DISTANCE)}),
         heading_rad=reader.number("heading", Dimension.ANGLE, 0.0),
         battery=reader.value("battery", fraction, 1.0),
         kind=reader.choice("kind", KINDS),

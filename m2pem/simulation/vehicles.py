@@ -17,7 +17,7 @@ _PARKING_GAP_M = 10.0
 
 
 class SimVehicle:
-    """Stands at its `home`, or (without one) in a row south of the fleet's origin.
+    """Begins at its `home`, or (without one) in a row south of the fleet's origin.
 
     `behavior`: the id of what it is busy with, `doing` the name; "" when free. `held`: whether
     `hold` was called on it. `spare`: full batteries that it has besides the one that it shows.
@@ -41,7 +41,8 @@ class SimVehicle:
         self.spare = 0.0
         yaw = yaw_of(settings.heading_rad)
         self._driven_m = 0.0
-        self.track: Track[Pose] = Track(Plan([Stand(self.home, yaw, 0.0, 0.0)]), now_us)
+        up = self.home[2] + (settings.altitude_m if self.domain == "air" else 0.0)
+        self.track: Track[Pose] = Track(Plan([Stand((*self.home[:2], up), yaw, 0.0, 0.0)]), now_us)
 
     def _home(self, frame: FlatFrame, place: int) -> Vector:
         if self.settings.home is None:

@@ -13,8 +13,16 @@ FLEET = """
 version: 1
 origin: {lat: 38.1075, lon: -77.3192, alt: 60.0}
 vehicles:
-  uav1: {domain: air, arbiter: sim, connection: {home: [38.1095, -77.3192]}, cruise_speed: 5 m/s}
-  uav2: {domain: air, arbiter: sim, connection: {home: [38.1076, -77.3192]}, cruise_speed: 5 m/s}
+  uav1:
+    domain: air
+    arbiter: sim
+    connection: {home: [38.1095, -77.3192], altitude: 30 m}
+    cruise_speed: 5 m/s
+  uav2:
+    domain: air
+    arbiter: sim
+    connection: {home: [38.1076, -77.3192], altitude: 30 m}
+    cruise_speed: 5 m/s
   rover: {domain: ground, arbiter: sim, connection: {home: [38.1075, -77.3180]}}
 """
 

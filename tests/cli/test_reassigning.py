@@ -11,8 +11,16 @@ FLEET = """
 version: 1
 origin: {lat: 38.1075, lon: -77.3192, alt: 60.0}
 vehicles:
-  uav1: {domain: air, arbiter: sim, connection: {home: [38.1080, -77.3192]}, cruise_speed: 5 m/s}
-  uav2: {domain: air, arbiter: sim, connection: {home: [38.1070, -77.3192]}, cruise_speed: 5 m/s}
+  uav1:
+    domain: air
+    arbiter: sim
+    connection: {home: [38.1080, -77.3192], altitude: 30 m}
+    cruise_speed: 5 m/s
+  uav2:
+    domain: air
+    arbiter: sim
+    connection: {home: [38.1070, -77.3192], altitude: 30 m}
+    cruise_speed: 5 m/s
 routes: {along: along.geojson}
 """
 
@@ -74,9 +82,9 @@ def test_after_a_kill_between_the_loss_and_the_new_choice_the_rest_is_done(
     """The only vehicle is lost, and its executive is killed. The next one holds the vehicle first,
     and has it do what it had left."""
     mission, fleet = files(tmp_path)
-    alone = "\n".join(line for line in FLEET.splitlines() if "uav2" not in line)
-    fault = ", faults: ['single_vehicle_routing: cut link at 60 s']}, cruise"
-    fleet.write_text(alone.replace("}, cruise", fault))
+    alone = FLEET[: FLEET.index("  uav2:")] + FLEET[FLEET.index("routes:") :]
+    fault = "m, faults: ['single_vehicle_routing: cut link at 60 s']}"
+    fleet.write_text(alone.replace("m}", fault))
     mission.write_text(MISSION.replace("onLoss", 'wait="unlimited" onLoss'))
     words = ("--speed", "50", "--ocu", "none", "--format", "json")
     program = m2pem.start("run", mission, "--fleet", fleet, *words)

@@ -161,7 +161,8 @@ def test_members_of_a_team_are_kept_from_others_not_from_each_other(play: Play) 
         return said
 
     geometries = {"field": field, "over": route((300, 0), (0, 0))}
-    said = play(story, homes, geometries=geometries, others=("three",))
+    settings = {"altitude": "20 m"}
+    said = play(story, homes, geometries=geometries, others=("three",), settings=settings)
     assert "r2.b1 (area_survey)" in said
 
 

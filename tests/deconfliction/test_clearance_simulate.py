@@ -15,7 +15,7 @@ version: 1
 origin: {lat: 38.0, lon: -77.0, alt: 60}
 vehicles:
   one: {domain: air, arbiter: sim, connection: {home: [38.0, -77.0]}}
-  two: {domain: air, arbiter: sim, connection: {home: [38.0, -76.999]}}
+  two: {domain: air, arbiter: sim, connection: {home: [38.0, -76.999], altitude: 30 m}}
 """
 
 

@@ -333,7 +333,7 @@ EXPECTED = {
             [
                 *("at SweepRoads", "SweepNorth: SUCCEEDED", "escalation NORTH_DONE to OnNorthDone"),
                 *("SweepSouth: rover single_vehicle_routing", "LookAtNorth: uav1 orbit"),
-                *("SweepSouth: SUCCEEDED", "at End", "LookAtNorth: SUCCEEDED", "completed"),
+                *("LookAtNorth: SUCCEEDED", "SweepSouth: SUCCEEDED", "at End", "completed"),
             ],
             never={"SweepRoads interrupted", "at OnBlocked"},
         ),

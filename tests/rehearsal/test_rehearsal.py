@@ -744,7 +744,7 @@ def test_a_wind_against_an_aircraft_lengthens_its_way_and_one_too_strong_stops_i
     aircraft = Fleet(
         "test",
         "test.yaml",
-        {uav: Vehicle(uav, Domain.AIR, "sim", {"cruise_speed": "20 m/s"})},
+        {uav: Vehicle(uav, Domain.AIR, "sim", {"cruise_speed": "20 m/s", "altitude": "30 m"})},
         {},
         origin=(38.1, -77.3, 0.0),
     )

@@ -250,8 +250,10 @@ def test_a_behavior_scaled_in_time_takes_as_many_times_as_long_for_the_same_moti
         ways = [(each.driven_m(now_us), *each.pose(now_us).place) for each in arbiter.vehicles]
         ends.append(([*chain(*ways)], report.outputs.get("picture.files")))
 
+    aloft = {"altitude": "30 m"} if behavior == "area_survey" else {}
+    fleet: Fleet = {**UGV, "uav": ("air", aloft), "uav/cam": ("air", {"kind": "camera"})}
     for _ in range(2):
-        simulate({**UGV, **UAV, "uav/cam": ("air", {"kind": "camera"})}, main)
+        simulate(fleet, main)
     assert took_s[1] == pytest.approx(2.5 * took_s[0], abs=1e-3)
     assert took_s[0] > 1
     (way, files), (scaled_way, scaled_files) = ends

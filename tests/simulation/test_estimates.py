@@ -17,7 +17,8 @@ FLEET = """version: 1
 origin: {lat: 38.10, lon: -77.30}
 vehicles:
   rover: {domain: ground, arbiter: sim, cruise_speed: 4 m/s, endurance: 2 h}
-  uav: {domain: air, arbiter: sim, cruise_speed: 8 m/s, endurance: ENDURANCE}
+  uav: {domain: air, arbiter: sim, cruise_speed: 8 m/s, endurance: ENDURANCE,
+        connection: {altitude: 30 m}}
 """
 HEAD = """<definitions xmlns="http://www.omg.org/spec/BPMN/20100524/MODEL"
  xmlns:m2pem="https://m2pem.org/schema/1" targetNamespace="t"><process id="p" isExecutable="true">

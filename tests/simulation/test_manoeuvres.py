@@ -4,7 +4,7 @@ import pytest
 from shapely import LineString, Polygon, union_all
 
 from m2pem.api.telemetry import VehicleState
-from m2pem.fleet.behaviors import SHARED
+from m2pem.fleet.behaviors import FLOWN, SHARED
 from m2pem.mission.behavior import BehaviorType
 from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.mission.geometry import Area, Point, Route, VehiclePosition
@@ -28,6 +28,7 @@ from tests.simulation.conftest import (
 S = 1_000_000
 UGV: Fleet = {"ugv": ("ground", {}), "lead": ("ground", {})}
 UAV: Fleet = {"uav": ("air", {"endurance": "10 h"}), "lead": ("ground", {})}
+ALOFT: Fleet = {"uav": ("air", {"endurance": "10 h", "altitude": "30 m"}), "lead": ("ground", {})}
 SQUARE = area((0, 0), (200, 0), (200, 100), (0, 100))
 
 
@@ -72,14 +73,68 @@ def test_every_shared_vehicle_behavior_is_a_manoeuvre() -> None:
     assert set(MANOEUVRES) == shared
 
 
-def test_a_landed_aircraft_takes_off_to_the_height_of_its_route(simulate: Simulate) -> None:
-    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
-        up = Route(route((50, 0, 40), (90, 0, 50)).waypoints)
-        await do(bench, "r1.b1", "single_vehicle_routing", "uav", route=up)
-        assert at(bench, "uav") == pytest.approx((90, 0, 50), abs=0.01)
-        assert all(height >= 39.9 for east, _, height in tracks(bench, "uav") if east > 1)
+FLOWN_PARAMETERS: dict[str, dict[str, object]] = {
+    "single_vehicle_routing": {"route": route((50, 0, 40), (90, 0, 50))},
+    "goto": {"target": Point(place(50, 0, 40))},
+    "change_altitude": {"altitude": 20.0},
+    "area_survey": {"area": SQUARE, "altitude": 30.0},
+    "orbit": {"target": Point(place(50, 0)), "altitude": 30.0},
+    "area_observe": {"area": SQUARE, "duration": 5.0, "altitude": 30.0},
+    "follow": {"target": VehiclePosition("lead"), "altitude": 30.0},
+}
 
-    simulate(UAV, main, telemetry_hz=2.0)
+
+@pytest.mark.parametrize("behavior", sorted(FLOWN))
+def test_an_aircraft_on_the_ground_refuses_what_must_fly(simulate: Simulate, behavior: str) -> None:
+    wishes = FLOWN_PARAMETERS[behavior]
+
+    async def main(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
+        await bench.start("r1.b1", behavior, "uav", **wishes)  # type: ignore[arg-type]
+        end = await bench.ended("r1.b1", 10)
+        assert end.state is BehaviorState.REJECTED
+        assert end.reason == "uav is on the ground: take off first (takeoff)"
+        await do(bench, "r1.b2", "takeoff", "uav", altitude=20.0)
+        await bench.start("r1.b3", behavior, "uav", **wishes)  # type: ignore[arg-type]
+        assert await bench.until(lambda: "RUNNING" in bench.states_of("r1.b3"), 10)
+        await arbiter.cancel("r1.b3", 1)
+        await bench.ended("r1.b3", 10)
+        await do(bench, "r1.b4", "land", "uav")
+        await bench.start("r1.b5", behavior, "uav", **wishes)  # type: ignore[arg-type]
+        assert (await bench.ended("r1.b5", 10)).state is BehaviorState.REJECTED
+
+    simulate(UAV, main)
+
+
+def test_an_aircraft_away_from_home_on_the_ground_does_not_return(simulate: Simulate) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
+        await do(bench, "r1.b0", "return_to_launch", "uav")
+        await do(bench, "r1.b1", "takeoff", "uav", altitude=20.0)
+        await do(bench, "r1.b2", "goto", "uav", target=Point(place(50, 0)))
+        await do(bench, "r1.b3", "land", "uav")
+        await bench.start("r1.b4", "return_to_launch", "uav")
+        assert "take off first" in (await bench.ended("r1.b4", 10)).reason
+
+    simulate(UAV, main)
+
+
+def test_an_aircraft_may_begin_in_the_air(simulate: Simulate) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
+        await do(bench, "r1.b0", "hold", "uav", duration=2.0)
+        assert at(bench, "uav") == pytest.approx((0, 0, 30))
+        await do(bench, "r1.b1", "goto", "uav", target=Point(place(50, 0)))
+        assert at(bench, "uav") == pytest.approx((50, 0, 30), abs=0.01)
+        await do(bench, "r1.b2", "return_to_launch", "uav")
+        assert at(bench, "uav") == pytest.approx((0, 0, 0), abs=0.01)
+
+    simulate(ALOFT, main)
+
+
+def test_a_rover_has_no_altitude_at_first(simulate: Simulate) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
+        await do(bench, "r1.b0", "hold", "ugv", duration=2.0)
+        assert at(bench, "ugv") == pytest.approx((0, 0, 0))
+
+    simulate({"ugv": ("ground", {"altitude": "30 m"})}, main)
 
 
 def test_altitudes_are_read_in_their_frame(simulate: Simulate) -> None:
@@ -178,7 +233,7 @@ def test_an_aircraft_returns_high_and_lands_where_it_started(simulate: Simulate)
         assert isinstance(state, VehicleState)
         assert state.mode == "landed"
 
-    simulate(UAV, main, telemetry_hz=2.0)
+    simulate(ALOFT, main, telemetry_hz=2.0)
 
 
 def test_land_comes_down_where_it_is(simulate: Simulate) -> None:
@@ -187,7 +242,7 @@ def test_land_comes_down_where_it_is(simulate: Simulate) -> None:
         await do(bench, "r1.b2", "land", "uav")
         assert at(bench, "uav") == pytest.approx((40, 0, 0), abs=0.01)
 
-    simulate(UAV, main)
+    simulate(ALOFT, main)
 
 
 def test_a_survey_passes_every_part_of_the_area(simulate: Simulate) -> None:
@@ -231,7 +286,7 @@ def test_an_orbit_keeps_its_radius_for_its_turns(simulate: Simulate) -> None:
         turning_s = math.pi
         assert seconds == pytest.approx(2 * math.tau * 40 / 8 + 8 / 3 + turning_s, rel=0.1)
 
-    simulate(UAV, main, telemetry_hz=5.0)
+    simulate(ALOFT, main, telemetry_hz=5.0)
 
 
 def test_the_duration_of_an_orbit_counts_from_arriving_on_it(simulate: Simulate) -> None:
@@ -241,10 +296,10 @@ def test_the_duration_of_an_orbit_counts_from_arriving_on_it(simulate: Simulate)
         seconds = await do(bench, "r1.b1", "orbit", "uav", target=target, duration=120.0)
         assert seconds == pytest.approx(120.0, abs=4)
 
-    simulate(UAV, main)
+    simulate(ALOFT, main)
 
 
-@pytest.mark.parametrize("fleet", [UGV, UAV])
+@pytest.mark.parametrize("fleet", [UGV, ALOFT])
 def test_observing_lasts_until_cancelled_or_for_its_duration(
     simulate: Simulate, fleet: Fleet
 ) -> None:
@@ -345,7 +400,7 @@ def test_teleop_lasts_for_its_timeout(simulate: Simulate) -> None:
     simulate(UGV, main)
 
 
-@pytest.mark.parametrize("fleet", [UGV, UAV])
+@pytest.mark.parametrize("fleet", [UGV, ALOFT])
 def test_following_keeps_its_station_while_the_target_moves_and_stands(
     simulate: Simulate, fleet: Fleet
 ) -> None:
@@ -442,4 +497,4 @@ def test_goto_a_vehicle_goes_to_where_it_is_at_the_start(simulate: Simulate) -> 
         await do(bench, "r1.b3", "goto", "lead", target=VehiclePosition("uav"))
         assert at(bench, "lead") == pytest.approx((90, 0, 0), abs=0.01)
 
-    simulate(UAV, main)
+    simulate(ALOFT, main)

@@ -29,7 +29,7 @@ AREA = Area((tuple((*FRAME.to_latlon(place), None) for place in SIDES),))
 
 def fly(main: Callable[[ArbiterHarness, SimArbiter], Awaitable[None]]) -> None:
     async def run(clock: Clock) -> None:
-        arbiter = SimArbiter({UAV: Connection(UAV, "air", {})}, context(clock))
+        arbiter = SimArbiter({UAV: Connection(UAV, "air", {"altitude": "30 m"})}, context(clock))
         async with ArbiterHarness(arbiter, clock) as bench:
             await main(bench, arbiter)
 

@@ -18,7 +18,7 @@ from tests.seeds import examples
 from tests.simulation.conftest import START_US, Fleet, local, make, place, route
 
 STEP_S = 0.1
-FLEET: Fleet = {"ugv": ("ground", {}), "uav": ("air", {}), "lead": ("ground", {})}
+FLEET: Fleet = {"ugv": ("ground", {}), "uav": ("air", {"altitude": "30 m"}), "lead": ("ground", {})}
 VEHICLES = ("ugv", "uav")
 BEHAVIORS: list[tuple[str, dict[str, ResolvedValue]]] = [
     ("goto", {"target": Point(place(60, 20, 30))}),
@@ -91,6 +91,9 @@ async def play(clock: Clock, script: list[tuple[float, str, str | int]]) -> None
         check_motion(bench.states)
         for id_ in {report.id for report in bench.reports} - {"r1.lead"}:
             states = bench.states_of(id_)
+            if "take off first" in bench.of(id_)[-1].reason:
+                assert states == [BehaviorState.REJECTED]
+                continue
             assert states[:2] == [BehaviorState.ACCEPTED, BehaviorState.RUNNING]
             assert [state.terminal for state in states] == [False, False, True]
             numbers = [report.number for report in bench.of(id_)]

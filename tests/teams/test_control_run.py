@@ -297,7 +297,7 @@ def test_a_member_that_does_not_stop_is_named(play: Play) -> None:
 
 def test_a_rehearsal_in_which_nobody_tells_where_it_is_comes_to_its_end() -> None:
     vehicles = {
-        ResourceId(name): Vehicle(ResourceId(name), domain, "sim", {})
+        ResourceId(name): Vehicle(ResourceId(name), domain, "sim", {"altitude": "30 m"})
         for name, domain in (("ugv", Domain.GROUND), ("uav", Domain.AIR))
     }
     crew = Team("crew", tuple(vehicles), ResourceId("ugv"))

@@ -43,6 +43,7 @@ def fleet() -> Fleet:
         GEOMETRIES,
         policy=LostMemberPolicy.CONTINUE,
         domains=dict.fromkeys(PLACES, Domain.AIR),
+        settings={name: {"altitude": "30 m"} for name in PLACES},
     )
 
 
@@ -98,7 +99,7 @@ def test_all_is_surveyed_once_and_the_others_end_together(kind: type[SimArbiter]
     tracks = Tracks()
 
     async def story(world: Rehearsed) -> Any:
-        return await surveyed(world, {"b": 70.0}, tracks)
+        return await surveyed(world, {"b": 60.0}, tracks)
 
     ended = rehearsed(fleet(), story, kind=kind)
     assert ended.state is BehaviorState.SUCCEEDED
@@ -116,7 +117,7 @@ def test_a_member_that_is_lost_with_what_it_took_over_is_replaced_as_well(
     tracks = Tracks()
 
     async def story(world: Rehearsed) -> Any:
-        return await surveyed(world, {"b": 60.0, "c": 200.0}, tracks)
+        return await surveyed(world, {"b": 50.0, "c": 190.0}, tracks)
 
     ended = rehearsed(fleet(), story, kind=kind)
     assert ended.state is BehaviorState.SUCCEEDED

@@ -4,23 +4,11 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
 
-from m2pem.api import SHARED, BehaviorSpec, BehaviorType, ParameterKind, ParameterSpec
+from m2pem.api import FLOWN, SHARED, BehaviorSpec, BehaviorType, ParameterKind, ParameterSpec
 
-_EVERYWHERE = frozenset(
-    {
-        "single_vehicle_routing",
-        "goto",
-        "hold",
-        "drive_stop",
-        "return_to_launch",
-        "area_survey",
-        "orbit",
-        "area_observe",
-        "follow",
-        "set_speed",
-        "deploy",
-    }
-)
+_EVERYWHERE = (FLOWN - {"change_altitude"}) | {
+    *("hold", "drive_stop", "return_to_launch", "set_speed", "deploy"),
+}
 _BY_DOMAIN: Mapping[str, frozenset[str]] = {
     "ground": _EVERYWHERE | {"reverse", "teleop"},
     "air": _EVERYWHERE | {"takeoff", "land", "change_altitude"},

@@ -1,12 +1,10 @@
 """Examples of the repository on real autopilots, to their ends: ArduPilots are in the place of the
-vehicles that m2pem simulates. Aircraft are in the air already when an example begins: it counts on
-m2pem's simulation, which takes off by itself."""
+vehicles that m2pem simulates."""
 
 import json
 import signal
 import subprocess
 import sys
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +14,6 @@ import yaml
 from test_mavlink_demo import REPOSITORY
 
 SPEED = 5
-HEIGHT = "30 m"
 
 pytestmark = [pytest.mark.timeout(900), pytest.mark.sitl("M2PEM_ARDUCOPTER", "M2PEM_ARDUROVER")]
 
@@ -41,36 +38,6 @@ def real_vehicles(example: Path, folder: Path) -> Path:
             payload["arbiter"] = "sim"
     file = folder / "fleet.yaml"
     file.write_text(yaml.safe_dump(fleet), encoding="utf-8")
-    return file
-
-
-def aircraft(fleet: Path) -> list[str]:
-    vehicles = yaml.safe_load(fleet.read_text(encoding="utf-8"))["vehicles"]
-    return [name for name, vehicle in vehicles.items() if vehicle["domain"] == "air"]
-
-
-def takeoffs(vehicles: list[str], folder: Path) -> Path:
-    """A mission in which aircraft take off, one after the other."""
-    steps = ["Start", *(f"Up_{name}" for name in vehicles), "End"]
-    tasks = "".join(
-        f'<scriptTask id="Up_{name}"><extensionElements><m2pem:behavior type="vehicle" '
-        f'name="takeoff"><m2pem:properties><m2pem:property name="altitude" value="{HEIGHT}"/>'
-        f'</m2pem:properties><m2pem:resources><m2pem:role name="actor" vehicle="{name}"/>'
-        "</m2pem:resources></m2pem:behavior></extensionElements></scriptTask>"
-        for name in vehicles
-    )
-    flows = "".join(
-        f'<sequenceFlow id="{one}_{other}" sourceRef="{one}" targetRef="{other}"/>'
-        for one, other in pairwise(steps)
-    )
-    file = folder / "takeoffs.bpmn"
-    file.write_text(
-        '<definitions xmlns="http://www.omg.org/spec/BPMN/20100524/MODEL" '
-        'xmlns:m2pem="https://m2pem.org/schema/1" targetNamespace="https://m2pem.org/tests">'
-        '<process id="UP" isExecutable="true"><startEvent id="Start"/><endEvent id="End"/>'
-        f"{tasks}{flows}</process></definitions>",
-        encoding="utf-8",
-    )
     return file
 
 
@@ -119,8 +86,6 @@ def test_an_example_reaches_its_end(
     ) as autopilots:
         try:
             mavlink_sitl.until_ready(autopilots)
-            if flying := aircraft(fleet):
-                run(takeoffs(flying, tmp_path), fleet)
             records = run(example / "mission.bpmn", fleet, *words)
         finally:
             autopilots.send_signal(signal.SIGINT)

@@ -2,7 +2,7 @@
 
 import math
 
-from m2pem.api import LatLon, LocalFrame, distance_m
+from m2pem.api import LatLon, LocalFrame, distance_m, takeoff_first
 from m2pem_plugin_mavlink.behaviors.behavior import Behavior, BehaviorContext
 from m2pem_plugin_mavlink.microservices.message_requests import RequestMessage
 from m2pem_plugin_mavlink.protocol.messages import Message
@@ -134,9 +134,7 @@ def on_the_ground(vehicle: Vehicle) -> bool:
 
 def takeoff_required(vehicle: Vehicle) -> str:
     """Return why a motion cannot begin before a takeoff; "" if it can."""
-    if on_the_ground(vehicle):
-        return f"{vehicle.resource} is on the ground: take off first (takeoff)"
-    return ""
+    return takeoff_first(vehicle.resource) if on_the_ground(vehicle) else ""
 
 
 def accepted_modes(behavior: Behavior) -> frozenset[FlightMode]:
