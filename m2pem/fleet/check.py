@@ -16,6 +16,7 @@ from m2pem.fleet.same_vehicle import check_same_vehicle
 from m2pem.fleet.shortage import Demand, check_shortages
 from m2pem.fleet.space_check import check_space
 from m2pem.fleet.speed_check import check_speeds
+from m2pem.fleet.takeoff_check import check_takeoffs
 from m2pem.fleet.task_findings import TaskFindings
 from m2pem.geo.positions import NO_ORIGIN, geometry_out_of_reach
 from m2pem.mission.behavior import Behavior, BehaviorType, Role, RoleKind, ServiceCall
@@ -186,6 +187,7 @@ def check_mission(
     findings = [finding for task in mission.activities() for finding in check.task(task)]
     shortages = check_shortages(mission, check.demands)
     shortages += check_same_vehicle(mission, check.demands)
+    shortages += check_takeoffs(mission, check.commanded, fleet, catalogue)
     roles = check_operator_roles(mission, fleet)
     drawn = [*_out_of_reach(mission, fleet), *_of_files(mission, fleet)]
     return [*findings, *shortages, *_returned(mission, fleet), *roles, *drawn]
@@ -282,6 +284,8 @@ class _Check:
     handed_over: Container[str]
     demands: dict[Activity, Demand] = field(default_factory=dict)
     """What tasks need whose roles can be filled."""
+    commanded: dict[Activity, tuple[Behavior, Collection[ResourceId]]] = field(default_factory=dict)
+    """What tasks command that are right, and all vehicles that may fill the roles."""
     known: KnownFits = field(default_factory=dict)
     grounds: "list[GroundCheck]" = field(default_factory=list)
 
@@ -298,6 +302,9 @@ class _Check:
             if not has_errors(findings.found):
                 places = places_of(task.behavior, self.fleet, possible)
                 self.demands[task] = Demand.of(task.behavior, places)
+                able = (each for _, resources in places for each in resources)
+                vehicles = {each: None for each in able if each in self.fleet.vehicles}
+                self.commanded[task] = task.behavior, vehicles
         elif isinstance(task, ServiceTask) and task.call:
             self._service(task.call, findings)
         return findings.found

@@ -305,7 +305,7 @@ class _Check:
             places = 1 if resources is not None else len(self.demands[task].places)
             often = ", several instances" if count // places > 1 else ""
             said.append(f"{task.label} ({self._roles(task, resources)}{often})")
-        return _joined(said)
+        return joined(said)
 
     def _roles(self, task: Activity, resources: Resources | None, *, kept: bool = True) -> str:
         demand = self.demands[task]
@@ -314,7 +314,7 @@ class _Check:
             for role, able in (*demand.places, *(demand.kept if kept else ()))
             if resources is None or able <= resources
         )
-        return f"role{'s' if len(names) > 1 else ''} {_joined(list(names))}"
+        return f"role{'s' if len(names) > 1 else ''} {joined(list(names))}"
 
 
 def _asks_before(
@@ -397,7 +397,8 @@ def _listed(resources: Resources) -> str:
     return ", ".join(names[:NAMED]) + (f" and {more} others" if more > 0 else "")
 
 
-def _joined(words: Sequence[str]) -> str:
+def joined(words: Sequence[str]) -> str:
+    """Return words as a sentence lists them; many are counted."""
     if len(words) > NAMED:
         return f"{', '.join(words[:NAMED])} and {len(words) - NAMED} others"
     return " and ".join((", ".join(words[:-1]), words[-1])) if len(words) > 1 else "".join(words)

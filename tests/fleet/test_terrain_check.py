@@ -18,7 +18,7 @@ origin: {{lat: 38.105, lon: -77.305, alt: 60}}
 terrain: {{folder: elevation{clearance}}}
 vehicles:
   rover: {{domain: ground, arbiter: sim}}
-  uav: {{domain: air, arbiter: sim}}
+  uav: {{domain: air, arbiter: sim, connection: {{altitude: 30 m}}}}
 """
 MISSION = """<definitions xmlns="http://www.omg.org/spec/BPMN/20100524/MODEL"
  xmlns:m2pem="https://m2pem.org/schema/1" targetNamespace="t"><process id="p" isExecutable="true">
