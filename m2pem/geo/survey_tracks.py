@@ -107,7 +107,7 @@ class SurveyTracks:
         way = Fence.around(self.holes).way(place, self.line.points[0]) if self.holes else None
         if not way:
             return self
-        passes = [(len(way) + index, *metres) for index, *metres in self.passes]
+        passes = [(len(way) + each[0], *each[1:]) for each in self.passes]
         points = [*way, *self.line.points]
         return SurveyTracks(points, self.width_m, self.overshoot_m, passes, self.holes)
 
