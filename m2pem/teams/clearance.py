@@ -15,7 +15,10 @@ from m2pem.geo.polyline import Polyline, Segment
 from m2pem.teams.paths import MemberPath
 
 NEAREST_SHARE = 0.83
-"""Share of the spacing that is aimed at, to keep a minimum distance of 0.8 in the plane."""
+"""Share of the spacing that is aimed at, to keep a minimum distance of 0.8 in the plane.
+
+Members beside each other may come a little nearer in sharp turns of short legs.
+"""
 
 _BEND_RADIUS_M, _FARTHEST_MISS_M = 10.0, 3.5
 """Vehicles round corners: so far from the corner do they pass at most."""

@@ -218,7 +218,9 @@ class FormationController:
             track.unseen_s += PERIOD_S
         else:
             track.pose, track.unseen_s = stand, 0.0
-            found_m = path.find(stand.place, track.along_m, _LOOK_AHEAD_M, stand.yaw_rad)
+            found_m = path.find(
+                stand.place, track.along_m, _LOOK_AHEAD_M, stand.yaw_rad, stand.course_rad
+            )
             track.along_m, track.mark_m = found_m, path.mark_m(found_m)
             track.off_m = path.off_m(stand.place, found_m)
             braking_m_s2 = _HARD_BRAKING * track.marcher.motion.braking_m_s2

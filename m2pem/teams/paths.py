@@ -103,17 +103,23 @@ class MemberPath:
         near_m: float | None,
         ahead_m: float,
         yaw_rad: float | None = None,
+        course_rad: float | None = None,
     ) -> float:
         """How far along this path a place is, in metres of the path.
 
         `near_m`: where it was before, and it is at most `ahead_m` farther now, so that a path that
-        crosses itself is not cut short. None, or one who has strayed: anywhere; `yaw_rad` (from
-        east, counter-clockwise) then distinguishes the way there from the way back.
+        crosses itself is not cut short. None, or one who has strayed: anywhere. `course_rad`, where
+        it moves (from east, counter-clockwise), distinguishes the way there from the way back;
+        anywhere, `yaw_rad` does.
         """
         if near_m is not None:
             feet = self.line.feet(place, near_m - _BEHIND_M, near_m + ahead_m)
-            off_m, found_m = min(
-                ((off_m, along_m) for along_m, off_m, _ in feet), default=(math.inf, 0.0)
+            _, off_m, found_m = min(
+                (
+                    (off_m + _wrong_way_m(leg, course_rad), off_m, along_m)
+                    for along_m, off_m, leg in feet
+                ),
+                default=(math.inf, math.inf, 0.0),
             )
             if off_m <= _STRAY_M:
                 return found_m

@@ -124,11 +124,13 @@ class Plan:
 @dataclass(frozen=True, slots=True)
 class MemberPose:
     """A vehicle's pose: `place` is east and north in metres in the team's local frame; `yaw_rad`
-    from east, counter-clockwise; None: not known. `speed_m_s`: 0 if it is not known."""
+    from east, counter-clockwise; None: not known. `speed_m_s`: 0 if it is not known.
+    `course_rad`: where it moves, from east; None: it stands, or that is not known."""
 
     place: tuple[float, float]
     yaw_rad: float | None = None
     speed_m_s: float = 0.0
+    course_rad: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -40,6 +40,8 @@ def alike(request: BehaviorRequest) -> Plan:
 
 SEEN_WITHIN_S = 1.5
 LOOK_EVERY_S = 0.1
+STANDS_M_S = 0.3
+"""A vehicle that is slower than this has no direction of motion."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,4 +160,7 @@ def pose_of(frame: LocalFrame, state: VehicleState) -> MemberPose:
     if state.position is None:
         raise ValueError(f"the position of {state.resource} is not known")
     place = frame.to_local(state.position.latlon)
-    return MemberPose(place, state.yaw_rad, math.hypot(*(state.velocity_enu_m_s or ())[:2]))
+    east, north, _ = state.velocity_enu_m_s or (0.0, 0.0, 0.0)
+    speed_m_s = math.hypot(east, north)
+    course_rad = math.atan2(north, east) if speed_m_s > STANDS_M_S else None
+    return MemberPose(place, state.yaw_rad, speed_m_s, course_rad)

@@ -166,7 +166,8 @@ def check(seed: int) -> None:
         found = judged(case.fleet(), case.mission)
         if not refused(found):
             assert found.ended.state is BehaviorState.SUCCEEDED, (case, found)
-            assert found.least_m >= 0.8 * case.spacing_m, (case, found)
+            least = 0.8 if case.shape == "column" else 0.75  # beside each other, in short legs
+            assert found.least_m >= least * case.spacing_m, (case, found)
 
 
 @pytest.mark.parametrize("seed", [0, 2, 12, 18, 23, 27, 51, 99, 107, 112, 210, 268])
