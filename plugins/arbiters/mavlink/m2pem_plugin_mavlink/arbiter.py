@@ -172,7 +172,7 @@ class MavlinkArbiter(UnitArbiter["VehicleController"]):
             )
             area = self._connections[resource].fence
             if area is not None:
-                self._fences[resource] = fences.setdefault(id(area), Fence(area))
+                self._fences[resource] = fences[id(area)] = fences.get(id(area)) or Fence(area)
             self._publish_mode_changes(self._units[resource])
             self._tasks.append(create(self._monitor_vehicle(resource)))
         known = await asyncio.gather(
