@@ -79,6 +79,7 @@ class GroundCheck:
                 f"raise it by {raised_m} m, or let the route follow the terrain",
                 line=line,
                 severity=Severity.WARNING,
+                place=low.place,
             )
 
     def _profile(self, route: Route) -> list[ProfilePoint]:

@@ -55,6 +55,7 @@ class Engine:
     def __init__(self, mission: Mission, fleet: Fleet) -> None:
         self.run, self.now_us, self.steps = MissionRun(mission, fleet, "r1", 200), START_US, 0
         self.reached: set[str] = set()
+        self.is_followed = True
         self.source = {flow.id: flow.source.id for flow in mission.flows}
 
     def give(self, item: i.Input, now_us: int) -> None:
@@ -64,6 +65,8 @@ class Engine:
         for record in step.records:
             if isinstance(record, r.FlowTaken):
                 self.reached |= {record.flow, self.source[record.flow]}
+            # Errors are followed only where all that an expression reads is.
+            self.is_followed &= getattr(record, "code", "") != "EXPRESSION"
         few = len(self.run.state.tokens) < MOST_TOKENS
         if self.run.wants_continue and self.steps < MOST_INPUTS and few:
             self.give(i.Continue(), self.now_us)
@@ -93,6 +96,15 @@ class Engine:
         yield from (i.ServiceCompleted(each) for each in state.services)
         if self.run.next_due_us is not None:
             yield i.Tick()
+
+    def release(self) -> None:
+        """Let the behaviors end that are being cancelled: no token is on their tasks any more."""
+        for behavior in list(self.run.state.behaviors.values()):
+            if behavior.phase is BehaviorPhase.CANCELLING:
+                ended = i.BehaviorReported(
+                    behavior.id, behavior.number + 1, BehaviorState.CANCELLED
+                )
+                self.give(ended, self.now_us)
 
     def goes_on(self, dice: Random) -> bool:
         """Let one thing happen; whether there was any."""
@@ -169,6 +181,7 @@ class Judge:
         if name in UNCAUGHT:
             return "" if end.failed else "nothing has failed"
         if name == "no-deadlock":
+            end.release()
             return "" if end.stuck else f"the engine goes on: {end.run.state.detail}"
         if violation.cycle or end.stuck:
             return ""
@@ -200,7 +213,7 @@ class Judge:
             while engine.steps < MOST_INPUTS and engine.goes_on(dice):
                 pass
             self.counts["plays"] += 1
-            if engine.reached & dead:
+            if engine.reached & dead and engine.is_followed:
                 return f"never reached, and reached: {', '.join(sorted(engine.reached & dead))}"
             if not certain or "EXPRESSION" in engine.run.state.detail:
                 continue
