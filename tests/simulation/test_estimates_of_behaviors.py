@@ -28,9 +28,15 @@ vehicles:
   g2: {domain: ground, arbiter: sim, endurance: 20 min, cruise_speed: 3 m/s}
   g3: {domain: ground, arbiter: sim, endurance: 25 min}
   g4: {domain: ground, arbiter: sim, endurance: 25 min, payloads: {mast: {connection: {kind: ptz}}}}
-  a1: {domain: air, arbiter: sim, endurance: 15 min, payloads: {eye: {connection: {kind: ptz}}}}
-  a2: {domain: air, arbiter: sim, endurance: 15 min, connection: {wind: 6 m/s, wind_from: 40 deg}}
-  a3: {domain: air, arbiter: sim, endurance: 40 min, cruise_speed: 6 m/s}
+  a1:
+    {domain: air, arbiter: sim, endurance: 15 min, connection: {altitude: 30 m},
+     payloads: {eye: {connection: {kind: ptz}}}}
+  a2:
+    {domain: air, arbiter: sim, endurance: 15 min,
+     connection: {altitude: 30 m, wind: 6 m/s, wind_from: 40 deg}}
+  a3:
+    {domain: air, arbiter: sim, endurance: 40 min, cruise_speed: 6 m/s,
+     connection: {altitude: 30 m}}
   boat: {domain: surface, arbiter: sim, endurance: 30 min}
   sub: {domain: subsurface, arbiter: sim, endurance: 2 h}
 teams:
@@ -184,6 +190,8 @@ def single(behavior: str, type_: BehaviorType, resources: str, given: dict[str, 
         return mission_of(it, flows("s", "it", "e"))
     before = task("before", "goto", V, vehicle, target="[38.1008, -77.2992]")
     after = task("after", "goto", V, vehicle, target="[38.1, -77.2991]")
+    if vehicle.startswith("a") and behavior in ("land", "return_to_launch"):
+        after = task("after", "takeoff", V, vehicle, altitude="20 m")
     return mission_of(before, it, after, flows("s", "before", "it", "after", "e"))
 
 
