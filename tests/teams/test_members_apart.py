@@ -86,13 +86,14 @@ class Case:
             for name, (back, left) in slots.items()
         }
         speeds = self.speeds_m_s or [15.0] * len(self.names)
+        aloft = {"altitude": "30 m"} if self.domain is Domain.AIR else {}
         return sim_fleet(
             starts,
             {"way": route(*self.places)},
             policy=policy,
             domains=dict.fromkeys(self.names, self.domain),
             settings={
-                name: {"max_speed": f"{speed} m/s"}
+                name: {"max_speed": f"{speed} m/s"} | aloft
                 for name, speed in zip(self.names, speeds, strict=True)
             },
         )
