@@ -1,11 +1,12 @@
 """Throwing errors, escalations, signals and messages: what catches them, and what follows."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TypeVar
 
 from m2pem.mission import elements as e
 from m2pem.mission.events import (
     ErrorEventDefinition,
+    EventDefinition,
     MessageEventDefinition,
     SignalEventDefinition,
     error_code,
@@ -30,15 +31,23 @@ def catchable(scope: ScopeDraft, instance: ActivityInstance | None) -> list[str]
     return list(codes)
 
 
-def _around(scope: ScopeDraft, instance: ActivityInstance | None) -> list[e.Event]:
-    found: list[e.Event] = []
+def _outward(
+    scope: ScopeDraft, instance: ActivityInstance | None
+) -> Iterator[tuple[ScopeDraft, ActivityInstance | None]]:
+    """Yield a scope and those around it, each with the activity that is left on the way to it."""
     here: ScopeDraft | None = scope
     while here is not None:
-        if instance is not None and instance.boundary:
-            found += instance.node.boundary
-        found += [s for each in handlers(here) for s in each.starts]
+        yield here, instance
         instance = here.instance if isinstance(here.instance, ActivityInstance) else None
         here = instance.outer if instance is not None else None
+
+
+def _around(scope: ScopeDraft, instance: ActivityInstance | None) -> list[e.Event]:
+    found: list[e.Event] = []
+    for here, left in _outward(scope, instance):
+        if left is not None and left.boundary:
+            found += left.node.boundary
+        found += [s for each in handlers(here) for s in each.starts]
     return found
 
 
@@ -64,8 +73,15 @@ def throw_error(
     The thrower's own token is removed already. `instance`: the activity that it was on, which may
     catch the error itself.
     """
-    thrown = Step(thrower.id, Action.THROWN, code)
-    return _go_up(context, scope, thrower, instance, code, thrown, uncaught)
+    caught, uncaught_by_all = _catch(context, scope, thrower, instance, code, error_code)
+    found = [effect for effect, _ in caught]
+    if uncaught_by_all is not None:
+        failed = uncaught_by_all.then(context.end_run(context.failed))
+        assert failed is not None
+        flagged = failed.then(Effect(flag=uncaught, flagged=code))
+        assert flagged is not None
+        found.append(flagged)
+    return found
 
 
 def failing(
@@ -79,41 +95,54 @@ def throw_escalation(
     context: TranslationContext, scope: ScopeDraft, thrower: e.FlowNode, code: str
 ) -> list[tuple[Effect, bool]]:
     """Return what an escalation leads to, and whether its scope goes on."""
-    thrown = Step(thrower.id, Action.THROWN, code)
+    found, unheard = _catch(context, scope, thrower, None, code, escalation_code)
+    if unheard is not None:
+        ignored = unheard.then(Effect(flag=Flag.UNHEARD, flagged=code))
+        assert ignored is not None
+        found.append((ignored, True))
+    return found
+
+
+def _catch(
+    context: TranslationContext,
+    scope: ScopeDraft,
+    thrower: e.FlowNode,
+    instance: ActivityInstance | None,
+    code: str,
+    code_of: Callable[[EventDefinition], str | None],
+) -> tuple[list[tuple[Effect, bool]], Effect | None]:
+    """Return what an error or escalation leads to where an event catches it, each with whether its
+    scope goes on; and the effect of throwing it where none does, None: one does in any case."""
     found: list[tuple[Effect, bool]] = []
-    condition = Effect(steps=(thrown,))
-    here: ScopeDraft | None = scope
-    instance: ActivityInstance | None = None
-    node: e.FlowNode = thrower
-    while here is not None:
-        if instance is not None and instance.boundary:
-            event = best(instance.node.boundary, code, escalation_code)
+    condition = Effect(steps=(Step(thrower.id, Action.THROWN, code),))
+    node = thrower
+    taken_off = True  # the token of an activity that throws itself
+    for here, left in _outward(scope, instance):
+        if here is not scope:
+            assert left is not None
+            node, taken_off = left.node, False
+        if left is not None and left.boundary:
+            event = best(left.node.boundary, code, code_of)
             if event is not None:
-                there, without = _there(context, condition, instance)
-                found.append(_at_boundary(context, there, instance, event, taken_off=False))
+                there, without = _there(context, condition, left, taken_off=taken_off)
+                found.append(_at_boundary(context, there, left, event, taken_off=taken_off))
                 if without is None:
-                    return found
+                    return found, None
                 condition = without
         if here.open is not None:
-            start = best(_starts(here, node), code, escalation_code)
+            start = best(_starts(here, node), code, code_of)
             if start is not None:
                 begun = condition.then(Effect(read=frozenset({here.open})))
                 assert begun is not None
-                for effect in begin_handler(context, here, start):
-                    both = begun.then(effect)
-                    if both is not None:
-                        found.append((both, not start.interrupting))
+                found += [
+                    (both, not start.interrupting)
+                    for effect in begin_handler(context, here, start)
+                    if (both := begun.then(effect)) is not None
+                ]
                 without = condition.then(Effect(inhibit=frozenset({here.open})))
                 assert without is not None
                 condition = without
-        instance = here.instance if isinstance(here.instance, ActivityInstance) else None
-        if instance is None:
-            break
-        node, here = instance.node, instance.outer
-    ignored = condition.then(Effect(flag=Flag.UNHEARD, flagged=code))
-    assert ignored is not None
-    found.append((ignored, True))
-    return found
+    return found, condition
 
 
 def _there(
@@ -121,7 +150,7 @@ def _there(
     condition: Effect,
     instance: ActivityInstance,
     *,
-    taken_off: bool = False,
+    taken_off: bool,
 ) -> tuple[Effect, Effect | None]:
     """When an activity's boundary events can catch what is thrown in it, and when not, if ever.
 
@@ -158,54 +187,6 @@ def _at_boundary(
     return done, not event.interrupting
 
 
-def _go_up(
-    context: TranslationContext,
-    scope: ScopeDraft,
-    thrower: e.FlowNode,
-    instance: ActivityInstance | None,
-    code: str,
-    thrown: Step,
-    uncaught: Flag,
-) -> list[Effect]:
-    found: list[Effect] = []
-    condition = Effect(steps=(thrown,))
-    here: ScopeDraft | None = scope
-    node = thrower
-    taken_off = True
-    while here is not None:
-        if instance is not None and instance.boundary:
-            event = best(instance.node.boundary, code, error_code)
-            if event is not None:
-                there, without = _there(context, condition, instance, taken_off=taken_off)
-                found.append(_at_boundary(context, there, instance, event, taken_off=taken_off)[0])
-                if without is None:
-                    return found
-                condition = without
-        if here.open is not None:
-            start = best(_starts(here, node), code, error_code)
-            if start is not None:
-                begun = condition.then(Effect(read=frozenset({here.open})))
-                assert begun is not None
-                found += [
-                    both
-                    for effect in begin_handler(context, here, start)
-                    if (both := begun.then(effect)) is not None
-                ]
-                without = condition.then(Effect(inhibit=frozenset({here.open})))
-                assert without is not None
-                condition = without
-        instance = here.instance if isinstance(here.instance, ActivityInstance) else None
-        if instance is None:
-            break
-        node, here, taken_off = instance.node, instance.outer, False
-    failed = condition.then(context.end_run(context.failed))
-    assert failed is not None
-    flagged = failed.then(Effect(flag=uncaught, flagged=code))
-    assert flagged is not None
-    found.append(flagged)
-    return found
-
-
 def begin_handler(
     context: TranslationContext, scope: ScopeDraft, start: e.StartEvent
 ) -> list[Effect]:
@@ -230,9 +211,10 @@ def _starts(scope: ScopeDraft, but: e.FlowNode) -> list[e.StartEvent]:
     return [start for each in handlers(scope) if each is not but for start in each.starts]
 
 
-def best(events: Sequence[Catching], code: str, code_of: "object") -> Catching | None:
+def best(
+    events: Sequence[Catching], code: str, code_of: Callable[[EventDefinition], str | None]
+) -> Catching | None:
     """The event that names a code, else one that catches all."""
-    assert callable(code_of)
     for_all = None
     for event in events:
         for definition in event.definitions:
@@ -299,14 +281,11 @@ def interrupting_places(
     completes.
     """
     around: set[int] = set()
-    here: ScopeDraft | None = scope
-    while here is not None:
+    for here, left in _outward(scope, None):
         if here.open is not None:
             around.add(here.open)
-        instance = here.instance if isinstance(here.instance, ActivityInstance) else None
-        if instance is not None:
-            around.add(instance.active)
-        here = instance.outer if instance is not None else None
+        if left is not None:
+            around.add(left.active)
     register = context.signals if what == "signal" else context.messages
     return frozenset(
         each.waiting for each in register.get(ref, ()) if each.waiting in around and not each.keeps
