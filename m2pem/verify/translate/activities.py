@@ -130,8 +130,7 @@ def _arm_before_work(
             ended = frozenset({instance.inside.index}) if over else frozenset()
             begins = () if effect.steps else (Step(node.id, Action.ENTERED, BEGINS),)
             context.transitions(product([Effect(begins, (due,), reset_scopes=ended)], [effect]))
-    armed = come.then(Effect(produce=(due, *instance.armed)))
-    assert armed is not None
+    armed = come.and_then(Effect(produce=(due, *instance.armed)))
     net.transition(armed)
     caught_before_work(context, replace(instance, active=due, armed=[]))
 

@@ -114,9 +114,7 @@ def take_named_resources(
         wait_for_space(context, instance)
         _note_kept_while_it_waits_for_space(context, instance, named)
     context.contended.append(Contender(instance, named, refused, begins, kind))
-    begun = instance.begin().then(Effect(produce=(asks,)))
-    assert begun is not None
-    return [begun]
+    return [instance.begin().and_then(Effect(produce=(asks,)))]
 
 
 def _holds_named(
@@ -176,9 +174,7 @@ def choose_resources(
                     context.transitions(product(refused, fails), Kind.JOIN)
 
     context.later.append(translate_later)
-    begun = instance.begin().then(Effect(produce=(asks,)))
-    assert begun is not None
-    return [begun]
+    return [instance.begin().and_then(Effect(produce=(asks,)))]
 
 
 def lose_resources(context: TranslationContext, instance: ActivityInstance) -> None:

@@ -121,8 +121,7 @@ def _boundary(
             register_catcher(
                 context, what, ref, instance.active, caught, not event.interrupting, event
             )
-            both = caught_comes.then(Effect(consume=(caught,)))
-            assert both is not None
+            both = caught_comes.and_then(Effect(consume=(caught,)))
             context.transitions(context.data.receive([both], instance.outer, event))
         case ConditionalEventDefinition(condition=condition):
             _boundary_condition(context, instance, event, condition, comes, number)
@@ -176,9 +175,7 @@ def _all_came(
 def _once(instance: ActivityInstance, comes: Effect, armed: int) -> Effect:
     """A non-interrupting event happens once for each token on the activity."""
     instance.armed.append(armed)
-    both = comes.then(Effect(consume=(armed,)))
-    assert both is not None
-    return both
+    return comes.and_then(Effect(consume=(armed,)))
 
 
 def _again(
@@ -189,9 +186,7 @@ def _again(
         event, Exactness.BOUNDED, "it comes again only when what it began has ended"
     )
     places = (entry_place(context.net, node, instance.outer) for node in handled(event))
-    both = comes.then(Effect(inhibit=frozenset(places)))
-    assert both is not None
-    return both
+    return comes.and_then(Effect(inhibit=frozenset(places)))
 
 
 def handled(event: e.BoundaryEvent) -> frozenset[e.FlowNode]:
@@ -314,9 +309,7 @@ def _start_by_all_triggers(
         )
         context.net.transition(missed)
         again = replace(come, produce=places.again)
-        alone = again.then(_once_at_a_time(context, scope, start))
-        assert alone is not None
-        come = alone
+        come = again.and_then(_once_at_a_time(context, scope, start))
     ways = context.data.receive([come], scope, start)
     context.transitions(product(ways, begin_handler(context, scope, start)))
 
@@ -352,22 +345,18 @@ def _handler_condition(
             net.transition(effect, Kind.EXTERNAL, Trigger.CONDITION)
         return
     for guard, truth in context.data.cases([condition], scope, start, first):
-        asked = when.then(Effect(guard=guard))
-        assert asked is not None
+        asked = when.and_then(Effect(guard=guard))
         if truth is True:
             if not start.interrupting:
-                asked = asked.then(Effect(consume=(armed,)))
-                assert asked is not None
-                asked = asked.then(_once_at_a_time(context, scope, start))
-                assert asked is not None
+                asked = asked.and_then(Effect(consume=(armed,)))
+                asked = asked.and_then(_once_at_a_time(context, scope, start))
             context.transitions(product([asked], begun))
         elif not start.interrupting and truth != ERROR:
-            reset = asked.then(
+            reset = asked.and_then(
                 Effect(
                     steps=(Step(start.id, Action.ENTERED, "its condition is false"),),
                     inhibit=frozenset({armed}),
                     produce=(armed,),
                 )
             )
-            assert reset is not None
             net.transition(reset)

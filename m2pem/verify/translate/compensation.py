@@ -342,9 +342,7 @@ def cancel(context: TranslationContext, node: e.EndEvent, scope: ScopeDraft) -> 
                 steps=(Step(boundary.id, Action.TRIGGERED),),
                 produce=(entry_place(context.net, boundary, instance.outer),),
             )
-            both = left.then(out)
-            assert both is not None
-            left = both
+            left = left.and_then(out)
             break
     compensating = _compensate_points(context, node, "", scope, _points(context, scope))
     over = compensating.over.with_step(node.id, Action.COMPLETED, "all is undone")
@@ -453,8 +451,7 @@ def _compensation_of(
             if context.net.places[place].element == handler.id
             and context.net.places[place].role is not Role.CONTROL
         ]
-        over = when_empty(compensates.inside).then(Effect(inhibit=frozenset(tokens)))
-        assert over is not None
+        over = when_empty(compensates.inside).and_then(Effect(inhibit=frozenset(tokens)))
         return [Effect(produce=(entry_place(context.net, handler, scope),))], over
     inner = _inside(instance)
     if inner is None:  # a process that calls itself: the inner call is not seen

@@ -102,9 +102,8 @@ def _enter(
     context: TranslationContext, node: e.FlowNode, scope: ScopeDraft, places: tuple[int, ...]
 ) -> None:
     """A token that enters the event waits at once."""
-    come = _come(context, node, scope, Action.ENTERED).then(Effect(produce=places))
-    assert come is not None
-    context.net.transition(come)
+    come = _come(context, node, scope, Action.ENTERED)
+    context.net.transition(come.and_then(Effect(produce=places)))
     context.net.at_once.add(entry_place(context.net, node, scope))
 
 
@@ -303,8 +302,7 @@ def _terminate(context: TranslationContext, scope: ScopeDraft) -> list[Effect]:
     instance = scope.instance
     if not isinstance(instance, ActivityInstance):
         return [stop]
-    left = instance.leave().then(stop)
-    assert left is not None
+    left = instance.leave().and_then(stop)
     return product([left], instance.cut() if instance.cut is not None else instance.done())
 
 

@@ -216,7 +216,7 @@ def _reset(
             more = Effect(
                 steps=(Step(flow.id, Action.TAKEN),), produce=(arrival(net, flow, scope),)
             )
-            second = [*second, *(both for s in second if (both := s.then(more)) is not None)]
+            second = [*second, *product(second, [more])]
     reach = upstream(node)
     tokens = _tokens_by_node(context, scope)
     if len(places) > MOST_INCOMING:

@@ -160,8 +160,7 @@ def _standard_loop(
         context.transitions(
             product([last.with_step(node.id, Action.COMPLETED, "a round")], _over(whole))
         )
-    begun = Effect(produce=(sequence.begins, *rounds[:1])).then(whole.begin())
-    assert begun is not None
+    begun = Effect(produce=(sequence.begins, *rounds[:1])).and_then(whole.begin())
     begun = replace(begun, reset=forget_instance_completions(context, whole, 1).reset)
     if most == 0:
         return whole.done()
@@ -212,11 +211,9 @@ def _sequential(
             context.net.place(node, whole.inside, Role.CONTROL, f":{n + 1}") for n in range(count)
         ]
         for n in range(count - 1):
-            goes_on = Effect(consume=(rounds[n],), produce=(rounds[n + 1],)).then(again)
-            assert goes_on is not None
+            goes_on = Effect(consume=(rounds[n],), produce=(rounds[n + 1],)).and_then(again)
             context.transitions([goes_on.with_step(node.id, Action.COMPLETED, "an instance")])
-        last = Effect(consume=(rounds[-1],)).then(stop)
-        assert last is not None
+        last = Effect(consume=(rounds[-1],)).and_then(stop)
         context.transitions(product([last], _over(whole)))
     else:
         context.net.approximate(node, Exactness.MORE, "how many instances there are is not known")
@@ -229,8 +226,7 @@ def _sequential(
             context.net.approximate(
                 node, Exactness.MORE, "its completion condition may be true at any instance's end"
             )
-    begun = Effect(produce=(sequence.begins, *rounds[:1])).then(whole.begin())
-    assert begun is not None
+    begun = Effect(produce=(sequence.begins, *rounds[:1])).and_then(whole.begin())
     begun = replace(begun, reset=forget_instance_completions(context, whole, 1).reset)
     return [begun] if counted else [begun, *whole.done()]
 
@@ -281,8 +277,7 @@ def _parallel(
         if size == 0:
             found += whole.done()
             continue
-        begun = whole.begin().then(Effect(produce=tuple(begins[:size])))
-        assert begun is not None
+        begun = whole.begin().and_then(Effect(produce=tuple(begins[:size])))
         begun = replace(begun, reset=forget_instance_completions(context, whole, total).reset)
         found.append(begun)
     return found

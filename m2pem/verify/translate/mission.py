@@ -114,8 +114,7 @@ def _completes(context: TranslationContext) -> None:
     over = Effect(
         steps=(Step(context.process.id, Action.COMPLETED),),
         empty_scopes=frozenset({context.everything.index}),
-    ).then(context.end_run(context.completed))
-    assert over is not None
+    ).and_then(context.end_run(context.completed))
     context.net.transition(over)
 
 

@@ -104,6 +104,12 @@ class Effect:
             self.releases | other.releases,
         )
 
+    def and_then(self, other: "Effect") -> "Effect":
+        """Return both effects together, as `then`; they do not exclude each other."""
+        both = self.then(other)
+        assert both is not None
+        return both
+
     def with_step(self, element: str, action: Action, detail: str = "") -> "Effect":
         """Return the effect with one more step at its beginning."""
         return replace(self, steps=(Step(element, action, detail), *self.steps))

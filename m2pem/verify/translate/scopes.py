@@ -54,9 +54,8 @@ def begin_event_subprocess(
             *(entry_place(context.net, start, instance.inside) for start in starts),
             *(place for place in inside.produce if place not in entries),
         ),
-    ).then(instance.begin())
-    assert begun is not None
-    return begun
+    )
+    return begun.and_then(instance.begin())
 
 
 def armed_handlers(

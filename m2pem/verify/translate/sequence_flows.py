@@ -7,7 +7,7 @@ from m2pem.mission import elements as e
 from m2pem.verify.net.petri_net import Action, Exactness, Step
 from m2pem.verify.translate.context import TranslationContext
 from m2pem.verify.translate.data import ERROR, Truth
-from m2pem.verify.translate.net_builder import Effect, ScopeDraft, arrival
+from m2pem.verify.translate.net_builder import Effect, ScopeDraft, arrival, product
 
 MOST_SUBSETS = 6
 """Most flows of which every combination is tried; of more, each alone and all together."""
@@ -81,7 +81,7 @@ def leave(
             if default is not None and not (asks if beside else taken):
                 taken.append(default)
             ways = [along(context, scope, taken, times)]
-        found += [both for way in ways if (both := when.then(way)) is not None]
+        found += product([when], ways)
     return found
 
 

@@ -25,8 +25,7 @@ def build(context: TranslationContext, container: e.Container, scope: ScopeDraft
 
 def ends_with_its_inside(context: TranslationContext, instance: ActivityInstance) -> None:
     """An activity is done when no token is left inside."""
-    over = instance.leave().then(when_empty(instance.inside))
-    assert over is not None
+    over = instance.leave().and_then(when_empty(instance.inside))
     over = over.with_step(instance.node.id, Action.COMPLETED)
     context.transitions(on_inside_end(context, instance, instance.inside, [over]))
 
@@ -86,8 +85,7 @@ def subprocess(context: TranslationContext, instance: ActivityInstance) -> list[
     assert isinstance(node, e.SubProcess)
     build(context, node, instance.inside)
     ends_with_its_inside(context, instance)
-    both = forget_completions(context, instance.inside, node).then(instance.begin())
-    assert both is not None
+    both = forget_completions(context, instance.inside, node).and_then(instance.begin())
     return product([both], [begin(context, node, instance.inside)])
 
 
@@ -101,8 +99,7 @@ def ad_hoc(context: TranslationContext, instance: ActivityInstance) -> list[Effe
     if node.active_elements is not None or not node.entries:
         net.approximate(node, Exactness.MORE, "any of its activities may be chosen")
         ends_with_its_inside(context, instance)
-        begun = instance.begin().then(begin(context, node, inside))
-        assert begun is not None
+        begun = instance.begin().and_then(begin(context, node, inside))
         begun = replace(begun, reset=forget_completions(context, inside, node).reset)
         bare = replace(
             begun,
@@ -148,8 +145,7 @@ def ad_hoc(context: TranslationContext, instance: ActivityInstance) -> list[Effe
                 if not node.cancel_remaining:
                     net.approximate(node, Exactness.MORE, "it ends though some of it goes on")
             context.transitions(product([looked], going))
-    begun = instance.begin().then(begin(context, node, inside))
-    assert begun is not None
+    begun = instance.begin().and_then(begin(context, node, inside))
     begun = replace(begun, reset=forget_completions(context, inside, node).reset)
     entries = {entry_place(net, x, inside) for x in node.entries}
     return [replace(begun, produce=tuple(n for n in begun.produce if n not in entries))]
@@ -170,8 +166,7 @@ def translate_choices(context: TranslationContext) -> None:
             for n in inside.places
             if net.places[n].element == entry.id and net.places[n].role is not Role.CONTROL
         }
-        both = effect.then(Effect(inhibit=frozenset(busy)))
-        assert both is not None
+        both = effect.and_then(Effect(inhibit=frozenset(busy)))
         net.transition(both, Kind.EXTERNAL, Trigger.ANSWER, entry.id)
 
 
@@ -206,8 +201,7 @@ def call(context: TranslationContext, instance: ActivityInstance) -> list[Effect
         ways = data.write(
             ways, mapping.target, mapping.source, instance.outer, node, into=inside.frame
         )
-    over = instance.leave().then(when_empty(instance.inside))
-    assert over is not None
+    over = instance.leave().and_then(when_empty(instance.inside))
     overs = [over.with_step(node.id, Action.COMPLETED)]
     for mapping in node.mappings.outputs:
         overs = data.write_out(overs, mapping.target, mapping.source, inside, instance.outer, node)

@@ -15,7 +15,7 @@ from m2pem.mission.events import (
 from m2pem.verify.net.petri_net import Action, Exactness, Flag, Kind, Step
 from m2pem.verify.translate.compensation import compensated_by, cut_short, forget_completions
 from m2pem.verify.translate.context import ActivityInstance, CompensatedBy, TranslationContext
-from m2pem.verify.translate.net_builder import Effect, ScopeDraft, entry_place
+from m2pem.verify.translate.net_builder import Effect, ScopeDraft, entry_place, product
 from m2pem.verify.translate.scopes import begin_event_subprocess, handler_instance
 
 Catching = TypeVar("Catching", bound=e.Event)
@@ -76,11 +76,8 @@ def throw_error(
     caught, uncaught_by_all = _catch(context, scope, thrower, instance, code, error_code)
     found = [effect for effect, _ in caught]
     if uncaught_by_all is not None:
-        failed = uncaught_by_all.then(context.end_run(context.failed))
-        assert failed is not None
-        flagged = failed.then(Effect(flag=uncaught, flagged=code))
-        assert flagged is not None
-        found.append(flagged)
+        failed = uncaught_by_all.and_then(context.end_run(context.failed))
+        found.append(failed.and_then(Effect(flag=uncaught, flagged=code)))
     return found
 
 
@@ -97,9 +94,7 @@ def throw_escalation(
     """Return what an escalation leads to, and whether its scope goes on."""
     found, unheard = _catch(context, scope, thrower, None, code, escalation_code)
     if unheard is not None:
-        ignored = unheard.then(Effect(flag=Flag.UNHEARD, flagged=code))
-        assert ignored is not None
-        found.append((ignored, True))
+        found.append((unheard.and_then(Effect(flag=Flag.UNHEARD, flagged=code)), True))
     return found
 
 
@@ -132,16 +127,10 @@ def _catch(
         if here.open is not None:
             start = best(_starts(here, node), code, code_of)
             if start is not None:
-                begun = condition.then(Effect(read=frozenset({here.open})))
-                assert begun is not None
-                found += [
-                    (both, not start.interrupting)
-                    for effect in begin_handler(context, here, start)
-                    if (both := begun.then(effect)) is not None
-                ]
-                without = condition.then(Effect(inhibit=frozenset({here.open})))
-                assert without is not None
-                condition = without
+                begun = condition.and_then(Effect(read=frozenset({here.open})))
+                ways = product([begun], begin_handler(context, here, start))
+                found += [(way, not start.interrupting) for way in ways]
+                condition = condition.and_then(Effect(inhibit=frozenset({here.open})))
     return found, condition
 
 
@@ -158,8 +147,7 @@ def _there(
     """
     if taken_off or compensated_by(context, instance.node) is not CompensatedBy.INSIDE:
         return condition, None
-    there = condition.then(Effect(read=frozenset({instance.active})))
-    assert there is not None
+    there = condition.and_then(Effect(read=frozenset({instance.active})))
     return there, condition.then(Effect(inhibit=frozenset({instance.active})))
 
 
@@ -178,13 +166,8 @@ def _at_boundary(
     if event.interrupting:
         inside = frozenset({instance.inside.index})
         left = Effect(reset_scopes=inside) if taken_off else instance.leave()
-        stopped = left.with_step(instance.node.id, Action.INTERRUPTED)
-        both = condition.then(stopped)
-        assert both is not None
-        condition = both
-    done = condition.then(caught)
-    assert done is not None
-    return done, not event.interrupting
+        condition = condition.and_then(left.with_step(instance.node.id, Action.INTERRUPTED))
+    return condition.and_then(caught), not event.interrupting
 
 
 def begin_handler(
@@ -194,16 +177,11 @@ def begin_handler(
     container = start.container
     assert isinstance(container, e.SubProcess)
     begun = begin_event_subprocess(context, scope, container, (start,))
-    anew = forget_completions(
-        context, handler_instance(context, scope, container).inside, container
-    ).then(begun)
-    assert anew is not None
-    begun = anew
+    inside = handler_instance(context, scope, container).inside
+    begun = forget_completions(context, inside, container).and_then(begun)
     if start.interrupting:
         stop = Effect(interrupt_scopes=frozenset({scope.index}), produce=cut_short(context, scope))
-        both = stop.then(begun)
-        assert both is not None
-        return [both]
+        return [stop.and_then(begun)]
     return [begun]
 
 
@@ -240,7 +218,7 @@ def signal_effects(context: TranslationContext, signal: str) -> list[Effect]:
     """The effects of a signal on catchers, and the processes that it begins."""
     found = [throw_signal(context, signal)]
     for begun in context.begins.get(("signal", signal), ()):
-        found = [both for one in found for way in begun if (both := one.then(way)) is not None]
+        found = product(found, begun)
     return found
 
 
@@ -260,13 +238,11 @@ def message_effects(
     unawaited = Effect(inhibit=frozenset(c.waiting for c in catchers))
     begins = context.begins.get(("message", message), ())
     if begins:
-        return found + [both for way in begins[0] if (both := unawaited.then(way)) is not None]
+        return found + product([unawaited], begins[0])
     if not catchers:
         return [Effect()]
     if kept:
-        unawaited = (
-            unawaited.then(Effect(produce=(_stored_messages(context, message),))) or unawaited
-        )
+        unawaited = unawaited.and_then(Effect(produce=(_stored_messages(context, message),)))
     return [*found, unawaited]
 
 
