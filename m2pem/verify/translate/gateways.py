@@ -8,7 +8,7 @@ from m2pem.mission.reachability import upstream
 from m2pem.verify.net.petri_net import Action, Exactness, Kind, Role, Step, Trigger
 from m2pem.verify.translate.context import TranslationContext
 from m2pem.verify.translate.net_builder import Effect, ScopeDraft, arrival, entry_place, product
-from m2pem.verify.translate.sequence_flows import any_of, is_free_choice, leave
+from m2pem.verify.translate.sequence_flows import any_of, is_free_choice, leave, some_of
 from m2pem.verify.translate.throwing import throw_error
 
 MOST_INCOMING = 8
@@ -24,18 +24,28 @@ def _come(context: TranslationContext, node: e.FlowNode, scope: ScopeDraft) -> E
 def exclusive(context: TranslationContext, node: e.FlowNode, scope: ScopeDraft) -> None:
     """Take the first true flow, else the default one; every token passes."""
     assert isinstance(node, e.ExclusiveGateway)
-    if is_free_choice(node):
-        ways = any_of(context, scope, node, one=True)
-    else:
-        ways = leave(
-            context,
-            scope,
-            node,
-            node.default,
-            lambda code: throw_error(context, scope, node, None, code),
-            first_only=True,
-        )
+    ways = _ways(context, node, scope, one=True)
     context.transitions(product([_come(context, node, scope)], ways))
+
+
+def _ways(
+    context: TranslationContext,
+    node: e.ExclusiveGateway | e.InclusiveGateway,
+    scope: ScopeDraft,
+    *,
+    one: bool,
+) -> list[Effect]:
+    """How a token goes on: by `one` flow, or by every true one."""
+    if is_free_choice(node):
+        return any_of(context, scope, node, one=one)
+    return leave(
+        context,
+        scope,
+        node,
+        node.default,
+        lambda code: throw_error(context, scope, node, None, code),
+        first_only=one,
+    )
 
 
 def parallel(context: TranslationContext, node: e.FlowNode, scope: ScopeDraft) -> None:
@@ -57,16 +67,7 @@ def parallel(context: TranslationContext, node: e.FlowNode, scope: ScopeDraft) -
 def inclusive(context: TranslationContext, node: e.FlowNode, scope: ScopeDraft) -> None:
     """Take every true flow. A join waits for all tokens that can still come."""
     assert isinstance(node, e.InclusiveGateway)
-    if is_free_choice(node):
-        ways = any_of(context, scope, node, one=False)
-    else:
-        ways = leave(
-            context,
-            scope,
-            node,
-            node.default,
-            lambda code: throw_error(context, scope, node, None, code),
-        )
+    ways = _ways(context, node, scope, one=False)
     if len(node.incoming) <= 1:
         context.transitions(product([_come(context, node, scope)], ways))
         return
@@ -87,29 +88,28 @@ def joined(context: TranslationContext, node: e.FlowNode, scope: ScopeDraft) -> 
             node, Exactness.MORE, "whether more can come is not looked at: too many flows come in"
         )
         return [
-            Effect(steps=(Step(node.id, Action.COMPLETED),), consume=tuple(each))
-            for each in ([*((p,) for p in places), tuple(places)])
+            Effect(steps=(Step(node.id, Action.COMPLETED),), consume=each)
+            for each in some_of(places, MOST_INCOMING)
         ]
     reach = upstream(node)
     tokens = _tokens_by_node(context, scope)
     found: list[Effect] = []
-    for size in range(1, len(flows) + 1):
-        for chosen in itertools.combinations(range(len(flows)), size):
-            bits = sum(1 << number for number in chosen)
-            blocking = {
-                place
-                for other, reachable in reach.items()
-                if reachable & ~bits and not reachable & bits
-                for place in tokens.get(other, ())
-            }
-            absent = {places[n] for n in range(len(flows)) if n not in chosen}
-            found.append(
-                Effect(
-                    steps=(Step(node.id, Action.COMPLETED),),
-                    consume=tuple(places[n] for n in chosen),
-                    inhibit=frozenset(blocking | absent),
-                )
+    for chosen in some_of(range(len(flows)), MOST_INCOMING):
+        bits = sum(1 << number for number in chosen)
+        blocking = {
+            place
+            for other, reachable in reach.items()
+            if reachable & ~bits and not reachable & bits
+            for place in tokens.get(other, ())
+        }
+        absent = {places[n] for n in range(len(flows)) if n not in chosen}
+        found.append(
+            Effect(
+                steps=(Step(node.id, Action.COMPLETED),),
+                consume=tuple(places[n] for n in chosen),
+                inhibit=frozenset(blocking | absent),
             )
+        )
     return found
 
 
@@ -148,14 +148,7 @@ def complex_gateway(context: TranslationContext, node: e.FlowNode, scope: ScopeD
     resetting = context.net.place(node, scope, Role.CONTROL, ":resets")
 
     def translate_later() -> None:
-        subsets = [
-            chosen
-            for size in range(1, len(places) + 1)
-            for chosen in itertools.combinations(range(len(places)), size)
-        ]
-        if len(places) > MOST_INCOMING:
-            subsets = [*((n,) for n in range(len(places))), tuple(range(len(places)))]
-        for chosen in subsets:
+        for chosen in some_of(range(len(places)), MOST_INCOMING):
             active = _activates(node, chosen)
             if active is False:
                 continue

@@ -1,6 +1,6 @@
 """Standard loops and multi-instance activities."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 
 from m2pem.errors import ExpressionError
@@ -15,6 +15,7 @@ from m2pem.verify.translate.context import (
     ActivityInstance,
     TranslationContext,
     behavior_of,
+    first,
     held_by_instance,
 )
 from m2pem.verify.translate.data import ERROR, Truth
@@ -66,14 +67,7 @@ def _instance(
     node, net = whole.node, context.net
     held, behavior = held_by_instance(context, node)
     suffix = f"[{number}]"
-    active = net.place(
-        node,
-        whole.inside,
-        Role.ACTIVE,
-        suffix,
-        resources=held,
-        behavior=behavior,
-    )
+    active = net.place(node, whole.inside, Role.ACTIVE, suffix, resources=held, behavior=behavior)
     inside = net.scope(node, whole.inside, step=f"{node.id}{suffix}")
     instance = ActivityInstance(node, whole.inside, inside, active, lambda: [], boundary=False)
     inside.instance = instance
@@ -106,10 +100,8 @@ class _Sequence:
         self.instance.done = lambda: product(
             [note_instance_completion(context, self.instance, 0)], self.ends()
         )
-        for effect in product(
-            [Effect(consume=(self.begins,))], _begin_instance(work, context, self.instance)
-        ):
-            context.net.transition(effect)
+        begun_work = _begin_instance(work, context, self.instance)
+        context.transitions(product([Effect(consume=(self.begins,))], begun_work))
 
     def ends(self) -> list[Effect]:
         """Translate the end of an instance."""
@@ -137,12 +129,7 @@ def _standard_loop(
         when = Effect(guard=guard)
         if goes_on == ERROR:
             ways = throw_error(context, whole.outer, node, whole, "EXPRESSION", Flag.UNCAUGHT)
-            ways = product(
-                [
-                    stop,
-                ],
-                product([Effect(consume=(whole.active,))], ways),
-            )
+            ways = product([stop], product([Effect(consume=(whole.active,))], ways))
         elif not goes_on:
             ways = product([stop], _over(whole))
         elif not rounds:
@@ -182,10 +169,6 @@ def _condition_cases(
         return [({}, True)]
     if not context.data.is_followed([loop.condition], whole.node):
         context.net.approximate(whole.node, Exactness.MORE, "how often it goes round is not known")
-
-    def first(truths: Sequence[Truth]) -> Truth:
-        return truths[0]
-
     return context.data.cases([loop.condition], whole.outer, whole.node, first)
 
 
@@ -267,8 +250,8 @@ def _parallel(
     for number, (instance, begin) in enumerate(zip(activity_instances, begins, strict=True)):
         instance.cut = lambda: ends
         instance.done = _note_and_end(context, instance, number, ends)
-        for effect in product([Effect(consume=(begin,))], _begin_instance(work, context, instance)):
-            context.net.transition(effect)
+        begun_work = _begin_instance(work, context, instance)
+        context.transitions(product([Effect(consume=(begin,))], begun_work))
     when_empty = Effect(empty_scopes=frozenset({whole.inside.index}))
     context.transitions(product([when_empty], _over(whole)))
     sizes = [total] if known else range(total + 1)

@@ -207,15 +207,7 @@ def _stopped(
     known = context.moving.get(key)
     if known is not None:
         return known
-    place = context.moving[key] = context.net.place(
-        context.process, context.everything, Role.CONTROL, name, several=len(group.vehicles) > 1
-    )
-    context.net.places[place] = replace(
-        context.net.places[place],
-        most=len(group.vehicles),
-        inside=tuple(sorted(inside)),
-        vehicles=group.vehicles,
-    )
+    place = context.moving[key] = _place_of_vehicles(context, group, name, inside)
     possible = [each for each in after if group.standings[each] <= inside] or list(after)
     for standing in dict.fromkeys(possible):
         there = standing_place(context, group, standing)
@@ -246,12 +238,14 @@ def standing_place(context: TranslationContext, group: Group, standing: int) -> 
     if len(group.standings) < 2:
         return None
     inside = group.standings[standing]
+    name = f":stands {standing + 1} {group.name} in {_said(inside)}"
+    return _place_of_vehicles(context, group, name, inside)
+
+
+def _place_of_vehicles(context: TranslationContext, group: Group, name: str, inside: Spaces) -> int:
+    """Return a place with a token for each vehicle of a group that is at rest in some spaces."""
     place = context.net.place(
-        context.process,
-        context.everything,
-        Role.CONTROL,
-        f":stands {standing + 1} {group.name} in {_said(inside)}",
-        several=len(group.vehicles) > 1,
+        context.process, context.everything, Role.CONTROL, name, several=len(group.vehicles) > 1
     )
     context.net.places[place] = replace(
         context.net.places[place],

@@ -2,6 +2,7 @@
 
 import itertools
 from collections.abc import Callable, Sequence
+from typing import TypeVar
 
 from m2pem.mission import elements as e
 from m2pem.verify.net.petri_net import Action, Exactness, Step
@@ -10,7 +11,9 @@ from m2pem.verify.translate.data import ERROR, Truth
 from m2pem.verify.translate.net_builder import Effect, ScopeDraft, arrival, product
 
 MOST_SUBSETS = 6
-"""Most flows of which every combination is tried; of more, each alone and all together."""
+"""Most flows, or activities of an ad-hoc subprocess, of which every combination is tried."""
+
+T = TypeVar("T")
 
 Fail = Callable[[str], list[Effect]]
 """What an error with a code leads to; the token is removed already."""
@@ -97,18 +100,14 @@ def any_of(
     context.net.approximate(
         node, Exactness.MORE, "no flow has a condition, so any of them may be taken"
     )
-    flows = node.outgoing
-    if one:
-        chosen: list[tuple[e.SequenceFlow, ...]] = [(flow,) for flow in flows]
-    else:
-        chosen = some_of(flows)
+    chosen = [(flow,) for flow in node.outgoing] if one else some_of(node.outgoing)
     return [along(context, scope, each) for each in chosen]
 
 
-def some_of(flows: Sequence[e.SequenceFlow]) -> list[tuple[e.SequenceFlow, ...]]:
-    """The non-empty combinations of flows."""
-    if len(flows) > MOST_SUBSETS:
-        return [*((flow,) for flow in flows), tuple(flows)]
+def some_of(these: Sequence[T], most: int = MOST_SUBSETS) -> list[tuple[T, ...]]:
+    """The non-empty combinations of these; of more than `most`, each alone and all together."""
+    if len(these) > most:
+        return [*((each,) for each in these), tuple(these)]
     return [
-        each for size in range(1, len(flows) + 1) for each in itertools.combinations(flows, size)
+        each for size in range(1, len(these) + 1) for each in itertools.combinations(these, size)
     ]

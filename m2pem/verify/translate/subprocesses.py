@@ -1,7 +1,6 @@
 """Processes, subprocesses, event subprocesses, ad-hoc subprocesses and call activities."""
 
 from dataclasses import replace
-from itertools import combinations
 
 from m2pem.mission import elements as e
 from m2pem.verify.net.petri_net import Action, Exactness, Kind, Place, Role, Step, Trigger
@@ -11,6 +10,7 @@ from m2pem.verify.translate.context import ActivityInstance, TranslationContext
 from m2pem.verify.translate.net_builder import Effect, ScopeDraft, entry_place, product
 from m2pem.verify.translate.parallel_multiple import all_must_come, trigger_places
 from m2pem.verify.translate.scopes import begin, handler_instance, when_empty
+from m2pem.verify.translate.sequence_flows import some_of
 
 
 def build(context: TranslationContext, container: e.Container, scope: ScopeDraft) -> None:
@@ -113,7 +113,7 @@ def ad_hoc(context: TranslationContext, instance: ActivityInstance) -> list[Effe
             Effect(),
             *(
                 Effect(produce=tuple(entry_place(net, x, inside) for x in some))
-                for some in _subsets(node.entries)
+                for some in some_of(node.entries)
             ),
         ]
         return product([bare], chosen)
@@ -149,12 +149,6 @@ def ad_hoc(context: TranslationContext, instance: ActivityInstance) -> list[Effe
     begun = replace(begun, reset=forget_completions(context, inside, node).reset)
     entries = {entry_place(net, x, inside) for x in node.entries}
     return [replace(begun, produce=tuple(n for n in begun.produce if n not in entries))]
-
-
-def _subsets(nodes: tuple[e.FlowNode, ...]) -> list[tuple[e.FlowNode, ...]]:
-    if len(nodes) > 6:
-        return [*((n,) for n in nodes), nodes]
-    return [c for size in range(1, len(nodes) + 1) for c in combinations(nodes, size)]
 
 
 def translate_choices(context: TranslationContext) -> None:
