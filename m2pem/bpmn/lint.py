@@ -21,25 +21,16 @@ from m2pem.mission.elements import (
     Activity,
     CallActivity,
     Container,
-    EndEvent,
     Event,
     ExclusiveGateway,
     FlowNode,
     InclusiveGateway,
-    IntermediateThrowEvent,
     Process,
-    ReceiveTask,
-    SendTask,
     SubProcess,
+    caught_by,
+    thrown_by,
 )
-from m2pem.mission.events import (
-    ErrorEventDefinition,
-    EventDefinition,
-    Message,
-    MessageEventDefinition,
-    Signal,
-    SignalEventDefinition,
-)
+from m2pem.mission.events import ErrorEventDefinition, Message, Signal, signals_and_messages
 from m2pem.mission.loops import MultiInstance
 from m2pem.mission.mission import Mission
 from m2pem.mission.reachability import components, unreached
@@ -172,12 +163,9 @@ def _outside_only(mission: Mission) -> Iterator[Finding]:
         if isinstance(node, Activity) and isinstance(node.loop, MultiInstance):
             for root in _thrown_by_instances(node.loop):
                 thrown.add((type(root).__name__, root.id))
-        for root in _roots(node):
-            key = (type(root).__name__, root.id)
-            if isinstance(node, EndEvent | IntermediateThrowEvent | SendTask):
-                thrown.add(key)
-            else:
-                caught.setdefault(key, (root, []))[1].append(node)
+        thrown.update((type(root).__name__, root.id) for root in thrown_by(node))
+        for root in caught_by(node):
+            caught.setdefault((type(root).__name__, root.id), (root, []))[1].append(node)
     for key, (root, catchers) in caught.items():
         known = (mission.signals if isinstance(root, Signal) else mission.messages).get(root.id)
         sent = root.from_operator or (known is not None and known.from_operator)
@@ -196,26 +184,10 @@ def _outside_only(mission: Mission) -> Iterator[Finding]:
         )
 
 
-def _roots(node: FlowNode) -> Iterator[Signal | Message]:
-    if isinstance(node, SendTask | ReceiveTask):
-        if node.message is not None:
-            yield node.message
-    elif isinstance(node, Event):
-        yield from _named(node.definitions)
-
-
 def _thrown_by_instances(loop: MultiInstance) -> Iterator[Signal | Message]:
-    yield from _named(loop.events)
+    yield from signals_and_messages(loop.events)
     for each in loop.complex:
-        yield from _named(each.events)
-
-
-def _named(definitions: Iterable[EventDefinition]) -> Iterator[Signal | Message]:
-    for definition in definitions:
-        if isinstance(definition, SignalEventDefinition):
-            yield definition.signal
-        elif isinstance(definition, MessageEventDefinition):
-            yield definition.message
+        yield from signals_and_messages(each.events)
 
 
 # --- calls --------------------------------------------------------------------------------------

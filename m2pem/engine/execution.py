@@ -23,22 +23,22 @@ from m2pem.mission.elements import (
     Activity,
     AdHocSubProcess,
     CallActivity,
-    EndEvent,
     Event,
     EventBasedGateway,
     FlowNode,
     IntermediateCatchEvent,
-    IntermediateThrowEvent,
     Process,
     ReceiveTask,
     SequenceFlow,
     StartEvent,
     SubProcess,
     Transaction,
+    caught_by,
 )
 from m2pem.mission.events import (
     ConditionalEventDefinition,
     EventDefinition,
+    Message,
     MessageEventDefinition,
     SignalEventDefinition,
     TimerEventDefinition,
@@ -430,10 +430,5 @@ def armed_triggers(start: FlowNode) -> Sequence[EventDefinition]:
 @lru_cache(maxsize=16)
 def received_messages(mission: Mission) -> frozenset[str]:
     """Return the ids of the messages that an element of a mission catches."""
-    return frozenset(
-        definition.message.id
-        for node in mission.nodes
-        if not isinstance(node, EndEvent | IntermediateThrowEvent)
-        for definition in definitions_of(node)
-        if isinstance(definition, MessageEventDefinition)
-    )
+    caught = (each for node in mission.nodes for each in caught_by(node))
+    return frozenset(each.id for each in caught if isinstance(each, Message))

@@ -35,18 +35,17 @@ from m2pem.mission.elements import (
     ManualTask,
     ParallelGateway,
     ReceiveTask,
-    SendTask,
     SequenceFlow,
     StartEvent,
     SubProcess,
     Task,
     UserTask,
+    thrown_by,
 )
 from m2pem.mission.events import (
     ConditionalEventDefinition,
     EventDefinition,
-    MessageEventDefinition,
-    SignalEventDefinition,
+    signals_and_messages,
 )
 from m2pem.mission.loops import MultiInstance
 from m2pem.mission.mission import Mission
@@ -138,7 +137,8 @@ class ConcurrentTasks:
     """
 
     def __init__(self, mission: Mission, matters: Callable[[Activity], bool]) -> None:
-        self._thrown = _thrown(mission)
+        self._thrown = {each.id for node in mission.nodes for each in thrown_by(node)}
+        self._thrown |= {each.id for each in mission.signals.values() if each.returned}
         self._matters = matters
         self._begins: dict[Container, _Fork] = {}
         self._forks: dict[FlowNode, _Fork] = {}
@@ -245,7 +245,7 @@ class ConcurrentTasks:
     def _may_come(self, definition: EventDefinition) -> bool:
         if isinstance(definition, ConditionalEventDefinition):
             return False
-        return _sent_by(definition).isdisjoint(self._thrown)
+        return all(each.id not in self._thrown for each in signals_and_messages([definition]))
 
     # --- what may be active together --------------------------------------------------------------
 
@@ -456,30 +456,6 @@ def _inside(node: FlowNode) -> Container | None:
     if isinstance(node, SubProcess) and not node.triggered_by_event:
         return node
     return node.called if isinstance(node, CallActivity) else None
-
-
-def _thrown(mission: Mission) -> set[str]:
-    """Return the ids of the signals and messages that elements of a mission throw."""
-    found: set[str] = set()
-    for node in mission.nodes:
-        if isinstance(node, SendTask) and node.message is not None:
-            found.add(node.message.id)
-        elif isinstance(node, Event) and not isinstance(
-            node, IntermediateCatchEvent | BoundaryEvent | StartEvent
-        ):
-            found.update(*map(_sent_by, node.definitions))
-    found |= {each.id for each in mission.signals.values() if each.returned}
-    return found
-
-
-def _sent_by(definition: EventDefinition) -> set[str]:
-    """Return the id of the signal or message of a definition."""
-    match definition:
-        case SignalEventDefinition():
-            return {definition.signal.id}
-        case MessageEventDefinition():
-            return {definition.message.id}
-    return set()
 
 
 def _begins_at_once(activity: Activity) -> bool:

@@ -14,10 +14,7 @@ from enum import StrEnum
 from typing import Self, TypeAlias, Union
 
 from m2pem.mission.behavior import Behavior, Mappings, Prompt, Script, ServiceCall
-from m2pem.mission.events import (
-    EventDefinition,
-    Message,
-)
+from m2pem.mission.events import EventDefinition, Message, Signal, signals_and_messages
 from m2pem.mission.expression import Expression
 from m2pem.mission.loops import MultiInstance, StandardLoop
 
@@ -392,3 +389,23 @@ class BoundaryEvent(Event):
 
     interrupting: bool = True
     attached_to: Activity = field(init=False, repr=False)
+
+
+def exchanged(node: FlowNode) -> list[Signal | Message]:
+    """Return the signals and messages that an element throws or catches, in their order."""
+    if isinstance(node, SendTask | ReceiveTask):
+        return [node.message] if node.message is not None else []
+    return signals_and_messages(node.definitions) if isinstance(node, Event) else []
+
+
+def thrown_by(node: FlowNode) -> list[Signal | Message]:
+    """Return the signals and messages that an element throws."""
+    return exchanged(node) if isinstance(node, _THROWING) else []
+
+
+def caught_by(node: FlowNode) -> list[Signal | Message]:
+    """Return the signals and messages that an element catches."""
+    return [] if isinstance(node, _THROWING) else exchanged(node)
+
+
+_THROWING = (SendTask, EndEvent, IntermediateThrowEvent)

@@ -1,6 +1,6 @@
 """Event definitions and the root elements they refer to (BPMN 2.0.2, clauses 8.4 and 10.5.5)."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -115,6 +115,17 @@ def escalation_code(definition: EventDefinition) -> str | None:
     if not isinstance(definition, EscalationEventDefinition):
         return None
     return definition.escalation.code if definition.escalation is not None else ""
+
+
+def signals_and_messages(definitions: Iterable[EventDefinition]) -> list[Signal | Message]:
+    """Return the signals and messages that event definitions name, in their order."""
+    found: list[Signal | Message] = []
+    for each in definitions:
+        if isinstance(each, SignalEventDefinition):
+            found.append(each.signal)
+        elif isinstance(each, MessageEventDefinition):
+            found.append(each.message)
+    return found
 
 
 def caught_data(event: Sequence[EventDefinition], code: str, reason: str = "") -> dict[str, str]:

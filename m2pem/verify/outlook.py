@@ -23,14 +23,14 @@ from typing import Any, Protocol
 
 from m2pem.bpmn.data_names import unwritten
 from m2pem.engine import inputs as i
-from m2pem.engine.execution import definitions_of, triggered_starts
+from m2pem.engine.execution import triggered_starts
 from m2pem.engine.records import IncidentOpened, Record, RunOutcome, Trigger
 from m2pem.engine.run import MissionRun
 from m2pem.engine.state import BehaviorPhase, Incident, RunState, RunStatus, Token
 from m2pem.engine.throwing import catcher_of_error
 from m2pem.mission.catalogue import BehaviorState
-from m2pem.mission.elements import Activity, Event, FlowNode
-from m2pem.mission.events import Message, Signal
+from m2pem.mission.elements import Activity, Event, exchanged
+from m2pem.mission.events import Signal
 from m2pem.mission.mission import Mission, version_of
 from m2pem.verify.state_key import NotKnownError, state_key
 
@@ -241,7 +241,7 @@ class _Explorer:
         self._begun = [
             (Trigger.SIGNAL if isinstance(each, Signal) else Trigger.MESSAGE, each.id, start)
             for start in triggered_starts(mission, root)
-            for each in _roots(start)
+            for each in exchanged(start)
             if each.from_operator
         ]
         self._labels = {node.id: node.label for node in mission.nodes}
@@ -368,15 +368,6 @@ class _Explorer:
             raise NotKnownError(f"more than {self._limits.seconds:g} s are needed")
 
 
-def _roots(node: FlowNode) -> list[Signal | Message]:
-    """Return the signals and messages that an element throws or catches."""
-    of_events = [getattr(each, name, None) for each in definitions_of(node) for name in _KINDS]
-    return [each for each in (*of_events, getattr(node, "message", None)) if each is not None]
-
-
-_KINDS = ("signal", "message")
-
-
 def _bringing(mission: Mission) -> frozenset[str]:
     """Return the ids of what brings data, or is for those receivers whose keys it matches."""
     keyed = [ref for ref, each in mission.messages.items() if each.correlation_key is not None]
@@ -385,7 +376,7 @@ def _bringing(mission: Mission) -> frozenset[str]:
         root.id
         for node in mission.nodes
         if isinstance(node, Activity | Event) and (node.data_flow.inputs or node.data_flow.outputs)
-        for root in _roots(node)
+        for root in exchanged(node)
     }
 
 

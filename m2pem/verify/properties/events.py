@@ -3,39 +3,23 @@ handled?
 """
 
 from m2pem.mission import elements as e
-from m2pem.mission.events import MessageEventDefinition, RootElement, SignalEventDefinition
+from m2pem.mission.events import Signal
 from m2pem.verify.net.petri_net import Action, Flag, Step, Transition, Trigger
 from m2pem.verify.properties.results import Result, SearchedMission, Violation
-from m2pem.verify.translate.events import awaited
 from m2pem.verify.translate.mission import messages_from_black_box_pools
-from m2pem.verify.translate.throwing import thrown_by
-
-
-def _thrown(searched: SearchedMission) -> set[str]:
-    found: set[str] = set()
-    for node in searched.mission.nodes:
-        signals, messages = thrown_by(node)
-        found |= signals | messages
-    return found
 
 
 def can_be_triggered(searched: SearchedMission) -> Result:
     """Every catcher waits for a signal or message that something sends."""
     mission = searched.mission
-    sent = _thrown(searched) | set(messages_from_black_box_pools(mission))
+    sent = {each.id for node in mission.nodes for each in e.thrown_by(node)}
+    sent |= messages_from_black_box_pools(mission)
     sent |= {s.id for s in mission.signals.values() if s.from_operator or s.returned}
     sent |= {m.id for m in mission.messages.values() if m.from_operator}
     violations: list[Violation] = []
     for node in mission.nodes:
-        if isinstance(node, e.EndEvent | e.IntermediateThrowEvent):
-            continue
-        for definition in awaited(node):
-            root: RootElement | None = None
-            if isinstance(definition, SignalEventDefinition):
-                root = definition.signal
-            elif isinstance(definition, MessageEventDefinition):
-                root = definition.message
-            if root is not None and root.id not in sent:
+        for root in e.caught_by(node):
+            if root.id not in sent:
                 violations.append(
                     Violation(
                         f"{searched.label(node.id)} waits for {root.name or root.id}, which"
@@ -55,16 +39,13 @@ def can_be_triggered(searched: SearchedMission) -> Result:
 def is_caught(searched: SearchedMission) -> Result:
     """Every signal or escalation that is thrown can be caught."""
     mission = searched.mission
-    caught: set[str] = set()
-    for node in mission.nodes:
-        if isinstance(node, e.EndEvent | e.IntermediateThrowEvent):
-            continue
-        for definition in awaited(node):
-            if isinstance(definition, SignalEventDefinition):
-                caught.add(definition.signal.id)
+    caught = {
+        each.id for node in mission.nodes for each in e.caught_by(node) if isinstance(each, Signal)
+    }
     violations: list[Violation] = []
     for node in mission.nodes:
-        for signal in sorted(thrown_by(node)[0] - caught):
+        thrown = {each.id for each in e.thrown_by(node) if isinstance(each, Signal)}
+        for signal in sorted(thrown - caught):
             violations.append(
                 Violation(
                     f"{searched.label(node.id)} throws signal {signal}, which nothing catches",

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+from m2pem.engine.execution import definitions_of
 from m2pem.mission import elements as e
 from m2pem.mission.events import (
     CancelEventDefinition,
@@ -168,7 +169,7 @@ def event_based(context: TranslationContext, node: e.FlowNode, scope: ScopeDraft
         target = flow.target
         taken = Effect(steps=(Step(flow.id, Action.TAKEN),))
         ways = product([taken], after(context, target, scope))
-        for definition in awaited(target):
+        for definition in definitions_of(target):
             made = _trigger(context, target, scope, definition, waiting, ways, number)
             number += 1
             together = isinstance(target, e.Event) and all_must_come(target)
@@ -178,13 +179,6 @@ def event_based(context: TranslationContext, node: e.FlowNode, scope: ScopeDraft
                 )
             if isinstance(definition, TimerEventDefinition) and not (node.parallel or together):
                 runs(context, waiting, fixed(definition), (waiting,), made)
-
-
-def awaited(node: e.FlowNode) -> tuple[EventDefinition, ...]:
-    """The triggers of a catch event or receive task."""
-    if isinstance(node, e.ReceiveTask):
-        return (MessageEventDefinition(node.line, node.message),) if node.message else ()
-    return node.definitions if isinstance(node, e.Event) else ()
 
 
 def after(context: TranslationContext, node: e.FlowNode, scope: ScopeDraft) -> list[Effect]:

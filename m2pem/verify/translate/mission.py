@@ -3,12 +3,14 @@
 from collections.abc import Callable
 from dataclasses import replace
 
+from m2pem.engine.execution import definitions_of
 from m2pem.fleet.default_fleet import fleet_for
 from m2pem.fleet.fleet import Fleet
 from m2pem.mission import elements as e
 from m2pem.mission.events import (
     ConditionalEventDefinition,
     EventDefinition,
+    Message,
     MessageEventDefinition,
     SignalEventDefinition,
     TimerEventDefinition,
@@ -21,7 +23,7 @@ from m2pem.verify.translate.activities import translate_contention
 from m2pem.verify.translate.assumed import restrict
 from m2pem.verify.translate.compensation import release_claims
 from m2pem.verify.translate.context import Catcher, TranslationContext, what_and_ref
-from m2pem.verify.translate.events import after, awaited
+from m2pem.verify.translate.events import after
 from m2pem.verify.translate.keeping import release_at_the_end
 from m2pem.verify.translate.moving import initial_places
 from m2pem.verify.translate.net_builder import (
@@ -47,7 +49,6 @@ from m2pem.verify.translate.throwing import (
     deliver_stored,
     message_effects,
     signal_effects,
-    thrown_by,
 )
 from m2pem.verify.translate.timers import put_in_order, timer_us
 from m2pem.verify.translate.waiting_order import follow_order
@@ -148,7 +149,7 @@ def _instances(context: TranslationContext, process: e.Process) -> None:
         build(context, process, scope)
         scopes.append((scope, alive(context, process, scope)))
     for start in starts:
-        for definition in awaited(start):
+        for definition in definitions_of(start):
             _begun_by(context, process, start, definition, scopes)
 
 
@@ -165,7 +166,7 @@ def _counted_instances(
     )
     build(context, process, scope)
     for start in starts:
-        for definition in awaited(start):
+        for definition in definitions_of(start):
             begun = Effect(
                 steps=(Step(start.id, Action.TRIGGERED),),
                 produce=(entry_place(context.net, start, scope),),
@@ -225,7 +226,7 @@ def _first_of_several(
     """Translate the first of several triggers of a start event; the instance awaits the others."""
     places = trigger_places(context, start, scope)
     waiting = context.net.place(start, scope, Role.ACTIVE)
-    triggers = [each for each in awaited(start) if isinstance(each, AWAITED)]
+    triggers = [each for each in definitions_of(start) if isinstance(each, AWAITED)]
     came = [
         there if each is definition else yet
         for each, there, yet in zip(triggers, places.came, places.awaited, strict=True)
@@ -238,9 +239,7 @@ def _first_of_several(
 
 def _outside(context: TranslationContext) -> None:
     mission = context.mission
-    thrown_messages: set[str] = set()
-    for node in mission.nodes:
-        thrown_messages |= thrown_by(node)[1]
+    thrown_messages = {each.id for node in mission.nodes for each in e.thrown_by(node)}
     for message in sorted(thrown_messages & set(context.messages)):
         deliver_stored(context, message)
     for signal in mission.signals.values():
@@ -263,9 +262,7 @@ def messages_from_black_box_pools(mission: Mission) -> frozenset[str]:
         if flow.source_id not in mission.elements:
             target = mission.elements.get(flow.target_id)
             if isinstance(target, e.Event | e.ReceiveTask):
-                for definition in awaited(target):
-                    if isinstance(definition, MessageEventDefinition):
-                        found.add(definition.message.id)
+                found.update(each.id for each in e.exchanged(target) if isinstance(each, Message))
     return frozenset(found)
 
 

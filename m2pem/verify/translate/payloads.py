@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from m2pem.errors import ExpressionError
 from m2pem.mission import elements as e
 from m2pem.mission.behavior import Mapping
-from m2pem.mission.events import EventDefinition, MessageEventDefinition, SignalEventDefinition
 from m2pem.mission.expression import Expression
 from m2pem.mission.expression.tree import Name
 from m2pem.mission.mission import Mission
@@ -33,24 +32,25 @@ class Payloads:
         self._open_world = open_world
         self._sent: dict[str, list[dict[str, Expression | None]]] = {}
         for node in mission.nodes:
-            for ref in _sends(node):
+            for root in e.thrown_by(node):
                 assert isinstance(node, e.Activity | e.Event)
                 inputs = {m.target: _constant(m) for m in node.data_flow.inputs}
-                self._sent.setdefault(ref, []).append(inputs)
+                self._sent.setdefault(root.id, []).append(inputs)
 
     def received_values(self, node: e.FlowNode) -> list[ReceivedValue]:
         """Return the values that a catch event or receive task may get by any of its triggers."""
         found: dict[str, ReceivedValue] = {}
-        refs = list(_catches(node))
-        for ref in refs:
-            for each in self._by(node, ref):
+        roots = e.caught_by(node)
+        for root in roots:
+            for each in self._by(node, root.id):
                 known = found.get(each.key)
                 sources = (*(known.sources if known else ()), *each.sources)
                 anything = any(source is None for source in sources)
                 found[each.key] = ReceivedValue(
                     each.key, (None,) if anything else sources, each.perhaps
                 )
-        if len(refs) > 1 or len(_definitions(node)) > len(refs):
+        definitions = node.definitions if isinstance(node, e.Event) else ()
+        if len(roots) > 1 or len(definitions) > len(roots):
             return [ReceivedValue(each.key, each.sources, perhaps=True) for each in found.values()]
         return list(found.values())
 
@@ -92,33 +92,3 @@ def _constant(mapping: Mapping) -> Expression | None:
     except ExpressionError:
         return None
     return mapping.source if isinstance(value, _SIMPLE) else None
-
-
-def _definitions(node: e.FlowNode) -> tuple[EventDefinition, ...]:
-    return node.definitions if isinstance(node, e.Event) else ()
-
-
-def _sends(node: e.FlowNode) -> list[str]:
-    if isinstance(node, e.SendTask) and node.message is not None:
-        return [node.message.id]
-    if isinstance(node, e.EndEvent | e.IntermediateThrowEvent):
-        return _refs(node.definitions)
-    return []
-
-
-def _catches(node: e.FlowNode) -> list[str]:
-    if isinstance(node, e.ReceiveTask):
-        return [node.message.id] if node.message is not None else []
-    if isinstance(node, e.EndEvent | e.IntermediateThrowEvent):
-        return []
-    return _refs(_definitions(node))
-
-
-def _refs(definitions: tuple[EventDefinition, ...]) -> list[str]:
-    found = []
-    for each in definitions:
-        if isinstance(each, SignalEventDefinition):
-            found.append(each.signal.id)
-        elif isinstance(each, MessageEventDefinition):
-            found.append(each.message.id)
-    return found

@@ -7,8 +7,6 @@ from m2pem.mission import elements as e
 from m2pem.mission.events import (
     ErrorEventDefinition,
     EventDefinition,
-    MessageEventDefinition,
-    SignalEventDefinition,
     error_code,
     escalation_code,
 )
@@ -302,18 +300,3 @@ def deliver_stored(context: TranslationContext, message: str) -> None:
             produce=(catcher.caught,),
         )
         context.net.transition(taken, Kind.INTERNAL)
-
-
-def thrown_by(node: e.FlowNode) -> tuple[set[str], set[str]]:
-    """Ids of the signals and messages that an element throws."""
-    signals: set[str] = set()
-    messages: set[str] = set()
-    if isinstance(node, e.SendTask) and node.message is not None:
-        messages.add(node.message.id)
-    if isinstance(node, e.EndEvent | e.IntermediateThrowEvent):
-        for definition in node.definitions:
-            if isinstance(definition, SignalEventDefinition):
-                signals.add(definition.signal.id)
-            elif isinstance(definition, MessageEventDefinition):
-                messages.add(definition.message.id)
-    return signals, messages
