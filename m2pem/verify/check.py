@@ -73,6 +73,13 @@ class Report:
         return (self.watched or self.net) if result.property == INTERRUPTED else self.net
 
     @property
+    def interrupted(self) -> bool:
+        """Whether a person has ended a search."""
+        return self.found.stopped is Stopped.INTERRUPTED or any(
+            each.covered.endswith(Stopped.INTERRUPTED) for each in self.results
+        )
+
+    @property
     def verdict(self) -> Verdict:
         """VIOLATED if any property that is no mere warning is; else MAY_BE_VIOLATED or UNDECIDED if
         any is."""

@@ -118,7 +118,7 @@ class _Check:
         """Check what assumes something once more, without that; None: nothing does, or a person has
         ended the search."""
         asked = [each for each in self.asked if self.assumed & each.assumed]
-        if _interrupted(report) or not (self.assumed or asked):
+        if report.interrupted or not (self.assumed or asked):
             return None
         if self.assumed:
             plain = self.checks.properties(NOTHING, self._rest())
@@ -141,7 +141,7 @@ class _Check:
     def _with_hints(self, report: Report) -> Report:
         doubtful = {_key(each) for each in report.results if self._may_hold_without_failures(each)}
         small = self._small()
-        if not doubtful or _interrupted(report) or report.states > SMALL_STATES:
+        if not doubtful or report.interrupted or report.states > SMALL_STATES:
             return report
         found = replace(report, results=(), engine="builtin")
         if any(not required for _, required in doubtful):
@@ -166,7 +166,7 @@ class _Check:
         ]
         for under in (NOTHING, NO_FAILURES):
             small = self._small()
-            if not asked or _interrupted(report) or report.states > SMALL_STATES:
+            if not asked or report.interrupted or report.states > SMALL_STATES:
                 break
             plain = replace(report, results=(), engine="builtin")
             found = self.short.requirements(plain, asked, under, small).results
@@ -231,10 +231,3 @@ def _not_begun(result: Result) -> Result:
         return result
     why = f"not begun without the assumptions, after {Stopped.INTERRUPTED}"
     return replace(result, verdict=Verdict.UNDECIDED, violations=(), covered=why, assumed=NOTHING)
-
-
-def _interrupted(report: Report) -> bool:
-    """Whether a person has ended a search."""
-    return report.found.stopped is Stopped.INTERRUPTED or any(
-        each.covered.endswith(Stopped.INTERRUPTED) for each in report.results
-    )

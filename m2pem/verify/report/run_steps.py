@@ -102,7 +102,6 @@ _NUMBERED = re.compile(r"(#\d+|\[\d+\])$")
 _ROOM_BITS = 8
 _SAME = -1
 """Index of a part that belongs to the transition before it."""
-_PASSED = (Action.TAKEN,)
 
 
 @dataclass(frozen=True, slots=True)
@@ -306,8 +305,8 @@ def _run_step(
     transition = next((each for each in transitions if each.trigger is not None), transitions[-1])
     actions = tuple(dict.fromkeys(step for each in transitions for step in each.steps))
     element = next(each for each in transitions if each.steps).element
-    taken = [step.element for step in actions if step.action in _PASSED]
-    others = [step.element for step in actions if step.action not in _PASSED]
+    taken = [step.element for step in actions if step.action is Action.TAKEN]
+    others = [step.element for step in actions if step.action is not Action.TAKEN]
     writes, marking = _writes(transition, element_names, encoding.net), encoding.marking(state)
     return RunStep(
         number,
@@ -390,8 +389,8 @@ def _internal(first: Step, actions: Sequence[Step], element_names: ElementNames)
     name = element_names.with_id(first.element)
     taken = [step.element for step in actions if step.action is Action.TAKEN]
     if isinstance(node, e.Gateway) and taken:
-        named = [flow for flow in taken if _named(element_names, flow)]
-        if len(taken) == 1 and named:
+        flow = element_names.mission.elements.get(taken[0])
+        if len(taken) == 1 and flow is not None and flow.name:
             return f"{name}: {element_names.name(taken[0])}"
         return f"{name}: on to {_targets(element_names, taken)}"
     match first.action:
@@ -416,9 +415,7 @@ def _internal(first: Step, actions: Sequence[Step], element_names: ElementNames)
             return f"nothing is left to do in {name}: it keeps nothing more"
         case Action.STANDS:
             return first.detail or "a vehicle has stopped"
-        case Action.INTERRUPTED:
-            return ""
-        case Action.THROWN:
+        case Action.INTERRUPTED | Action.THROWN:
             return ""
         case Action.TRIGGERED:
             compensation = first.detail in (COMPENSATION_BEGINS, COMPENSATION_ENDS)
@@ -460,11 +457,6 @@ def _besides(
         elif step.action is Action.COMPLETED and place and step.element != element:
             said.append(f"{name} is over")
     return list(dict.fromkeys(said))
-
-
-def _named(element_names: ElementNames, flow: str) -> bool:
-    known = element_names.mission.elements.get(flow)
-    return known is not None and bool(known.name)
 
 
 def _targets(element_names: ElementNames, flows: Sequence[str]) -> str:

@@ -136,9 +136,7 @@ def with_requirements(
     spins: SpinExploration | None = None
     results: list[Result] = []
     instead: list[str] = []
-    stopped = report.found.stopped is Stopped.INTERRUPTED or any(
-        each.covered.endswith(Stopped.INTERRUPTED) for each in report.results
-    )
+    stopped = report.interrupted
     for each in requirements:
         if decided is not None and results:
             decided(results[-1])

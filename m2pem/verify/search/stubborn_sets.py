@@ -240,17 +240,7 @@ class _Chooser:
     def _feeding(self, feed: Feed, closed: int, candidates: int) -> int:
         """A small set of transitions, one of which must fire before a feed can."""
         read_write = self.read_write
-        best = -1
-        for register, bits in (
-            (read_write.setting, feed.missing),
-            (read_write.clearing, feed.present),
-        ):
-            for low in bits_of(bits):
-                found = register.get(low, 0) & ~closed & candidates
-                if best < 0 or found.bit_count() < best.bit_count():
-                    best = found
-                    if not best & (best - 1):
-                        return best
+        best = self._fewest(feed.missing, feed.present, candidates & ~closed)
         if best >= 0:
             return best
         if feed.fields:
@@ -271,16 +261,7 @@ class _Chooser:
             for low in bits_of(bits):
                 if not register.get(low, 0) & ~closed & candidates:
                     return 0
-        best = -1
-        for register, bits in ((setting, missing), (clearing, present)):
-            for low in bits_of(bits):
-                found = register.get(low, 0) & ~closed & candidates
-                if not found:
-                    return 0
-                if best < 0 or found.bit_count() < best.bit_count():
-                    best = found
-                    if not best & (best - 1):
-                        return best
+        best = self._fewest(missing, present, candidates & ~closed)
         if best >= 0:
             return best
         for mask in c.any_of:
@@ -293,6 +274,22 @@ class _Chooser:
             if (state & mask) >> offset > count:
                 return self.read_write.clearing_any(mask)
         return 0
+
+    def _fewest(self, missing: int, present: int, candidates: int) -> int:
+        """The smallest set of candidates that set a missing bit, or clear one that is present; -1:
+        there are no such bits. The first with one candidate, or with none, is small enough."""
+        best = -1
+        for register, bits in (
+            (self.read_write.setting, missing),
+            (self.read_write.clearing, present),
+        ):
+            for low in bits_of(bits):
+                found = register.get(low, 0) & candidates
+                if best < 0 or found.bit_count() < best.bit_count():
+                    best = found
+                    if not best & (best - 1):
+                        return best
+        return best
 
     # --- what a step disturbs -------------------------------------------------------------------
 
