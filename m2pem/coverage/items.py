@@ -12,7 +12,6 @@ from enum import StrEnum
 
 from m2pem.engine import records as r
 from m2pem.mission import elements as e
-from m2pem.mission.events import CompensateEventDefinition
 from m2pem.mission.mission import Mission
 
 
@@ -67,7 +66,7 @@ def items_of(mission: Mission) -> list[Item]:
     nodes = [
         Item(_kind(node), node.id, _label(node), mission.file_of(node), node.line)
         for node in mission.nodes
-        if _has_tokens(node)
+        if not e.undoes(node)
     ]
     flows = [
         Item(Kind.FLOW, flow.id, _flow_label(flow), mission.file_of(flow.source), flow.line)
@@ -83,14 +82,6 @@ def _kind(node: e.FlowNode) -> Kind:
         isinstance(node.container, e.SubProcess) and node.container.triggered_by_event
     )
     return Kind.EVENT if catches or isinstance(node, e.BoundaryEvent) else Kind.ELEMENT
-
-
-def _has_tokens(node: e.FlowNode) -> bool:
-    """A boundary event for compensation only says what undoes its activity (clause 10.7.1)."""
-    return not (
-        isinstance(node, e.BoundaryEvent)
-        and any(isinstance(each, CompensateEventDefinition) for each in node.definitions)
-    )
 
 
 def _label(node: e.FlowNode) -> str:

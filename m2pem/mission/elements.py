@@ -14,7 +14,13 @@ from enum import StrEnum
 from typing import Self, TypeAlias, Union
 
 from m2pem.mission.behavior import Behavior, Mappings, Prompt, Script, ServiceCall
-from m2pem.mission.events import EventDefinition, Message, Signal, signals_and_messages
+from m2pem.mission.events import (
+    CompensateEventDefinition,
+    EventDefinition,
+    Message,
+    Signal,
+    signals_and_messages,
+)
 from m2pem.mission.expression import Expression
 from m2pem.mission.loops import MultiInstance, StandardLoop
 
@@ -406,6 +412,14 @@ def thrown_by(node: FlowNode) -> list[Signal | Message]:
 def caught_by(node: FlowNode) -> list[Signal | Message]:
     """Return the signals and messages that an element catches."""
     return [] if isinstance(node, _THROWING) else exchanged(node)
+
+
+def undoes(element: Element | None) -> bool:
+    """Whether an element is the boundary event of a compensation: no token ever comes to it, it
+    only says what undoes its activity (clause 10.7.1)."""
+    return isinstance(element, BoundaryEvent) and any(
+        isinstance(each, CompensateEventDefinition) for each in element.definitions
+    )
 
 
 _THROWING = (SendTask, EndEvent, IntermediateThrowEvent)

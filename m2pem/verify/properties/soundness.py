@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from m2pem.mission import elements as e
-from m2pem.mission.events import CompensateEventDefinition
 from m2pem.mission.mission import Mission
 from m2pem.verify.net.petri_net import (
     UNASKED,
@@ -369,12 +368,5 @@ def to_be_reached(mission: Mission, net: PetriNet) -> dict[str, None]:
     return dict.fromkeys(
         element
         for element in net.elements
-        if element not in unknown and not _undoes(mission.elements.get(element))
-    )
-
-
-def _undoes(element: object) -> bool:
-    """Whether an element is the boundary event of a compensation: no token ever comes to it."""
-    return isinstance(element, e.BoundaryEvent) and any(
-        isinstance(d, CompensateEventDefinition) for d in element.definitions
+        if element not in unknown and not e.undoes(mission.elements.get(element))
     )

@@ -5,7 +5,6 @@ from dataclasses import dataclass, field, replace
 
 from m2pem.diagram import Overlays
 from m2pem.mission import elements as e
-from m2pem.mission.events import CompensateEventDefinition
 from m2pem.mission.mission import Mission
 from m2pem.mission.values import Value
 from m2pem.verify.assumptions import NOTHING, Assumptions
@@ -164,12 +163,7 @@ def _unreached(mission: Mission, report: Report) -> frozenset[str]:
     begun = {node.container.process.id for node in mission.nodes if node.id in reached}
     nodes = {n.id for n in mission.nodes if n.container.process.id in begun}
     flows = {f.id for f in mission.flows if f.source.container.process.id in begun}
-    undoing = {
-        node.id
-        for node in mission.nodes
-        if isinstance(node, e.BoundaryEvent)
-        and any(isinstance(each, CompensateEventDefinition) for each in node.definitions)
-    }
+    undoing = {node.id for node in mission.nodes if e.undoes(node)}
     return frozenset(nodes | flows) - reached - undoing
 
 

@@ -19,7 +19,7 @@ from m2pem.engine.scopes import compensation_handler, is_compensation_handler
 from m2pem.mission import elements as e
 from m2pem.mission.events import CancelEventDefinition, CompensateEventDefinition
 from m2pem.mission.loops import MultiInstance
-from m2pem.mission.reachability import following
+from m2pem.mission.reachability import following, reach
 from m2pem.verify.net.petri_net import (
     COMPENSATION_BEGINS,
     COMPENSATION_ENDS,
@@ -165,15 +165,7 @@ def _comes_again(context: TranslationContext, scope: ScopeDraft, node: e.Activit
         return True
     if isinstance(node, e.SubProcess) and node.triggered_by_event:
         return any(not start.interrupting for start in node.starts)
-    waiting, seen = following(node), set[e.FlowNode]()
-    while waiting:
-        each = waiting.pop()
-        if each is node:
-            return True
-        if each not in seen:
-            seen.add(each)
-            waiting += following(each)
-    return False
+    return node in reach(following(node))
 
 
 def forget_completions(

@@ -16,7 +16,7 @@ from m2pem.mission import elements as e
 from m2pem.mission.behavior import Behavior
 from m2pem.mission.events import EventDefinition, MessageEventDefinition, SignalEventDefinition
 from m2pem.mission.mission import Mission
-from m2pem.mission.reachability import following
+from m2pem.mission.reachability import following, reach
 from m2pem.verify.net.petri_net import Kind, Role
 from m2pem.verify.net.size_limit import SizeLimit
 from m2pem.verify.translate.data import Data, Truth
@@ -257,17 +257,12 @@ def _nothing(context: TranslationContext, node: e.FlowNode, scope: ScopeDraft) -
 
 def _repeated_nodes(mission: Mission) -> frozenset[e.FlowNode]:
     """Nodes that are reached only from non-interrupting events that can happen again."""
+    found = reach(
+        node
+        for node in mission.nodes
+        if isinstance(node, e.BoundaryEvent) and not node.interrupting
+    )
     begun: set[e.FlowNode] = set()
-    waiting: list[e.FlowNode] = []
-    for node in mission.nodes:
-        if isinstance(node, e.BoundaryEvent) and not node.interrupting:
-            waiting.append(node)
-    found: set[e.FlowNode] = set()
-    while waiting:
-        each = waiting.pop()
-        if each not in found:
-            found.add(each)
-            waiting += following(each)
     for process in mission.processes:
         begun |= set(process.entries)
     for node in mission.nodes:

@@ -17,7 +17,7 @@ from itertools import product
 from m2pem.mission import elements as e
 from m2pem.mission.behavior import Behavior, Keep
 from m2pem.mission.behavior import Role as BehaviorRole
-from m2pem.mission.reachability import following
+from m2pem.mission.reachability import following, reach
 from m2pem.verify.net.petri_net import Action, Exactness, Role, Step
 from m2pem.verify.translate.compensation import container_of
 from m2pem.verify.translate.context import ActivityInstance, Source, TranslationContext
@@ -148,14 +148,7 @@ def _other_tokens_may_come(node: e.Activity) -> bool:
 
 
 def _after(node: e.FlowNode) -> set[e.FlowNode]:
-    found: set[e.FlowNode] = set()
-    waiting = following(node)
-    while waiting:
-        each = waiting.pop()
-        if each not in found:
-            found.add(each)
-            waiting += following(each)
-    return found
+    return reach(following(node))
 
 
 # --- what tasks take, and where it goes -----------------------------------------------------------
