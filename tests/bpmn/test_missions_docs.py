@@ -7,7 +7,7 @@ import pytest
 from bpmn_text import definitions, load
 
 from m2pem.bpmn.lint import lint
-from m2pem.mission.elements import Activity, CallActivity, ServiceTask
+from m2pem.mission.elements import Activity, CallActivity, ScriptTask, ServiceTask
 from m2pem.mission.loops import MultiInstance, StandardLoop
 
 DOCS = (Path(__file__).parent.parent.parent / "docs" / "missions.md").read_text()
@@ -92,7 +92,22 @@ def test_the_examples_of_loops_have_no_warning() -> None:
 
 
 def test_every_example_is_tested() -> None:
-    assert len(EXAMPLES) == 10
+    assert len(EXAMPLES) == 11
+
+
+def test_the_example_of_what_is_left_names_a_task() -> None:
+    route = example('<m2pem:property name="route"').strip()
+    behavior = '<m2pem:behavior type="vehicle" name="single_vehicle_routing"><m2pem:properties>'
+    role = '<m2pem:role name="driver" vehicle="uav1"/>'
+    task = (
+        f'<scriptTask id="FlyRoute"><extensionElements>{behavior}{route}</m2pem:properties>'
+        f"<m2pem:resources>{role}</m2pem:resources></m2pem:behavior></extensionElements>"
+        "</scriptTask>"
+    )
+    node = load(definitions(f'<process id="P">{task}</process>')).elements["FlyRoute"]
+    assert isinstance(node, ScriptTask)
+    assert node.behavior is not None
+    assert not isinstance(node.behavior.parameters[0].value, str)
 
 
 def test_every_error_that_the_program_throws_is_documented() -> None:
