@@ -98,7 +98,6 @@ class Clearance:
 
     def __init__(self, ways: Sequence[Way], apart_m: float) -> None:
         self._ways = ways
-        self._far_m = apart_m + _FARTHEST_MISS_M
         order = sorted(range(len(ways)), key=lambda index: ways[index].back_m)
         self._yields: dict[int, list[tuple[int, _Yield]]] = {index: [] for index in order}
         for first, second in combinations(order, 2):
@@ -118,18 +117,6 @@ class Clearance:
         """How far along its path a member may go. `place_m`: where another is on its own path."""
         rules = self._yields[member]
         return min((rule.limit_m(place_m(other)) for other, rule in rules), default=math.inf)
-
-    def in_the_way(self) -> tuple[int, int] | None:
-        """Return a member that another one comes by before it may set off, and the other one."""
-        for member, rules in self._yields.items():
-            begin = self._ways[member].line.points[0]
-            for other, rule in rules:
-                line, along_m = self._ways[other].line, 0.0
-                while along_m < line.length_m and math.dist(line.at(along_m), begin) < self._far_m:
-                    along_m += self._far_m / _STEPS
-                if along_m < line.length_m and rule.limit_m(along_m) < _NOTHING_M:
-                    return member, other
-        return None
 
     def reached_m(
         self, at_m: Sequence[float], ends_m: Sequence[float], short_m: float

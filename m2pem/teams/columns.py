@@ -249,12 +249,6 @@ def _keep_ends_apart(context: PlanningContext, ways: Sequence[_Way], spacing_m: 
                 shorter = True
         if not shorter:
             break
-    if not context.begun and (barred := clearance.in_the_way()) is not None:
-        member, other = (ways[index].member for index in barred)
-        raise TeamRefusedError(
-            f"parameter 'route': {other} would come within {nearest_m:.1f} m of {member} before "
-            "that can set off: let it begin elsewhere, or draw the route elsewhere"
-        )
 
 
 def _turn(context: PlanningContext, near: Nearest) -> str:
