@@ -23,7 +23,12 @@ name: hills
 origin: {lat: 38.10, lon: -77.30, alt: 60}
 terrain: {folder: elevation, clearance: 20 m}
 vehicles:
-  uav: {domain: air, arbiter: sim, cruise_speed: 8 m/s, endurance: 4 min}
+  uav:
+    domain: air
+    arbiter: sim
+    connection: {altitude: 30 m}
+    cruise_speed: 8 m/s
+    endurance: 4 min
 """
 MISSION = """<definitions xmlns="http://www.omg.org/spec/BPMN/20100524/MODEL"
  xmlns:m2pem="https://m2pem.org/schema/1" targetNamespace="t"><process id="p" isExecutable="true">
