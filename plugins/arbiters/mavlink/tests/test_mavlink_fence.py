@@ -121,3 +121,26 @@ def test_a_return_with_no_way_around_is_done_and_said(caplog) -> None:
 
     play(Body(east=10.0, north=90.0).fly(), main, fence=moat)
     assert "returns: the way to its home leaves the fleet's fence by 10 m" in caplog.text
+
+
+def test_a_vehicle_that_refuses_the_way_around_returns_all_the_same(caplog) -> None:
+    async def main(bench) -> None:
+        end = await bench.do("return_to_launch")
+        assert end.state is BehaviorState.SUCCEEDED
+        assert bench.told[:2] == ["go_to", "return_home"]
+
+    body = Body(east=85.0, north=85.0).fly()
+    body.refuses["go_to"] = "no position"
+    play(body, main, fence=FIELD)
+    assert "returns on a straight line" in caplog.text
+
+
+def test_a_vehicle_that_stays_on_its_way_around_returns_all_the_same(caplog) -> None:
+    async def main(bench) -> None:
+        await bench.start("r1.b1", "return_to_launch", V)
+        await bench.running("r1.b1")
+        bench.body.speed = 0.0
+        assert await bench.until(lambda: "return_home" in bench.told, 60)
+
+    play(Body(east=85.0, north=85.0).fly(), main, fence=FIELD)
+    assert "it does not move on" in caplog.text

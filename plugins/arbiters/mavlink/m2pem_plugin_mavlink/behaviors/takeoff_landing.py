@@ -219,6 +219,9 @@ async def disarm_after_landing(behavior: Behavior) -> None:
 AROUND_M, LOOK_EVERY_S = 3.0, 0.2
 """A return leads so far around what the fleet's fence keeps out, if there is room."""
 
+AROUND_STILL_S = 30.0
+"""A vehicle that does not move on for so long on its way around returns on a straight line."""
+
 
 class ReturnToLaunch(Behavior):
     """Return home; an aircraft lands there, unless it is set to hover or circle.
@@ -251,15 +254,25 @@ class ReturnToLaunch(Behavior):
             self.modes = ANY_MODE
             return
         self._around = self._way_around()
-        self.modes = type(self).modes | ({FlightMode.GUIDED} if self._around else set())
-        await self._send(self._around)
+        await self._send()
 
-    async def _send(self, around: Sequence[LatLon]) -> None:
-        if around:
+    async def _send(self) -> None:
+        """Send the vehicle to the next place on its way around, or home: also if it refuses that
+        place."""
+        self.modes = type(self).modes | ({FlightMode.GUIDED} if self._around else set())
+        if self._around:
             height = VehicleParameters(self.context).altitude()
-            await self.vehicle.driver.go_to(TargetPosition(*around[0], *height))
+            try:
+                await self.vehicle.driver.go_to(TargetPosition(*self._around[0], *height))
+            except ExchangeError as error:
+                await self._straight(str(error))
         else:
             await self.vehicle.driver.return_home()
+
+    async def _straight(self, why: str) -> None:
+        self.vehicle.warn(f"returns on a straight line, not around what the fence keeps out: {why}")
+        self._around.clear()
+        await self._send()
 
     def _way_around(self) -> list[LatLon]:
         """Return the places to pass on the way home, and say what the return still crosses."""
@@ -282,9 +295,11 @@ class ReturnToLaunch(Behavior):
         while self._around:
             await self.vehicle.sleep(LOOK_EVERY_S)
             if distance_to_m(self.vehicle, self._around[0]) <= near_m:
-                await self._send(self._around[1:])
+                self._stillness.forget()
                 del self._around[0]
-                self.modes = self.modes if self._around else type(self).modes
+                await self._send()
+            elif self._stillness.seconds() >= AROUND_STILL_S:
+                await self._straight("it does not move on")
         if self.vehicle.domain == "air" and self.modes is not ANY_MODE:
             with contextlib.suppress(ExchangeError):  # most have no rally points
                 self._rally = await self.vehicle.driver.rally_points()
