@@ -29,7 +29,7 @@ over at a place, not after a time."""
 FLOWN = frozenset(
     {"single_vehicle_routing", "goto", "change_altitude", "area_survey", "orbit", "follow"}
 ) | {"area_observe"}
-"""Behaviors of a vehicle that an aircraft on the ground refuses: only `takeoff` takes it off."""
+"""Behaviors of a vehicle that real aircraft on the ground refuse: only `takeoff` takes them off."""
 
 _SLOWEST_M_S = 0.01
 _SHORTEST_M = 0.1

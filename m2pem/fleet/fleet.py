@@ -263,7 +263,7 @@ def real_resources(fleet: Fleet) -> list[ResourceId]:
 
 def simulated_fleet(fleet: Fleet, settings: Mapping[str, Any] | None = None) -> Fleet:
     """The fleet with the simulated arbiter in place of every other; `settings` are added to those
-    that the simulation has of every resource, in place of its own of the same names. Nothing moves,
+    that the simulation has of every resource, in place of those of the same names. Nothing moves,
     so that missions need no approval."""
     changed = partial(sim_settings, changed=settings or {})
     return replace(

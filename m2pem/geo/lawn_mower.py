@@ -2,7 +2,8 @@
 
 Each strip of the given width is driven along its middle from where the polygon begins in the strip
 to where it ends, so that every point of the polygon is within half a spacing of a track. No pass
-enters a hole: where one has the middle of a strip, what is free beside it gets passes of its own.
+enters a hole: where one has the middle of a strip, what is free beside it gets passes, too.
+Shapely, which is slow to load, is imported only for that.
 """
 
 import math

@@ -214,7 +214,7 @@ class _Fenced:
         return made.plan.at(made.plan.duration_s), start[1] or behavior.name in _ENDS_AT_A_PLACE
 
     def _who(self, behavior: Behavior) -> list[ResourceId]:
-        """Return the vehicles that perform a behavior; of a role by need, one stands for all."""
+        """Return the vehicles that perform a behavior; of a role by need, one of them."""
         named = [
             resource
             for role in behavior.roles

@@ -15,7 +15,7 @@ from m2pem.simulation.segments import Pose, Vector
 class LocalParameters(BehaviorParameters):
     """Parameters that were checked, in the local frame of a simulation.
 
-    `pose_of_vehicle`: how a vehicle stands and moves now, None if it was never received. `fence`:
+    `pose_of_vehicle`: where a vehicle is and how it moves, None if it was never received. `fence`:
     in the same frame.
     """
 

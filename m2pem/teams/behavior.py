@@ -231,7 +231,7 @@ class TeamBehavior:
         if self._ending is not None or member.lost:
             return
         if not self._shares.carries(member.part.removeprefix(f"{self.id}.")):
-            return  # it begins anew
+            return  # it begins again
         code = report.code or ("LINK_LOST" if report.state is BehaviorState.LOST else "FAILED")
         reason = report.reason or f"its part ended {report.state.value}"
         if report.state is BehaviorState.REJECTED or code == "TAKEN_OVER":

@@ -74,7 +74,7 @@ class _Yield:
             least_m = min(least_m, self._within_m(index, 0.0))
 
     def limit_m(self, other_m: float) -> float:
-        """How far along its path the member may go when the other is at `other_m` of its own."""
+        """How far along its path the member may go when the other has gone `other_m` along its."""
         at = self._other.segment_at(other_m)
         index = next((each for each in self._order if each >= at), None)
         if index is None:

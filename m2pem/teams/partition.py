@@ -23,7 +23,7 @@ class Share:
     """A planned part of one member, or a piece of a lost member's. `by`: the member that carries
     it out; None: it has not begun. `part`: the id of the part. `left`: the parameters of what is
     left of it, as last reported. `given_up`: no member does it, or others do it in pieces.
-    `begins`: how many times it has begun anew."""
+    `begins`: how many times it has begun again."""
 
     leg: Leg
     by: ResourceId | None = None
@@ -112,7 +112,7 @@ class Partition:
                 share.done = True
 
     def withdraw(self, member: ResourceId) -> None:
-        """Let the share that a member carries out begin anew, when what it does has ended."""
+        """Let the share that a member carries out begin again, when what it does has ended."""
         for share in self._shares.values():
             if share.by == member and not share.over:
                 share.by, share.part, share.begins = None, "", share.begins + 1
@@ -131,7 +131,7 @@ class Partition:
         share.leg = Leg(member, "single_vehicle_routing", given)
 
     def carries(self, part: str) -> bool:
-        """Whether a part is that of a share, and not of one that begins anew."""
+        """Whether a part is that of a share, and not of one that begins again."""
         return any(share.part == part for share in self._shares.values())
 
     def place(self, part: str, *, done: bool) -> ResourceId:
@@ -253,8 +253,8 @@ class Partition:
             own = _own(key)
             if (before is not None and not before.over) or not (own or self._has_done(doer.id)):
                 continue
-            anew = [str(each) for each in (epoch if self.again else 0, share.begins) if each]
-            part = doer.id if own and not anew else "/".join((doer.id, key, *anew))
+            restarts = [str(each) for each in (epoch if self.again else 0, share.begins) if each]
+            part = doer.id if own and not restarts else "/".join((doer.id, key, *restarts))
             share.by, share.part = doer.id, part
             yield Assignment(doer, share.leg, share.part, own and not share.begins)
 
