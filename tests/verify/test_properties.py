@@ -115,3 +115,26 @@ def test_an_error_that_no_event_names_is_not_caught(named: list[str], uncaught: 
     ]
     found = [each.message.partition("(")[2].partition(")")[0] for each in result.violations]
     assert found == ([] if uncaught is None else [uncaught])
+
+
+def test_what_an_expression_may_lead_to_that_is_not_followed_is_not_dead_for_certain() -> None:
+    """A collection that is none ends the activity with error EXPRESSION."""
+    inside = """
+<process id="MAIN"><startEvent id="s"/>
+<userTask id="each"><multiInstanceLoopCharacteristics isSequential="true">
+<loopDataInputRef>items</loopDataInputRef></multiInstanceLoopCharacteristics></userTask>
+<dataObject id="items"/>
+<boundaryEvent id="failed" attachedToRef="each"><errorEventDefinition/></boundaryEvent>
+<userTask id="after"/><endEvent id="e"/><endEvent id="over"/>
+s -> each -> e
+failed -> after -> over
+</process>
+"""
+    (found,) = (
+        each for each in check(mission(inside)).results if each.property == "no-dead-element"
+    )
+    assert found.verdict is Verdict.MAY_BE_VIOLATED
+    assert {each.elements for each in found.violations} == {("failed",), ("after",), ("over",)}
+    assert {each.doubt for each in found.violations} == {
+        "an expression may fail whose data are not followed"
+    }

@@ -55,7 +55,6 @@ class Engine:
     def __init__(self, mission: Mission, fleet: Fleet) -> None:
         self.run, self.now_us, self.steps = MissionRun(mission, fleet, "r1", 200), START_US, 0
         self.reached: set[str] = set()
-        self.is_followed = True
         self.source = {flow.id: flow.source.id for flow in mission.flows}
 
     def give(self, item: i.Input, now_us: int) -> None:
@@ -65,8 +64,6 @@ class Engine:
         for record in step.records:
             if isinstance(record, r.FlowTaken):
                 self.reached |= {record.flow, self.source[record.flow]}
-            # Errors are followed only where all that an expression reads is.
-            self.is_followed &= getattr(record, "code", "") != "EXPRESSION"
         few = len(self.run.state.tokens) < MOST_TOKENS
         if self.run.wants_continue and self.steps < MOST_INPUTS and few:
             self.give(i.Continue(), self.now_us)
@@ -213,7 +210,7 @@ class Judge:
             while engine.steps < MOST_INPUTS and engine.goes_on(dice):
                 pass
             self.counts["plays"] += 1
-            if engine.reached & dead and engine.is_followed:
+            if engine.reached & dead:
                 return f"never reached, and reached: {', '.join(sorted(engine.reached & dead))}"
             if not certain or "EXPRESSION" in engine.run.state.detail:
                 continue

@@ -4,7 +4,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from m2pem.mission import elements as e
+from m2pem.mission.events import ErrorEventDefinition
 from m2pem.mission.mission import Mission
+from m2pem.mission.reachability import reach
 from m2pem.verify.net.petri_net import (
     UNASKED,
     Action,
@@ -17,6 +19,8 @@ from m2pem.verify.net.petri_net import (
 )
 from m2pem.verify.properties.results import BEYOND, Result, SearchedMission, Verdict, Violation
 from m2pem.verify.search.fairness import FairCycles
+
+_UNREAD = "an expression may fail whose data are not followed"
 
 
 def proper_completion(searched: SearchedMission) -> Result:
@@ -349,17 +353,34 @@ def no_dead_element(searched: SearchedMission) -> Result:
     # What no transition reaches is dead, whatever was searched.
     possible = {step.element for each in net.transitions for step in each.steps}
     doubt = BEYOND if searched.is_bounded else ""
+    unread = _after_unread_expressions(searched.mission, net)
     violations = [
         Violation(
             f"{searched.label(element)} is never reached",
             (element,),
-            doubt=doubt if element in possible else "",
+            doubt=_UNREAD if element in unread else doubt if element in possible else "",
         )
         for element in wanted
         if element not in (reached if found.complete else possible)
     ]
     text = "Every element is reached in some run."
     return searched.result("no-dead-element", text, violations, static=everything)
+
+
+def _after_unread_expressions(mission: Mission, net: PetriNet) -> set[str]:
+    """Return the elements to which an error EXPRESSION leads, if not all data are followed: the net
+    has such errors only where all that the expression reads is."""
+    if all(each.exactness is not Exactness.MORE for each in net.approximations):
+        return set()
+    caught = [
+        event
+        for event in mission.nodes
+        for definition in getattr(event, "definitions", ())
+        if isinstance(event, e.BoundaryEvent | e.StartEvent)
+        and isinstance(definition, ErrorEventDefinition)
+        and (definition.error is None or definition.error.code == "EXPRESSION")
+    ]
+    return {each.id for each in reach(caught)}
 
 
 def to_be_reached(mission: Mission, net: PetriNet) -> dict[str, None]:
