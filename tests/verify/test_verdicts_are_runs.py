@@ -172,8 +172,8 @@ class Judge:
         self.counts["played"] += 1
         if not played.agrees:
             return played.stopped
-        if name not in STUCK | UNCAUGHT:
-            return ""
+        if left_open or name not in STUCK | UNCAUGHT:
+            return ""  # the engine alone chooses otherwise
         end = replayed(mission, fleet, played)
         if name in UNCAUGHT:
             return "" if end.failed else "nothing has failed"
