@@ -19,6 +19,7 @@ from m2pem.fleet.default_fleet import fleet_for
 from m2pem.fleet.fleet import Fleet
 from m2pem.mission.catalogue import BehaviorState
 from m2pem.mission.mission import Mission
+from m2pem.mission.values import Value
 from m2pem.verify.check import Report, check
 from m2pem.verify.net.petri_net import Exactness
 from m2pem.verify.properties.results import Verdict, Violation
@@ -46,7 +47,8 @@ LEFT_OPEN = frozenset(
     }
 )
 """Where a mission leaves a choice open, the engine makes one, and verification each of them."""
-UNCAUGHT = frozenset({"errors-caught", "failures-handled", "decisions-handled"})
+UNCAUGHT = frozenset({"errors-caught", "failures-handled"})
+NO_FLOW = "decisions-handled"
 
 
 class Engine:
@@ -55,6 +57,7 @@ class Engine:
     def __init__(self, mission: Mission, fleet: Fleet) -> None:
         self.run, self.now_us, self.steps = MissionRun(mission, fleet, "r1", 200), START_US, 0
         self.reached: set[str] = set()
+        self.thrown: set[str] = set()
         self.source = {flow.id: flow.source.id for flow in mission.flows}
 
     def give(self, item: i.Input, now_us: int) -> None:
@@ -64,6 +67,8 @@ class Engine:
         for record in step.records:
             if isinstance(record, r.FlowTaken):
                 self.reached |= {record.flow, self.source[record.flow]}
+            elif isinstance(record, r.ErrorThrown):
+                self.thrown.add(record.code)
         few = len(self.run.state.tokens) < MOST_TOKENS
         if self.run.wants_continue and self.steps < MOST_INPUTS and few:
             self.give(i.Continue(), self.now_us)
@@ -114,7 +119,7 @@ class Engine:
         return True
 
 
-def random_mission(seed: int) -> tuple[Mission, dict[str, object]] | None:
+def random_mission(seed: int) -> tuple[Mission, dict[str, Value]] | None:
     """A random mission and what its run begins with; None: no such mission is read."""
     dice = Random(seed)
     try:
@@ -137,7 +142,7 @@ class Judge:
     def __init__(self, counts: Counter[str]) -> None:
         self.counts = counts
 
-    def wrong(self, mission: Mission, data: dict[str, object], seed: int) -> str:
+    def wrong(self, mission: Mission, data: dict[str, Value], seed: int) -> str:
         """What is said for certain, and the engine does otherwise."""
         fleet = fleet_for(mission)
         report = check(mission, fleet, options=Options(data=data), limits=LIMITS)
@@ -172,9 +177,11 @@ class Judge:
         self.counts["played"] += 1
         if not played.agrees:
             return played.stopped
-        if left_open or name not in STUCK | UNCAUGHT:
+        if left_open or name not in STUCK | UNCAUGHT | {NO_FLOW}:
             return ""  # the engine alone chooses otherwise
         end = replayed(mission, fleet, played)
+        if name == NO_FLOW:
+            return "" if "NO_FLOW" in end.thrown else "a flow is true"
         if name in UNCAUGHT:
             return "" if end.failed else "nothing has failed"
         if name == "no-deadlock":
@@ -191,7 +198,7 @@ class Judge:
         return ""
 
     def _what_holds(
-        self, report: Report, mission: Mission, fleet: Fleet, data: dict[str, object], seed: int
+        self, report: Report, mission: Mission, fleet: Fleet, data: dict[str, Value], seed: int
     ) -> str:
         said = {each.property: each for each in report.results}
         certain = not report.found.lost and not any(
@@ -203,7 +210,9 @@ class Judge:
             if not each.doubt
             for element in each.elements
         }
-        safe = all(said[each].verdict is Verdict.HOLDS for each in (*UNCAUGHT, "one-behavior"))
+        safe = all(
+            said[each].verdict is Verdict.HOLDS for each in (*UNCAUGHT, NO_FLOW, "one-behavior")
+        )
         for number in range(PLAYS):
             engine, dice = Engine(mission, fleet), Random(seed * PLAYS + number)
             engine.give(i.StartRun(report.net.process, data), START_US)
