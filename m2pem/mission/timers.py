@@ -1,18 +1,8 @@
-"""Times of timers (BPMN 2.0.2, table 10.101): ISO 8601 durations, dates and cycles, and cron texts.
+"""Times of timers (BPMN 2.0.2, table 10.101): ISO 8601 durations, dates and cycles.
 
 `..._us` counts microseconds: instants from the Unix epoch (UTC), durations by themselves. Values
 come from expressions, so each reader takes any value and refuses what is no text. Every reader
 raises ExpressionSyntaxError.
-
-Cron texts are those of other engines, always in UTC:
-
-* 5 fields, as cron has them: minute, hour, day of the month, month, day of the week (0 and 7 are
-  Sunday). When both days are restricted, either matches.
-* 6 fields begin with seconds (Quartz, Spring); 7 end with years (Quartz).
-* `@yearly`, `@annually`, `@monthly`, `@weekly`, `@daily`, `@midnight`, `@hourly`.
-
-Engines differ about which day of the week 1 is once there is a seconds field (Quartz: Sunday;
-Spring: Monday), so days have names there; with years it can only be Quartz.
 
 A cycle without a date (`R3/PT10S`) is due at mission times, and counts how often it has fired. One
 with a start or an end, and a cron text, is due at dates, which also pass during a pause or an
@@ -26,9 +16,9 @@ from datetime import UTC, datetime, timedelta, tzinfo
 from typing import NamedTuple, NoReturn
 
 import isodate
-from cronsim import CronSim, CronSimError
 
 from m2pem.errors import ExpressionSyntaxError
+from m2pem.mission import cron  # imports this module, too: only its name is bound yet
 from m2pem.mission.expression.literals import describe, shorten
 from m2pem.mission.values import Value
 from m2pem.units import US_PER_S
@@ -178,181 +168,6 @@ def _refuse(message: str, text: str) -> NoReturn:
     raise ExpressionSyntaxError(message, shorten(text), 0) from None
 
 
-_SECOND = timedelta(seconds=1)
-
-MACROS = {
-    "@yearly": "0 0 1 1 *",
-    "@annually": "0 0 1 1 *",
-    "@monthly": "0 0 1 * *",
-    "@weekly": "0 0 * * 0",
-    "@daily": "0 0 * * *",
-    "@midnight": "0 0 * * *",
-    "@hourly": "0 * * * *",
-}
-_DAYS = ("SUN", "MON", "TUE", "WED", "THU", "FRI", "SAT")
-_DAY = r"[0-9]+|SUN|MON|TUE|WED|THU|FRI|SAT"
-_DAY_TERM = re.compile(
-    rf"(?P<first>{_DAY}|\*)(?:-(?P<last>{_DAY}))?(?:/(?P<step>[1-9][0-9]*))?"
-    rf"|(?P<day>{_DAY})(?P<which>L|\#[1-5])"
-)
-_YEAR_TERM = re.compile(
-    r"(?P<first>[0-9]{4}|\*)(?:-(?P<last>[0-9]{4}))?(?:/(?P<step>[1-9][0-9]*))?"
-)
-_FIRST_YEAR, _LAST_YEAR = 1970, 2099  # Quartz's
-
-
-@dataclass(frozen=True, slots=True)
-class Cron:
-    """`fields`: what cronsim reads; `years`: None for all."""
-
-    fields: str
-    years: tuple[int, ...] | None
-
-    def after_us(self, at_us: int, zone: tzinfo = UTC) -> int | None:
-        """The first of its dates after an instant (both: microseconds since the Unix epoch).
-
-        `zone`: in which its fields are read. None: there is none, at least for 50 years.
-        """
-        try:
-            moment = (_EPOCH + timedelta(microseconds=at_us)).astimezone(zone)
-            while True:
-                found = next(CronSim(self.fields, moment))
-                if self.years is None or found.year in self.years:
-                    return (found - _EPOCH) // _MICROSECOND
-                following = [year for year in self.years if year > found.year]
-                if not following:
-                    return None
-                moment = datetime(following[0], 1, 1, tzinfo=zone) - _SECOND
-        except (StopIteration, OverflowError, ValueError):  # the calendar ends
-            return None
-
-    def before_us(self, at_us: int, zone: tzinfo = UTC) -> int | None:
-        """The last of its dates before an instant, as `after_us`; None: there is none."""
-        try:
-            moment = (_EPOCH + timedelta(microseconds=at_us)).astimezone(zone)
-            for found in CronSim(self.fields, moment, reverse=True):
-                if self.years is None or found.year in self.years:
-                    return (found - _EPOCH) // _MICROSECOND
-                if found.year < min(self.years):
-                    break
-        except (OverflowError, ValueError):  # the calendar begins
-            pass
-        return None
-
-
-def is_cron(text: str) -> bool:
-    """Whether a text looks like cron's rather than like ISO 8601."""
-    return text.lstrip().startswith("@") or len(text.split()) > 1
-
-
-def parse_cron(text: str) -> Cron:
-    """Read a cron text.
-
-    Raises:
-        ExpressionSyntaxError: it is none, or it means different things to different engines.
-    """
-    stripped = text.strip()
-    if len(stripped) > _MAX_CHARACTERS:
-        _refuse(f"a cron text has at most {_MAX_CHARACTERS} characters", text)
-    if stripped.startswith("@"):
-        macro = MACROS.get(stripped.lower())
-        if macro is None:
-            _refuse(f"expected one of {', '.join(MACROS)}", text)
-        return Cron(macro, None)
-    words = stripped.upper().split()
-    if len(words) not in (5, 6, 7):
-        _refuse(
-            f"a cron text has 5, 6 (seconds first) or 7 fields (years last), not {len(words)}", text
-        )
-    quartz = len(words) == 7
-    years = _years(text, words.pop()) if quartz else None
-    day, weekday = words[-3], words[-1]
-    if len(words) == 6 and not (_is_any(day) or _is_any(weekday)):
-        _refuse("give the day of the month or the day of the week, and '?' for the other", text)
-    words[-3] = day.replace("?", "*")
-    if len(words) == 6:
-        words[-1] = _weekdays(text, weekday, quartz)
-    else:
-        terms = weekday.replace("?", "*").split(",")
-        words[-1] = ",".join(_five_fields(text, term) for term in terms)
-    fields = " ".join(words)
-    try:
-        CronSim(fields, _EPOCH)
-    except CronSimError as error:
-        _refuse(f"{str(error).lower()} in the cron text", text)
-    return Cron(fields, years)
-
-
-def _is_any(field: str) -> bool:
-    return field == "?" or field.startswith("*")
-
-
-def _five_fields(text: str, term: str) -> str:
-    """A term of named days (FRIL, FRI-MON) in numbers; cronsim reads the others there."""
-    match = _DAY_TERM.fullmatch(term)
-    if match is None or match["step"]:
-        return term
-    days = {match["first"], match["last"], match["day"]} - {None}
-    return _weekdays(text, term, False) if days <= {*_DAYS} else term
-
-
-def _weekdays(text: str, field: str, quartz: bool) -> str:
-    """Days of the week as numbers from Sunday 0: what cronsim reads."""
-    if field in ("?", "*"):
-        return "*"
-    found: list[str] = []
-    for term in field.split(","):
-        match = _DAY_TERM.fullmatch(term)
-        if match is None:
-            _refuse(f"'{term}' is no day of the week such as MON, MON-FRI, FRIL or MON#1", text)
-        if match["day"]:
-            found.append(f"{_weekday(text, match['day'], quartz)}{match['which']}")
-            continue
-        step = int(match["step"] or 1)
-        first = 0 if match["first"] == "*" else _weekday(text, match["first"], quartz)
-        if match["last"]:
-            last = _weekday(text, match["last"], quartz)
-        else:
-            last = 6 if match["step"] or match["first"] == "*" else first
-        # A range may pass the end of the week: FRI-MON.
-        days = range(first, last + 1 if last >= first else last + 8)
-        found += [str(each % 7) for each in days[::step]]
-    return ",".join(found)
-
-
-def _weekday(text: str, name: str, quartz: bool) -> int:
-    if name in _DAYS:
-        return _DAYS.index(name)
-    if not quartz:
-        _refuse(
-            f"which day of the week '{name}' is depends on the engine (1 is Sunday for Quartz, "
-            "Monday for Spring): write MON, TUE, ...",
-            text,
-        )
-    if not 1 <= int(name) <= 7:
-        _refuse(f"'{name}' is no day of the week: 1 (SUN) to 7 (SAT)", text)
-    return int(name) - 1
-
-
-def _years(text: str, field: str) -> tuple[int, ...] | None:
-    if field in ("*", "?"):
-        return None
-    found: set[int] = set()
-    for term in field.split(","):
-        match = _YEAR_TERM.fullmatch(term)
-        if match is None:
-            _refuse(f"'{term}' is no year such as 2026, 2026-2028 or 2026/2", text)
-        first = _FIRST_YEAR if match["first"] == "*" else int(match["first"])
-        if match["last"]:
-            last = int(match["last"])
-        else:
-            last = _LAST_YEAR if match["step"] or match["first"] == "*" else first
-        if not _FIRST_YEAR <= first <= last <= _LAST_YEAR:
-            _refuse(f"years are {_FIRST_YEAR} to {_LAST_YEAR}, the first one first", text)
-        found.update(range(first, last + 1, int(match["step"] or 1)))
-    return tuple(sorted(found))
-
-
 _WHAT = "a cycle such as R3/PT10S, R/PT1M or R3/2026-01-01T12:00:00Z/PT10S"
 _CYCLE = re.compile(r"R(?P<repetitions>[0-9]{0,9})/(?P<first>[^/]*)(?:/(?P<second>[^/]*))?")
 
@@ -375,7 +190,7 @@ class Cycle:
     @property
     def dated(self) -> bool:
         """Whether it is due at dates, not at mission times."""
-        return self.start_us is not None or self.end_us is not None or is_cron(self.period)
+        return self.start_us is not None or self.end_us is not None or cron.is_cron(self.period)
 
     def first(self, at_us: int) -> "Round":
         """When it is due first, if it is armed at `at_us`. A date may have passed already: it is
@@ -393,8 +208,8 @@ class Cycle:
             if left < 0:
                 left = max(0, self.end_us - at_us) // period_us
             return Round(self.end_us - left * period_us, left, self.period)
-        if is_cron(self.period):
-            due_us = parse_cron(self.period).after_us(at_us)
+        if cron.is_cron(self.period):
+            due_us = cron.parse_cron(self.period).after_us(at_us)
             if due_us is None:
                 _refuse("none of its dates is left", self.period)
             return Round(due_us, left, self.period)
@@ -433,8 +248,8 @@ def next_round(period: str, due_us: int, at_us: int, left: int, *, dated: bool) 
     """
     if left == 0:
         return None
-    if is_cron(period):
-        found = parse_cron(period).after_us(max(due_us, at_us))
+    if cron.is_cron(period):
+        found = cron.parse_cron(period).after_us(max(due_us, at_us))
         return None if found is None else Round(found, left, period)
     try:
         if counted := _COUNTED.fullmatch(period):
@@ -463,14 +278,14 @@ def next_round(period: str, due_us: int, at_us: int, left: int, *, dated: bool) 
 
 def cycle(text: Value) -> Cycle:
     """Read a cycle: `R3/PT10S`, `R/PT1M` (for ever), `R3/2026-01-01T00:00:00Z/PT10S`,
-    `R/PT1H/2026-01-01T00:00:00Z` (the last date), or a cron text (`m2pem.mission.timers`).
+    `R/PT1H/2026-01-01T00:00:00Z` (the last date), or a cron text (`m2pem.mission.cron`).
 
     Raises:
         ExpressionSyntaxError: no cycle, or one that never fires.
     """
     stripped = text_from(text, _WHAT)
-    if is_cron(stripped):
-        parse_cron(stripped)
+    if cron.is_cron(stripped):
+        cron.parse_cron(stripped)
         return Cycle(None, None, stripped)
     match = _CYCLE.fullmatch(stripped)
     if match is None:

@@ -1,8 +1,7 @@
 """When an entry of the schedule is due: dates and cron texts in a time zone, deadlines, misses.
 
-Cron texts are those of timer events (`m2pem.mission.timers`), in a time zone. Where clocks are put
-forward, a time that does not exist comes at the next one that does; where they are put back, a time
-comes once (cronsim, as Debian's cron has it). Instants are microseconds since the Unix epoch.
+Cron texts are those of timer events, in a time zone (`m2pem.mission.cron`). Instants are
+microseconds since the Unix epoch.
 """
 
 import re
@@ -15,8 +14,8 @@ import msgspec
 
 from m2pem.errors import ExpressionSyntaxError, ScheduleError
 from m2pem.mission.candidate_facts import CANDIDATE_FACTS
+from m2pem.mission.cron import Cron, parse_cron
 from m2pem.mission.expression import Expression, parse
-from m2pem.mission.timers import Cron, parse_cron
 from m2pem.scheduling.entry import (
     KEPT_TIMES,
     EntryState,

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from m2pem.errors import ExpressionSyntaxError
+from m2pem.mission.cron import parse_cron
 from m2pem.mission.timers import (
     Cycle,
     cycle,
@@ -17,7 +18,6 @@ from m2pem.mission.timers import (
     duration_us,
     fixed_us,
     next_round,
-    parse_cron,
     wait_us,
 )
 from tests.seeds import examples
