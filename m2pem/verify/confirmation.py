@@ -63,6 +63,7 @@ class Confirmation:
             options.ways,
             steps,
             self._together,
+            {each.key for each in net.variables},
         )
         before: list[int] = []
         state = encoding.initial

@@ -72,11 +72,12 @@ class _StepsWithOpenConditions(Steps):
     """Steps of a run into which data of unknown origin may still be written.
 
     `choices`: by element, the sequence flows by which its next tokens leave, where neither the
-    mission nor its data decides; `made`: names of the data that was written for that. `together`:
-    the processes that are still to begin, with the run.
+    mission nor its data decides; `made`: names of the data that was written for that; `followed`:
+    names of data that is never written for that. `together`: the processes that are still to begin,
+    with the run.
     """
 
-    __slots__ = ("choices", "made", "together")
+    __slots__ = ("choices", "followed", "made", "together")
 
     def __init__(
         self,
@@ -84,9 +85,11 @@ class _StepsWithOpenConditions(Steps):
         fleet: Fleet | None,
         choices: Mapping[str, deque[tuple[str, ...]]],
         together: Sequence[str],
+        followed: Collection[str],
     ) -> None:
         super().__init__(state, fleet, _BATCH)
         self.choices = choices
+        self.followed = followed
         self.made: set[str] = set()
         self.together = [self.mission.process(each) for each in together]
 
@@ -130,7 +133,9 @@ class _StepsWithOpenConditions(Steps):
                     break
         read = reader(scope)
         names = {name for condition, _ in wanted for name in condition.names}
-        known = {name for name in names - self.made if read(name) is not None}
+        known = {
+            name for name in names - self.made if name in self.followed or read(name) is not None
+        }
         if data := data_for(wanted, read, known):
             self.made.update(data)
             self.write_in(scope, node, dict(data))
@@ -153,9 +158,10 @@ class _Run(MissionRun):
         fleet: Fleet | None,
         choices: Mapping[str, deque[tuple[str, ...]]],
         together: Sequence[str],
+        followed: Collection[str],
     ) -> None:
         super().__init__(mission, fleet, "r1")
-        self._x = _StepsWithOpenConditions(self.state, fleet, choices, together)
+        self._x = _StepsWithOpenConditions(self.state, fleet, choices, together, followed)
 
     def write(self, wait: Wait, data: dict[str, Value], now_us: int) -> Step:
         """Write data where an element waits for a condition that reads it."""
@@ -178,9 +184,11 @@ class ConformanceRun:
         ways: KnownWays | None = None,
         steps: Sequence[Mapping[str, Any]] = (),
         together: Sequence[str] = (),
+        followed: Collection[str] = (),
     ) -> None:
         """`ways`: those with which the net was made. `steps`: those that are going to be played.
-        `together`: processes that begin with the run, as other runs never do.
+        `together`: processes that begin with the run, as other runs never do. `followed`: names
+        whose values the net follows.
         """
         self._space: SpacePlan | None = None
         if fleet is not None and fleet.shared_space:
@@ -188,7 +196,7 @@ class ConformanceRun:
             self._space = space_plan(mission, mission.process(process), fleet, candidates, ways)
         if fleet is not None:
             fleet = without_space(fleet) if self._space is None else self._space.fleet
-        self.run = _Run(mission, fleet, _choices(mission, steps), together)
+        self.run = _Run(mission, fleet, _choices(mission, steps), together, followed)
         self.steps: list[Step] = []
         self._now_us = _START_US
         self._reports: Counter[str] = Counter()

@@ -22,6 +22,7 @@ START_US = 1_767_225_600_000_000
 """When a run is played: 2026-01-01T00:00:00Z, in microseconds since the Unix epoch."""
 _MOST_CONTINUES = 100
 _MOST_TOKENS = 200
+_MOST_TRIES = 50
 """With more, a run that does not wait is one that never will."""
 
 
@@ -50,7 +51,37 @@ def play(
     run: Sequence[int],
     data: Mapping[str, Value] | None = None,
 ) -> Played:
-    """Play the transitions of a run, one after the other, to a new run of the engine."""
+    """Play the transitions of a run, one after the other, to a new run of the engine.
+
+    Where a transition fits several inputs, such as one of two prompts of a task, each is tried.
+    """
+    first: Played | None = None
+    waiting: list[list[int]] = [[]]  # which of the inputs that fit was given, each time
+    for _ in range(_MOST_TRIES):
+        chosen = waiting.pop()
+        played, fitted = _play(mission, fleet, net, run, data, chosen)
+        if played.agrees:
+            return played
+        first = first or played
+        for place in range(len(chosen), len(fitted)):
+            more = [*chosen, *[0] * (place - len(chosen))]
+            waiting += [[*more, other] for other in range(fitted[place] - 1, 0, -1)]
+        if not waiting:
+            break
+    assert first is not None
+    return first
+
+
+def _play(
+    mission: Mission,
+    fleet: Fleet | None,
+    net: PetriNet,
+    run: Sequence[int],
+    data: Mapping[str, Value] | None,
+    chosen: Sequence[int],
+) -> tuple[Played, list[int]]:
+    """What came of it, and how many inputs fitted each time."""
+    fitted: list[int] = []
     engine = MissionRun(mission, fleet, "r1", 200)
     follower = Follower(net)
     inputs: list[tuple[int, i.Input]] = []
@@ -66,28 +97,31 @@ def play(
             steps.append(engine.receive(i.Continue(), now_us))
         return follower.step(engine.state)
 
+    def stopped(why: str) -> tuple[Played, list[int]]:
+        return Played(tuple(inputs), tuple(steps), why), fitted
+
     if not give(i.StartRun(net.process, dict(data or {}))):
-        return Played(tuple(inputs), tuple(steps), "the engine begins otherwise")
+        return stopped("the engine begins otherwise")
     for number in run:
         transition = net.transitions[number]
         if transition.kind is not Kind.EXTERNAL:
             continue
         if engine.state.status is RunStatus.ENDED:
-            return Played(tuple(inputs), tuple(steps), f"the run is over before {transition.name}")
+            return stopped(f"the run is over before {transition.name}")
         now_us += 1  # no two timers are due at one moment
         if transition.trigger is Trigger.TIMER:
             due_us = _due_us(engine.state, transition)
             if due_us is None:
-                return Played(tuple(inputs), tuple(steps), f"no timer of {transition.element} runs")
+                return stopped(f"no timer of {transition.element} runs")
             now_us = max(now_us, due_us)
-        item = next(_inputs(net, transition, engine.state), None)
-        if item is None:
-            return Played(tuple(inputs), tuple(steps), f"nothing makes {transition.name} happen")
-        if not give(item):
-            return Played(
-                tuple(inputs), tuple(steps), f"the engine goes another way at {transition.name}"
-            )
-    return Played(tuple(inputs), tuple(steps), "")
+        items = [*_inputs(net, transition, engine.state)]
+        if not items:
+            return stopped(f"nothing makes {transition.name} happen")
+        choice = chosen[len(fitted)] if len(fitted) < len(chosen) else 0
+        fitted.append(len(items))
+        if not give(items[choice]):
+            return stopped(f"the engine goes another way at {transition.name}")
+    return stopped("")
 
 
 def _due_us(state: RunState, transition: Transition) -> int | None:

@@ -138,3 +138,32 @@ failed -> after -> over
     assert {each.doubt for each in found.violations} == {
         "an expression may fail whose data are not followed"
     }
+
+
+def test_an_instance_of_a_process_begins_without_the_data_of_the_one_before() -> None:
+    inside = """
+<message id="m" name="m"/>
+<process id="MAIN"><startEvent id="s"/>
+<intermediateThrowEvent id="one"><messageEventDefinition messageRef="m"/></intermediateThrowEvent>
+<userTask id="wait"/>
+<intermediateThrowEvent id="two"><messageEventDefinition messageRef="m"/></intermediateThrowEvent>
+<endEvent id="e"/>
+s -> one -> wait -> two -> e
+</process>
+<process id="OTHER"><startEvent id="begun"><messageEventDefinition messageRef="m"/></startEvent>
+<exclusiveGateway id="gate" default="first"/><userTask id="again"/>
+<scriptTask id="write"><script>a = 1</script></scriptTask><endEvent id="end"/><endEvent id="over"/>
+begun -> gate
+first: gate -> write
+second: gate -> again if a == 1
+write -> end
+again -> over
+</process>
+"""
+    (found,) = (
+        each for each in check(mission(inside)).results if each.property == "no-dead-element"
+    )
+    assert {(each.elements, each.doubt) for each in found.violations} == {
+        (("again",), ""),
+        (("over",), ""),
+    }

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 from m2pem.mission import elements as e
 from m2pem.mission.events import ErrorEventDefinition
+from m2pem.mission.loops import MultiInstance
 from m2pem.mission.mission import Mission
 from m2pem.mission.reachability import reach
 from m2pem.verify.net.petri_net import (
@@ -369,8 +370,9 @@ def no_dead_element(searched: SearchedMission) -> Result:
 
 def _after_unread_expressions(mission: Mission, net: PetriNet) -> set[str]:
     """Return the elements to which an error EXPRESSION leads, if not all data are followed: the net
-    has such errors only where all that the expression reads is."""
-    if all(each.exactness is not Exactness.MORE for each in net.approximations):
+    has such errors only where all that the expression reads is, and none of collections."""
+    followed = all(each.exactness is not Exactness.MORE for each in net.approximations)
+    if followed and not any(isinstance(a.loop, MultiInstance) for a in mission.activities()):
         return set()
     caught = [
         event

@@ -94,6 +94,15 @@ class Data:
             )
         return known
 
+    def initial(self, process: e.Process, frame: tuple[str, ...]) -> dict[int, int]:
+        """The values of the variables that a process reads when an instance of it begins."""
+        variables = [
+            self.variable(key, frame)
+            for key in self.domains.of
+            if key not in self._mission.data_stores and self.is_read_in(key, process)
+        ]
+        return {each: self.variables[each].initial for each in variables}
+
     # --- reading --------------------------------------------------------------------------------
 
     def cases(

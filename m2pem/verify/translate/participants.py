@@ -99,12 +99,13 @@ def begin_together(context: TranslationContext, process: e.Process) -> tuple[int
 
 def alive(context: TranslationContext, process: e.Process, scope: ScopeDraft) -> int:
     """Return the place of a token while an instance of a process is active; it ends when it is
-    empty."""
+    empty, and its data with it."""
     place = context.net.place(process, scope, Role.CONTROL, ":alive")
     notes = context.notes_scopes.get(scope.index, scope)
     over = Effect(
         steps=(Step(process.id, Action.COMPLETED),),
         consume=(place,),
+        assign=context.data.initial(process, scope.frame),
         reset_scopes=frozenset({scope.index, notes.index}),
         empty_scopes=frozenset({scope.index}),
     )

@@ -187,10 +187,7 @@ def call(context: TranslationContext, instance: ActivityInstance) -> list[Effect
         [forget_completions(context, inside, node.called)], [begin(context, node.called, inside)]
     )
     data = context.data
-    for key in data.domains.of:
-        if key not in context.mission.data_stores and data.is_read_in(key, node.called):
-            variable = data.variable(key, inside.frame)
-            ways = product(ways, [Effect(assign={variable: data.variables[variable].initial})])
+    ways = product(ways, [Effect(assign=data.initial(node.called, inside.frame))])
     for mapping in node.mappings.inputs:
         ways = data.write(
             ways, mapping.target, mapping.source, instance.outer, node, into=inside.frame
