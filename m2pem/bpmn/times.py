@@ -7,6 +7,7 @@ from m2pem.mission.events import TimerKind
 from m2pem.mission.expression import Expression
 from m2pem.mission.expression.kinds import kinds
 from m2pem.mission.expression.temporal import DATE, DAYS, MOMENT, MONTHS
+from m2pem.mission.expression.vocabulary import COERCING
 from m2pem.mission.timers import cycle, date_us, duration_us
 from m2pem.mission.values import Value
 
@@ -30,7 +31,7 @@ def wrong_time(expression: Expression, kind: TimerKind) -> str:
         except (ExpressionSyntaxError, ExpressionError) as error:
             return str(error)
         return ""
-    found = kinds(expression.tree)
+    found = kinds(expression.tree, coerced=expression.dialect in COERCING)
     what, takes = _TAKES[kind]
     if takes & found:
         return ""

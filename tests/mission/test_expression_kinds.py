@@ -44,3 +44,8 @@ DURATIONS = {"days and time duration", "years and months duration"}
 def test_an_expression_has_only_values_of_its_kinds(text, expected):
     read = template if text.startswith("PT") else parse
     assert kinds(read(text).tree) == expected
+
+
+def test_arithmetic_that_coerces_gives_numbers():
+    assert kinds(parse("${a + 'x'}").tree, coerced=True) == {"number"}
+    assert kinds(parse("${a ? -'3' : b * c}").tree, coerced=True) == {"number"}

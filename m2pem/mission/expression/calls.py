@@ -8,10 +8,9 @@ from collections.abc import Callable
 
 from m2pem.mission.expression.dialect import Dialect
 from m2pem.mission.expression.functions import (
-    FEEL,
-    FEEL_FUNCTIONS,
     FEEL_NAMES,
     FUNCTIONS,
+    OWN,
     Function,
 )
 from m2pem.mission.expression.temporal import NOW
@@ -85,11 +84,9 @@ def method_call(receiver: Node, method: str, arguments: Arguments) -> Node:
 
 
 def _function(name: str, arguments: Arguments, dialect: Dialect = Dialect.JUEL) -> Node:
-    functions: dict[str, Function] = FUNCTIONS
-    prefix = ""
-    if dialect is Dialect.FEEL:
-        functions = {**FUNCTIONS, **FEEL_FUNCTIONS}
-        prefix = FEEL if name in FEEL_FUNCTIONS else ""
+    own = OWN.get(dialect.name, {})
+    functions: dict[str, Function] = {**FUNCTIONS, **own}
+    prefix = f"{dialect.name} " if name in own else ""
     function = functions.get(name)
     if function is None:
         if "." in name:
@@ -201,11 +198,5 @@ _XPATH_SHAPES: dict[str, Build] = {
     "false": lambda: Literal(False),
     "not": Not,
 }
-XPATH_NAMES = {
-    "ceiling": "ceil",
-    "count": "length",
-    "starts-with": "starts_with",
-    "string": "text",
-    "string-length": "length",
-}
-"""What XPath 1.0 calls the functions; it may use the names of `FUNCTIONS` too."""
+XPATH_NAMES = {"count": "length"}
+"""What XPath 1.0 calls one of `FUNCTIONS`, whose names it may use too."""

@@ -10,7 +10,6 @@ from typing import Any
 from m2pem.errors import ExpressionError
 from m2pem.mission.expression.functions import LISTED
 from m2pem.mission.expression.operators import (
-    ARITHMETIC,
     COMPARISONS,
     bounded_list,
     contains,
@@ -18,9 +17,8 @@ from m2pem.mission.expression.operators import (
     index,
     join,
     look_at,
-    negate,
-    truth,
 )
+from m2pem.mission.expression.rules import Rules
 from m2pem.mission.expression.temporal import Computed
 from m2pem.mission.expression.tree import (
     And,
@@ -62,83 +60,85 @@ def _part(value: Value, path: str) -> Value:
     return value
 
 
-def evaluate(node: Node, read: ReadValue) -> Computed:
-    """The tree's value; it raises ExpressionError."""
-    return _RULES[type(node)](node, read)
+def evaluate(node: Node, read: ReadValue, rules: Rules) -> Computed:
+    """The tree's value by the rules of its language; it raises ExpressionError."""
+    return _EVALUATE[type(node)](node, read, rules)
 
 
-def _holds(node: Node, read: ReadValue, what: str) -> bool:
-    value = _RULES[type(node)](node, read)
-    return value if value is True or value is False else truth(value, what)
+def _holds(node: Node, read: ReadValue, rules: Rules, what: str) -> bool:
+    value = _EVALUATE[type(node)](node, read, rules)
+    return value if value is True or value is False else rules.truth(value, what)
 
 
-def _literal(node: Literal, read: ReadValue) -> Computed:
+def _literal(node: Literal, read: ReadValue, rules: Rules) -> Computed:
     return node.value
 
 
-def _name(node: Name, read: ReadValue) -> Computed:
+def _name(node: Name, read: ReadValue, rules: Rules) -> Computed:
     return read(node.name)
 
 
-def _not(node: Not, read: ReadValue) -> Computed:
-    return not _holds(node.operand, read, "'not'")
+def _not(node: Not, read: ReadValue, rules: Rules) -> Computed:
+    return not _holds(node.operand, read, rules, "'not'")
 
 
-def _and(node: And, read: ReadValue) -> Computed:
+def _and(node: And, read: ReadValue, rules: Rules) -> Computed:
     for operand in node.operands:  # noqa: SIM110  # a generator costs more than all of it
-        if not _holds(operand, read, "'and'"):
+        if not _holds(operand, read, rules, "'and'"):
             return False
     return True
 
 
-def _or(node: Or, read: ReadValue) -> Computed:
+def _or(node: Or, read: ReadValue, rules: Rules) -> Computed:
     for operand in node.operands:  # noqa: SIM110  # a generator costs more than all of it
-        if _holds(operand, read, "'or'"):
+        if _holds(operand, read, rules, "'or'"):
             return True
     return False
 
 
-def _compare(node: Compare, read: ReadValue) -> Computed:
+def _compare(node: Compare, read: ReadValue, rules: Rules) -> Computed:
     operator, right = node.operator, node.right
-    value = _RULES[type(node.left)](node.left, read)
+    value = _EVALUATE[type(node.left)](node.left, read, rules)
     if type(right) is Literal:
         other = right.value
         # What conditions mostly are; for a text or null, Python's `==` is the same.
-        if other is None or type(other) is str:
+        if rules.compare is COMPARISONS and (other is None or type(other) is str):
             if operator is Comparison.EQUAL:
                 return value == other
             if operator is Comparison.NOT_EQUAL:
                 return value != other
-        return COMPARISONS[operator](value, other)
-    return COMPARISONS[operator](value, _RULES[type(right)](right, read))
+        return rules.compare[operator](value, other)
+    return rules.compare[operator](value, _EVALUATE[type(right)](right, read, rules))
 
 
-def _in(node: In, read: ReadValue) -> Computed:
-    container = evaluate(node.container, read)
-    return contains(container, evaluate(node.item, read))
+def _in(node: In, read: ReadValue, rules: Rules) -> Computed:
+    container = evaluate(node.container, read, rules)
+    return contains(container, evaluate(node.item, read, rules))
 
 
-def _negate(node: Negate, read: ReadValue) -> Computed:
-    return negate(evaluate(node.operand, read))
+def _negate(node: Negate, read: ReadValue, rules: Rules) -> Computed:
+    return rules.negate(evaluate(node.operand, read, rules))
 
 
-def _arithmetic(node: Arithmetic, read: ReadValue) -> Computed:
-    left = _RULES[type(node.left)](node.left, read)
-    return ARITHMETIC[node.operator](left, _RULES[type(node.right)](node.right, read))
+def _arithmetic(node: Arithmetic, read: ReadValue, rules: Rules) -> Computed:
+    left = _EVALUATE[type(node.left)](node.left, read, rules)
+    return rules.arithmetic[node.operator](
+        left, _EVALUATE[type(node.right)](node.right, read, rules)
+    )
 
 
-def _index(node: Index, read: ReadValue) -> Computed:
-    container = evaluate(node.container, read)
-    return index(container, evaluate(node.key, read))
+def _index(node: Index, read: ReadValue, rules: Rules) -> Computed:
+    container = evaluate(node.container, read, rules)
+    return index(container, evaluate(node.key, read, rules))
 
 
-def _if(node: If, read: ReadValue) -> Computed:
-    chosen = node.then if _holds(node.condition, read, "a condition") else node.otherwise
-    return evaluate(chosen, read)
+def _if(node: If, read: ReadValue, rules: Rules) -> Computed:
+    chosen = node.then if _holds(node.condition, read, rules, "a condition") else node.otherwise
+    return evaluate(chosen, read, rules)
 
 
-def _some(node: Some, read: ReadValue) -> Computed:
-    items = evaluate(node.collection, read)
+def _some(node: Some, read: ReadValue, rules: Rules) -> Computed:
+    items = evaluate(node.collection, read, rules)
     if items is None:
         return False
     if not isinstance(items, list):
@@ -146,24 +146,24 @@ def _some(node: Some, read: ReadValue) -> Computed:
     size = sum(1 for _ in walk(node.condition))
     for item in items:
         look_at(size)
-        if _holds(node.condition, bind(node.variable, item, read), "a condition"):
+        if _holds(node.condition, bind(node.variable, item, read), rules, "a condition"):
             return True
     return False
 
 
-def _list(node: ListOf, read: ReadValue) -> Computed:
-    return bounded_list([evaluate(item, read) for item in node.items])  # type: ignore[return-value]
+def _list(node: ListOf, read: ReadValue, rules: Rules) -> Computed:
+    return bounded_list([evaluate(item, read, rules) for item in node.items])  # type: ignore[return-value]
 
 
-def _call(node: Call, read: ReadValue) -> Computed:
-    return LISTED[node.function].call([evaluate(each, read) for each in node.arguments])
+def _call(node: Call, read: ReadValue, rules: Rules) -> Computed:
+    return LISTED[node.function].call([evaluate(each, read, rules) for each in node.arguments])
 
 
-def _join(node: Join, read: ReadValue) -> Computed:
-    return join([evaluate(part, read) for part in node.parts])
+def _join(node: Join, read: ReadValue, rules: Rules) -> Computed:
+    return join([evaluate(part, read, rules) for part in node.parts])
 
 
-_RULES: dict[type[Node], Callable[[Any, ReadValue], Computed]] = {
+_EVALUATE: dict[type[Node], Callable[[Any, ReadValue, Rules], Computed]] = {
     Literal: _literal,
     Name: _name,
     ListOf: _list,

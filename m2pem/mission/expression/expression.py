@@ -10,9 +10,9 @@ from m2pem.mission.expression.dialect import Dialect, Span, locate, split
 from m2pem.mission.expression.evaluate import evaluate
 from m2pem.mission.expression.feel import FeelParser
 from m2pem.mission.expression.literals import shorten, show_scalar
-from m2pem.mission.expression.operators import begin_work, truth
+from m2pem.mission.expression.operators import begin_work
 from m2pem.mission.expression.parser import Parser
-from m2pem.mission.expression.temporal import to_data
+from m2pem.mission.expression.rules import RULES
 from m2pem.mission.expression.tree import Join, Literal, Node, names
 from m2pem.mission.values import ReadValue, Value
 
@@ -52,21 +52,23 @@ class Expression:
         if new_limit:
             begin_work()
         try:
-            value = evaluate(self.tree, read)
-            return to_data(value) if self.dialect is Dialect.FEEL else value  # type: ignore[return-value]
+            rules = RULES[self.dialect]
+            value = evaluate(self.tree, read, rules)
+            return rules.result(value) if rules.result else value  # type: ignore[return-value]
         except ExpressionError as error:
             self._explain(error)
 
     def holds(self, read: ReadValue) -> bool:
-        """Its truth: null is false.
+        """Its truth: null is false; JUEL and XPath coerce other values.
 
         Raises:
-            ExpressionError: as `evaluate`, and when the value is neither a boolean nor null.
+            ExpressionError: as `evaluate`, and when the value is not true or false.
         """
         begin_work()
         try:
-            value = evaluate(self.tree, read)
-            return value if value is True or value is False else truth(value, "a condition")
+            rules = RULES[self.dialect]
+            value = evaluate(self.tree, read, rules)
+            return value if value is True or value is False else rules.truth(value, "a condition")
         except ExpressionError as error:
             self._explain(error)
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import m2pem.mission.timers as times  # imports this package too: only its name is bound yet
 from m2pem.errors import ExpressionError, ExpressionSyntaxError
+from m2pem.mission.expression import xpath
 from m2pem.mission.expression.literals import NUMBER, read_number
 from m2pem.mission.expression.operators import (
     TEXT_AS_VALUE,
@@ -267,10 +268,36 @@ FEEL_FUNCTIONS: dict[str, Function] = {
 }  # fmt: skip
 """What FEEL alone has, or has otherwise: dates and durations are values of their kinds."""
 
-FEEL = "FEEL "
-"""How the name of one of those begins in a tree."""
+XPATH_FUNCTIONS: dict[str, Function] = {
+    function.name: function
+    for function in (
+        Function("boolean(x)", (_ANY,), lambda x: xpath.truth(x, ""), gives=_BOOLEAN),
+        Function("ceiling(x)", (_ANY,), xpath.ceiling),
+        Function("concat(x, y, ...)", (_ANY, _ANY), xpath.concat, rest=True, gives=_TEXT),
+        Function("contains(x, y)", (_ANY, _ANY), xpath.contains, gives=_BOOLEAN),
+        Function("floor(x)", (_ANY,), xpath.floor),
+        Function("normalize-space(x)", (_ANY,), xpath.normalize_space, gives=_TEXT),
+        Function("number(x)", (_ANY,), xpath.number),
+        Function("round(x)", (_ANY,), xpath.rounded),
+        Function("starts-with(x, y)", (_ANY, _ANY), xpath.starts_with, gives=_BOOLEAN),
+        Function("string(x)", (_ANY,), xpath.string, gives=_TEXT),
+        Function("string-length(x)", (_ANY,), xpath.string_length),
+        Function("substring(x, start, length)", (_ANY, _ANY, _ANY), xpath.substring, gives=_TEXT,
+                 optional=1),
+        Function("substring-after(x, y)", (_ANY, _ANY), xpath.after, gives=_TEXT),
+        Function("substring-before(x, y)", (_ANY, _ANY), xpath.before, gives=_TEXT),
+        Function("translate(x, y, z)", (_ANY, _ANY, _ANY), xpath.translate, gives=_TEXT),
+    )
+}  # fmt: skip
+"""XPath's own, which convert what they take (XPath 1.0, clause 4)."""
 
-LISTED = {**FUNCTIONS, **{FEEL + name: each for name, each in FEEL_FUNCTIONS.items()}}
+OWN = {"FEEL": FEEL_FUNCTIONS, "XPATH": XPATH_FUNCTIONS}
+"""Functions that one language has, or has otherwise, by how their names begin in a tree."""
+
+LISTED = {
+    **FUNCTIONS,
+    **{f"{of} {name}": each for of, own in OWN.items() for name, each in own.items()},
+}
 """All functions, by their names in a tree."""
 
 FEEL_NAMES = {

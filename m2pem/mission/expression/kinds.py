@@ -23,11 +23,13 @@ _DATA = frozenset({"boolean", "number", "text", "list", "map"})
 _NEGATED = frozenset({"number", DAYS, MONTHS})
 
 
-def kinds(node: Node) -> frozenset[str]:
+def kinds(node: Node, *, coerced: bool = False) -> frozenset[str]:
     """The kinds of its values besides null, as `operators.kind` calls them; none: it has no value
-    but null, or an error.
+    but null, or an error. `coerced`: as of JUEL and XPath, whose arithmetic gives numbers.
     """
     match node:
+        case Negate() | Arithmetic() if coerced:
+            return frozenset({"number"})
         case Literal(value):
             return frozenset() if value is None else frozenset({kind(value)})
         case Name() | Index():
@@ -35,10 +37,12 @@ def kinds(node: Node) -> frozenset[str]:
         case Call(function, arguments):
             called = LISTED[function]
             takes = chain(called.takes, repeat(called.takes[-1]))
-            fits = all((kinds(each) | {"null"}) & {*next(takes)} for each in arguments)
+            fits = all(
+                (kinds(each, coerced=coerced) | {"null"}) & {*next(takes)} for each in arguments
+            )
             return frozenset(called.gives) if fits else frozenset()
         case If(_, then, otherwise):
-            return kinds(then) | kinds(otherwise)
+            return kinds(then, coerced=coerced) | kinds(otherwise, coerced=coerced)
         case Negate(operand):
             return kinds(operand) & _NEGATED
         case Arithmetic(sign, left, right):

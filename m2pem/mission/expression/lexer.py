@@ -47,7 +47,7 @@ _HINTS = {
 _CALLED = {
     Dialect.FEEL: r"date and time(?=\s*\()",
     Dialect.JUEL: r"(?:var|vars|variables):\w+(?=\s*\()",
-    Dialect.XPATH: r"(?!(?:and|or|div)\s*+\()(?:[^\W\d][\w.-]*+:)?[^\W\d][\w-]*+(?=\s*+\()",
+    Dialect.XPATH: r"(?!(?:and|or|div|mod)\s*+\()(?:[^\W\d][\w.-]*+:)?[^\W\d][\w-]*+(?=\s*+\()",
 }
 """Names of functions that are no names of the store."""
 

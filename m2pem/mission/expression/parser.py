@@ -1,8 +1,8 @@
 """Parses tokens of any dialect to the one syntax tree, by precedence climbing.
 
 From weak to strong: `a ? b : c`, `or`, `and`, `not`, comparisons (which do not chain), `+ -`,
-`* /`, unary `-`. In the `${...}` dialect `not` (`!`) and `empty` bind like unary `-`, as in
-JUEL. Where that would change what a bare expression means, it is refused.
+`* /`, unary `-`. In JUEL `not` (`!`) and `empty` bind like unary `-`; in it and in XPath
+comparisons chain, and `==` binds more weakly than `<`. What people read otherwise is refused.
 """
 
 import re
@@ -36,8 +36,10 @@ from m2pem.mission.expression.tree import (
 )
 from m2pem.mission.expression.vocabulary import (
     AND,
+    COERCING,
     COMPARISON,
     CONSTANTS,
+    EQUALITY,
     LOWEST,
     NOT,
     UNARY,
@@ -124,8 +126,9 @@ class Parser:
         if negated:
             self._expect("in", "after 'not'")
         right = self._expression(strength)
-        if strength == COMPARISON:
-            self._refuse_chain()
+        if strength in (EQUALITY, COMPARISON):
+            if self._dialect not in COERCING or operator in ("in", "not"):
+                self._refuse_chain()
             if operator in ("in", "not"):
                 member = In(left, right)
                 return Not(member) if negated else member
@@ -161,9 +164,10 @@ class Parser:
                 return Negate(self._expression(UNARY))
             case "not":
                 return self._not(token, minimum)
+            case "%" if self._token.text == "(" and self._text.startswith("mod", token.position):
+                return self._inside(self._name(token._replace(text="mod")))
             case "empty":
-                node = Call("is_empty", (self._expression(UNARY),))
-                return self._unambiguous(node, token)
+                return self._unambiguous(Call("is_empty", (self._expression(UNARY),)), token)
         self._fail(f"expected a value, found {token.text!r}", token)
 
     def _not(self, token: Token, minimum: int) -> Node:
@@ -175,7 +179,7 @@ class Parser:
 
     def _unambiguous(self, node: Node, token: Token) -> Node:
         # JUEL reads '!a == b' as '(!a) == b', most people as '!(a == b)'.
-        if self._token.strength >= COMPARISON:
+        if self._token.strength >= EQUALITY:
             self._fail(
                 f"'{token.text}' is ambiguous before '{self._token.text}'; use parentheses", token
             )

@@ -27,12 +27,13 @@ class Comparison(StrEnum):
 
 
 class Operation(StrEnum):
-    """Arithmetic. `+` also joins two texts."""
+    """Arithmetic. `+` also joins two texts; `%` is of JUEL and XPath, with the dividend's sign."""
 
     ADD = "+"
     SUBTRACT = "-"
     MULTIPLY = "*"
     DIVIDE = "/"
+    MODULO = "%"
 
     __hash__ = str.__hash__
 

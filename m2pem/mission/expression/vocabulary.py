@@ -2,16 +2,19 @@
 
 from m2pem.mission.expression.dialect import Dialect
 
-LOWEST, OR, AND, NOT, COMPARISON, SUM, PRODUCT, UNARY = range(8)
+LOWEST, OR, AND, NOT, EQUALITY, COMPARISON, SUM, PRODUCT, UNARY = range(9)
 _BINARY = {
     "or": OR,
     "and": AND,
     **dict.fromkeys(("in", "between", "not"), COMPARISON),
     **dict.fromkeys(("==", "!=", "<", "<=", ">", ">="), COMPARISON),
     **dict.fromkeys("+-", SUM),
-    **dict.fromkeys("*/", PRODUCT),
+    **dict.fromkeys("*/%", PRODUCT),
 }
 """How strongly an operator binds after a value; `not` there begins `not in`."""
+
+COERCING = frozenset({Dialect.JUEL, Dialect.XPATH})
+"""Languages that coerce values; comparisons chain there, `==` and `!=` bind more weakly."""
 
 CONSTANTS = {"true": True, "false": False, "null": None}
 _SYMBOLS = {
@@ -22,7 +25,15 @@ _WORDS = {"and": "and", "or": "or", "not": "not", "in": "in"}
 
 SYMBOLS = {
     Dialect.BARE: {**_SYMBOLS, **_TERNARY, "==": "=="},
-    Dialect.JUEL: {**_SYMBOLS, **_TERNARY, "==": "==", "&&": "and", "||": "or", "!": "not"},
+    Dialect.JUEL: {
+        **_SYMBOLS,
+        **_TERNARY,
+        "==": "==",
+        "&&": "and",
+        "||": "or",
+        "!": "not",
+        "%": "%",
+    },
     Dialect.FEEL: {**_SYMBOLS, "=": "==", "..": ".."},
     Dialect.XPATH: {s: s for s in _SYMBOLS if s not in "/[]."} | {"=": "=="},
 }
@@ -37,13 +48,14 @@ WORDS = {
         "gt": ">",
         "ge": ">=",
         "div": "/",
+        "mod": "%",
         "empty": "empty",
     },
     Dialect.FEEL: {
         **_WORDS,
         **{word: word for word in ("between", "else", "every", "if", "satisfies", "some", "then")},
     },
-    Dialect.XPATH: {"and": "and", "or": "or", "div": "/"},
+    Dialect.XPATH: {"and": "and", "or": "or", "div": "/", "mod": "%"},
 }
 UNSUPPORTED = {Dialect.FEEL: ("for", "function", "instance")}
 """Words that are neither operators nor names."""
@@ -52,8 +64,10 @@ UNSUPPORTED = {Dialect.FEEL: ("for", "function", "instance")}
 def _meanings(dialect: Dialect) -> dict[str, tuple[str, str, int]]:
     """The kind, text and strength of what is written, where it has a meaning of its own."""
     operators = {**SYMBOLS[dialect], **WORDS[dialect]}
+    equality = dict.fromkeys(("==", "!="), EQUALITY) if dialect in COERCING else {}
+    binary = {**_BINARY, **equality}
     return {
-        **{w: ("operator", name, _BINARY.get(name, LOWEST)) for w, name in operators.items()},
+        **{w: ("operator", name, binary.get(name, LOWEST)) for w, name in operators.items()},
         **{word: ("constant", word, LOWEST) for word in CONSTANTS},
     }
 
