@@ -12,6 +12,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 from m2pem.geo.fence import Fence, polygons, valid
+from m2pem.geo.lazy_imports import shapely
 from m2pem.geo.local_frame import EastNorth
 from m2pem.geo.polygon import Edge, turned
 
@@ -135,14 +136,10 @@ def rows(
         found.append([(bottom + width_m / 2, span) for span in spans])
     if closed is None and len(rings) == 1:
         return found
-    import shapely  # noqa: PLC0415
-    from shapely import affinity  # noqa: PLC0415
-
-    kept_out = (
-        [] if closed is None else [affinity.rotate(closed, -yaw_rad, (0, 0), use_radians=True)]
-    )
-    holes = _turned_holes(rings[1:], yaw_rad)
-    obstacles = shapely.union_all([*kept_out, *([] if holes is None else [holes])])
+    obstacles = _turned_holes(rings[1:], yaw_rad) or shapely.Polygon()
+    if closed is not None:
+        around = shapely.affinity.rotate(closed, -yaw_rad, (0, 0), use_radians=True)
+        obstacles = obstacles.union(around)
     region = valid(level[0]).difference(obstacles)
     if region.is_empty:
         return []
@@ -154,8 +151,6 @@ def rows(
 
 def is_free(closed: "BaseGeometry", y: float, from_x: float, to_x: float) -> bool:
     """Whether a line along x stays out of what is closed; it may touch it."""
-    import shapely  # noqa: PLC0415
-
     line = shapely.LineString(((from_x, y), (to_x, y)))
     return line.length == 0.0 or line.intersection(closed).length < _SHORTEST_M
 
@@ -170,8 +165,6 @@ def _beside(
     row: Row, region: "BaseGeometry", closed: "BaseGeometry", bottom: float, width_m: float
 ) -> Row:
     """Return the passes of a strip that stay out of what is closed, with those beside it."""
-    import shapely  # noqa: PLC0415
-
     half_m = width_m / 2 + _SEAM_M
     west, _, east, _ = region.bounds
     strip = shapely.box(west - width_m, bottom, east + width_m, bottom + width_m)
@@ -212,8 +205,6 @@ def _length_m(row: Row) -> float:
 
 def _cut(y: float, span: Span, closed: "BaseGeometry") -> Iterator[Span]:
     """Yield the parts of a pass that are free."""
-    import shapely  # noqa: PLC0415
-
     left = shapely.LineString([(span[0], y), (span[1], y)]).difference(closed)
     for part in shapely.get_parts(left):
         if part.length >= _SHORTEST_M:

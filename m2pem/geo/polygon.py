@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import TypeAlias
 
+from m2pem.geo.lazy_imports import shapely
 from m2pem.geo.local_frame import EastNorth, LatLon, LocalFrame
 from m2pem.mission.geometry import Area, Coordinate, Geometry, Route
 
@@ -256,14 +257,9 @@ def ring_problem(rings: Sequence[Sequence[Coordinate]]) -> str:
 
 def mended(rings: Sequence[Sequence[Coordinate]]) -> tuple[tuple[Coordinate, ...], ...] | None:
     """Return closed rings without the parts that have no area, such as an edge that goes out and
-    back; None: that is not all that is wrong with them.
-
-    Shapely makes them valid. It is imported here, as it is slow to load and seldom needed.
-    """
+    back; None: that is not all that is wrong with them."""
     if _limit_problem(rings):
         return None
-    import shapely  # noqa: PLC0415
-
     heights = {corner[:2]: corner[2] for ring in rings for corner in ring}
     outer, *holes = ([corner[:2] for corner in ring] for ring in rings)
     drawn = shapely.Polygon(outer, holes)

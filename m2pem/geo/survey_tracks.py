@@ -12,6 +12,7 @@ from typing import TypeAlias
 
 from m2pem.geo.fence import Fence, rings_of
 from m2pem.geo.lawn_mower import Ring, Span, merged, passes_over, strip_width_m
+from m2pem.geo.lazy_imports import shapely
 from m2pem.geo.local_frame import EastNorth
 from m2pem.geo.polygon import turned
 from m2pem.geo.polyline import Polyline
@@ -134,8 +135,6 @@ class SurveyTracks:
 
     def _beside_holes(self, strips: Sequence[tuple[float, list[Span]]]) -> list[list[EastNorth]]:
         """Return strips without the holes of the area, in axes that are turned as the passes."""
-        import shapely  # noqa: PLC0415
-
         half_m = self.width_m / 2 + _SEAM_M
         boxes = [
             shapely.box(low, y - half_m, high, y + half_m)

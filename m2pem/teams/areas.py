@@ -8,6 +8,7 @@ from typing import TypeAlias
 from m2pem.fleet.parameters import accepted
 from m2pem.geo.fence import Fence, rings_of, valid
 from m2pem.geo.lawn_mower import Ring, longest_edge_yaw
+from m2pem.geo.lazy_imports import shapely
 from m2pem.geo.polygon import middle_of
 from m2pem.geo.survey_tracks import SurveyTracks
 from m2pem.geo.work_shares import owners, reach_m, split
@@ -37,8 +38,6 @@ def strips(
 ) -> list[list[list[Place]]]:
     """Return each member's band of an area as rings; an empty list for a member without a pass, or
     whose band is in several pieces."""
-    import shapely  # noqa: PLC0415
-
     level = [[turned(corner, (0.0, 0.0), tracks.yaw_rad) for corner in ring] for ring in rings]
     west, east = (extreme(x for x, _ in level[0]) for extreme in (min, max))
     low, high = (extreme(y for _, y in level[0]) for extreme in (min, max))

@@ -40,7 +40,7 @@ def test_help_imports_nothing_slow(words: list[str], may: list[str]) -> None:
     ("words", "unneeded"),
     [
         (["check"], ["asyncio", "m2pem.simulation.arbiters", "pydantic"]),
-        (["check", "--fleet", str(FLEET)], ["m2pem.executive.executive", "pyproj", "shapefile"]),
+        (["check", "--fleet", str(FLEET)], ["m2pem.executive.executive", "pyproj", "shapely"]),
         (["simulate"], ["m2pem.fleet.fleet_file", "numpy"]),
         (["run", "--fleet", "sim", "--ocu", "none", "--journal", "memory:"], ["numpy", "pydantic"]),
     ],
