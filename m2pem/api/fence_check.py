@@ -7,7 +7,7 @@ from m2pem.api.behavior_parameters import BehaviorParameters
 from m2pem.api.bus import FleetBus
 from m2pem.api.telemetry import VehicleState
 from m2pem.fleet.parameters import ResolvedValue
-from m2pem.geo.fence import Fence
+from m2pem.geo.fence import Breach, Fence
 from m2pem.geo.local_frame import LatLon, offset
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.geometry import Point
@@ -42,52 +42,38 @@ class FenceCheck:
         start: LatLon | None,
         yaw_rad: float | None = None,
     ) -> str:
-        """Return where the way would leave the fence; "" if it does not. `start` and `yaw_rad` are
+        """Return where the way would leave the fence, as `find_breach`; "" if it does not."""
+        return str(self.find_breach(behavior, values, start, yaw_rad) or "")
+
+    def find_breach(
+        self,
+        behavior: str,
+        values: Mapping[str, ResolvedValue],
+        start: LatLon | None,
+        yaw_rad: float | None = None,
+    ) -> Breach | None:
+        """Return where the way would leave the fence; None: it does not. `start` and `yaw_rad` are
         those of the vehicle. Without them, the way from the vehicle is not checked."""
         parameters = BehaviorParameters(values)
+        stance = self._stance(parameters.target_vehicle or "")
+        place, name = None, ""
         match behavior:
-            case "single_vehicle_routing":
-                return self._of_route(parameters, start)
+            case "single_vehicle_routing" if parameters.route is not None:
+                way = [waypoint[:2] for waypoint in parameters.route.waypoints]
+                return self.fence.find_breach(way, start, _waypoint, parameters.loop)
             case "goto":
-                return self._of_place(self._target(parameters), start, "the target")
-            case "follow":
-                return self.of_station(parameters, start)
+                place, name = stance and stance[0], "the target"
+                if isinstance(parameters.target, Point):
+                    place = parameters.target.position[:2]
+            case "follow" if stance is not None:
+                bearing_rad, offset_m = parameters.bearing_rad, parameters.offset_m
+                yaw = stance[1] - (BEHIND_RAD if bearing_rad is None else bearing_rad)
+                place = _beside(stance[0], yaw, OFFSET_M if offset_m is None else offset_m)
+                name = "its station at the target"
             case "reverse" if start is not None and yaw_rad is not None:
-                behind = _beside(start, yaw_rad, -parameters.distance_m)
-                return self._of_place(behind, start, "the place behind it")
-        return ""
-
-    def of_station(self, parameters: BehaviorParameters, start: LatLon | None) -> str:
-        """As `refusal`, of a vehicle that follows another one, as that is now."""
-        stance = self._stance(parameters.target_vehicle or "")
-        if stance is None:
-            return ""
-        bearing_rad, offset_m = parameters.bearing_rad, parameters.offset_m
-        yaw_rad = stance[1] - (BEHIND_RAD if bearing_rad is None else bearing_rad)
-        station = _beside(stance[0], yaw_rad, OFFSET_M if offset_m is None else offset_m)
-        return self._of_place(station, start, "its station at the target")
-
-    def _of_place(self, place: LatLon | None, start: LatLon | None, name: str) -> str:
-        return "" if place is None else self.fence.breach([place], start, lambda _: name)
-
-    def _of_route(self, parameters: BehaviorParameters, start: LatLon | None) -> str:
-        route = parameters.route
-        if route is None or not route.waypoints:
-            return ""
-        way = [waypoint[:2] for waypoint in route.waypoints]
-        reason = self.fence.breach(way, start, _waypoint)
-        if not reason and parameters.loop:
-            last = len(way) - 1
-            ends = [way[-1], way[0]]
-            reason = self.fence.breach(ends, None, lambda index: _waypoint(0 if index else last))
-        return reason
-
-    def _target(self, parameters: BehaviorParameters) -> LatLon | None:
-        target = parameters.target
-        if isinstance(target, Point):
-            return target.position[:2]
-        stance = self._stance(parameters.target_vehicle or "")
-        return None if stance is None else stance[0]
+                place = _beside(start, yaw_rad, -parameters.distance_m)
+                name = "the place behind it"
+        return None if place is None else self.fence.find_breach([place], start, lambda _: name)
 
 
 def stance_on(bus: FleetBus) -> Callable[[str], Stance | None]:

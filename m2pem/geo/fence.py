@@ -2,16 +2,17 @@
 
 The words are those of MAVLink's geofence. Holes of the inclusion are exclusions; there is no
 ceiling. Ways have a width: all that is kept out grows by half of it. Distances are metres in the
-plane of a local frame. Shapely does the geometry; it is imported when a fence is built, as that
-takes 0.3 s.
+plane of a local frame.
 """
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
+from m2pem.geo.lazy_imports import rustworkx, shapely
 from m2pem.geo.local_frame import EastNorth, LatLon, LocalFrame
 from m2pem.mission.geometry import Area, Coordinate
 
@@ -38,6 +39,17 @@ around the farthest."""
 _NEAR_M, _NEAR_FACTOR = 1.0, 3.0
 """A start in an exclusion may leave it by a way of this length, and this much for each metre that
 it is inside."""
+
+
+@dataclass(frozen=True, slots=True)
+class Breach:
+    """Where a way leaves a fence, in words; `place`: the farthest point of what lies outside."""
+
+    text: str
+    place: LatLon
+
+    def __str__(self) -> str:
+        return self.text
 
 
 class Fence:
@@ -78,9 +90,6 @@ class Fence:
     def _keep(
         self, inside: "BaseGeometry | None", kept_out: Sequence["BaseGeometry"], clearance_m: float
     ) -> None:
-        import shapely  # noqa: PLC0415  # slow to load
-
-        self._shapely = shapely
         everywhere = shapely.box(-_FAR_M, -_FAR_M, _FAR_M, _FAR_M)
         if inside is None:
             inside = everywhere
@@ -109,37 +118,46 @@ class Fence:
         way: Sequence[LatLon],
         start: LatLon | None = None,
         name: Callable[[int], str] = lambda index: f"waypoint {index + 1}",
+        loop: bool = False,
     ) -> str:
-        """Where a way of straight lines leaves the fence; "" if it does not.
+        """Where a way of straight lines leaves the fence, as `find_breach`; "" if it does not."""
+        return str(self.find_breach(way, start, name, loop) or "")
+
+    def find_breach(
+        self,
+        way: Sequence[LatLon],
+        start: LatLon | None = None,
+        name: Callable[[int], str] = lambda index: f"waypoint {index + 1}",
+        loop: bool = False,
+    ) -> Breach | None:
+        """Return where a way of straight lines leaves the fence; None: it does not.
 
         `start`: where the vehicle is. One that is outside of the inclusion may come in by a way
         that is never farther out, one in an exclusion may leave it by a near way. `name`: what
-        people call a point of the way.
+        people call a point of the way. `loop`: the way leads back to its first point.
         """
         levels = [self.frame.to_local(place) for place in way]
         for index, (place, level) in enumerate(zip(way, levels, strict=True)):
             if (by_m := self._outside_m(level)) > MARGIN_M:
-                return f"{name(index)}, {_text(place)}, is {_by(by_m)} outside the fleet's fence"
-        ways = [
-            (f"between {name(index)} and {name(index + 1)}", *ends)
-            for index, ends in enumerate(pairwise(levels))
+                said = f"{name(index)}, {_text(place)}, is {_by(by_m)} outside the fleet's fence"
+                return Breach(said, place)
+        order = [*range(len(way)), *([0] if loop else [])]
+        legs = [
+            (f"the way between {name(a)} and {name(b)}", levels[a], levels[b])
+            for a, b in pairwise(order)
         ]
         if start is not None and levels:
-            place = self.frame.to_local(start)
-            ways.insert(0, (f"to {name(0)}", self._entered(place, levels[0]), levels[0]))
-        for ends, *leg in ways:
-            if out := self._worst(leg):
-                return f"the way {ends} leaves the fleet's fence {out}"
-        return ""
+            entered = self._entered(self.frame.to_local(start), levels[0])
+            legs.insert(0, (f"the way to {name(0)}", entered, levels[0]))
+        return next(filter(None, (self._worst(leg, what) for what, *leg in legs)), None)
 
-    def leaves(self, track: Sequence[EastNorth]) -> str:
-        """As `breach`, of a track in the local frame from where the vehicle is. It may have many
-        points: those of curves, too."""
+    def leaves(self, track: Sequence[EastNorth]) -> Breach | None:
+        """As `find_breach`, of a track in the local frame from where the vehicle is. It may have
+        many points: those of curves, too."""
         start = track[0]
         moves = (at for at, place in enumerate(track) if math.dist(start, place) > GRAZE_M)
         way = track[next(moves, len(track)) :]
-        out = self._worst([self._entered(start, way[0]), *way]) if way else ""
-        return f"its way leaves the fleet's fence {out}" if out else ""
+        return self._worst([self._entered(start, way[0]), *way], "its way") if way else None
 
     def is_free(self, a: EastNorth, b: EastNorth) -> bool:
         """Whether the straight way between two places enters nothing that is kept out."""
@@ -153,8 +171,6 @@ class Fence:
         """
         if a == b or self.is_free(a, b):
             return []
-        import rustworkx  # noqa: PLC0415  # as shapely
-
         near = [self._nearest_free(each) for each in (a, b)]
         ends = [place or end for place, end in zip(near, (a, b), strict=True)]
         graph = self._corner_graph.copy()
@@ -166,14 +182,14 @@ class Fence:
         return [place for place in (near[0], *between, near[1]) if place is not None]
 
     def _outside_m(self, level: EastNorth) -> float:
-        distance_m = float(self._free.distance(self._shapely.Point(level)))
+        distance_m = float(self._free.distance(shapely.Point(level)))
         return math.inf if math.isnan(distance_m) else distance_m  # nothing is left of it
 
     def _entered(self, a: EastNorth, b: EastNorth) -> EastNorth:
         """Where the way from a place that may be outside is inside; the place itself if it leads
         farther out, or through an exclusion."""
-        start = self._shapely.Point(a)
-        parts = _lines(self._shapely.LineString((a, b)).intersection(self._out))
+        start = shapely.Point(a)
+        parts = _lines(shapely.LineString((a, b)).intersection(self._out))
         first = min(parts, key=start.distance, default=None)
         if first is None or start.distance(first) > MARGIN_M:
             return a
@@ -186,13 +202,16 @@ class Fence:
             leads = deepest_m <= depth_m + MARGIN_M and not first.intersection(self.closed).length
         return _between(a, b, min(1.0, length_m / math.dist(a, b))) if leads else a
 
-    def _worst(self, way: Sequence[EastNorth]) -> str:
+    def _worst(self, way: Sequence[EastNorth], what: str) -> Breach | None:
         """Of the parts of a way that lie outside, how far the farthest point is out, and where."""
-        line = self._shapely.LineString(way) if len(way) > 1 else self._shapely.Point(way[0])
+        line = shapely.LineString(way) if len(way) > 1 else shapely.Point(way[0])
         parts = _lines(line.intersection(self._deep))
         legs = (self._deepest(*leg) for part in parts for leg in pairwise(part.coords))
-        place, by_m = max(legs, key=lambda deepest: deepest[1], default=((0.0, 0.0), 0.0))
-        return f"by {_by(by_m)} at {_text(self.frame.to_latlon(place))}" if by_m > 0 else ""
+        level, by_m = max(legs, key=lambda deepest: deepest[1], default=((0.0, 0.0), 0.0))
+        if by_m <= 0:
+            return None
+        place = self.frame.to_latlon(level)
+        return Breach(f"{what} leaves the fleet's fence by {_by(by_m)} at {_text(place)}", place)
 
     def _deepest(self, a: EastNorth, b: EastNorth) -> tuple[EastNorth, float]:
         """Return the point of a line that is farthest out, and how far."""
@@ -208,22 +227,20 @@ class Fence:
 
     def _nearest_free(self, place: EastNorth) -> EastNorth | None:
         """Return the nearest place that is not kept out; None: this one is not, or all are."""
-        point = self._shapely.Point(place)
+        point = shapely.Point(place)
         room = self._free.buffer(-_AROUND_M, join_style="mitre")
         if room.is_empty or not self._inner.intersects(point):
             return None
-        nearest = self._shapely.shortest_line(room, point).coords[0]
+        nearest = shapely.shortest_line(room, point).coords[0]
         return nearest[0], nearest[1]
 
     def _are_free(self, place: EastNorth, others: Sequence[EastNorth]) -> list[bool]:
-        lines = self._shapely.linestrings([(place, other) for other in others])
-        return [not each for each in self._shapely.intersects(self._inner, lines)]
+        lines = shapely.linestrings([(place, other) for other in others])
+        return [not each for each in shapely.intersects(self._inner, lines)]
 
     @cached_property
     def _corner_graph(self) -> Any:
         """The corners to go around, and the lengths of the free straight ways between them."""
-        import rustworkx  # noqa: PLC0415
-
         around_m, corners = _AROUND_M, _corners(self._out.buffer(_AROUND_M, join_style="mitre"))
         while len(corners) > _MAX_CORNERS:
             around_m *= 2
@@ -249,16 +266,12 @@ class Fence:
 
 def area_in(rings: Sequence[Sequence[Coordinate]], frame: LocalFrame) -> "BaseGeometry":
     """Return the area that rings bound, made valid."""
-    import shapely  # noqa: PLC0415
-
     outer, *holes = (valid([frame.to_local(corner[:2]) for corner in ring]) for ring in rings)
     return outer.difference(shapely.union_all(holes))
 
 
 def valid(ring: Sequence[EastNorth]) -> "BaseGeometry":
     """Return what a closed ring bounds, made valid."""
-    import shapely  # noqa: PLC0415
-
     return shapely.make_valid(shapely.Polygon(ring), method="structure", keep_collapsed=False)
 
 
@@ -267,8 +280,6 @@ def rings_of(area: "BaseGeometry") -> list[list[EastNorth]]:
 
     The first ring is the outer one, counter-clockwise, the others are holes, clockwise.
     """
-    import shapely  # noqa: PLC0415
-
     parts = [part for part in polygons(area) if not part.buffer(-GRAZE_M).is_empty]
     if len(parts) != 1:
         return []
@@ -293,10 +304,8 @@ def _eroded(geometry: "BaseGeometry", by_m: float) -> Iterator["BaseGeometry"]:
 
 def _corners(kept_out: "BaseGeometry") -> list[EastNorth]:
     """Return the corners that a shortest way may pass: where what is kept out is convex."""
-    from shapely.geometry.polygon import orient  # noqa: PLC0415
-
     corners = []
-    for part in map(orient, polygons(kept_out)):  # what is kept out is to the left
+    for part in map(shapely.orient_polygons, polygons(kept_out)):  # what is kept out is to the left
         for ring in (part.exterior, *part.interiors):
             coords = ring.coords[:-1]
             for a, b, c in zip(coords[-1:] + coords, coords, coords[1:] + coords[:1], strict=False):

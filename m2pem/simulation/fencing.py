@@ -19,7 +19,7 @@ from m2pem.fleet.behaviors import SHARED
 from m2pem.fleet.fleet import Fleet
 from m2pem.fleet.parameters import ResolvedValue, examine
 from m2pem.fleet.task_findings import TaskFindings
-from m2pem.geo.fence import Fence
+from m2pem.geo.fence import Breach, Fence
 from m2pem.mission.behavior import Behavior, BehaviorType
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.elements import Activity, CallActivity, FlowNode, StartEvent, SubProcess
@@ -49,17 +49,17 @@ _AS_ROUTES = ("formation", "road_following_formation", "road_sweep", "bridge_cro
 
 def refusal(
     behavior: str, parameters: LocalParameters, craft: Craft, made: Manoeuvre, start: bool = True
-) -> str:
-    """Return where a manoeuvre would leave the fence, in the words of all arbiters; "" if it does
+) -> Breach | None:
+    """Return where a manoeuvre would leave the fence, in the words of all arbiters; None: it does
     not. `start`: whether the craft is where it will begin."""
     fence = parameters.fence
     if fence is None:
-        return ""
+        return None
     place = fence.frame.to_latlon(craft.pose.place[:2]) if start else None
     check = FenceCheck(fence, parameters.stance)
-    reason = check.refusal(behavior, parameters.given, place, craft.pose.yaw)
-    if reason or made.plan is None or behavior not in _BY_TRACK:
-        return reason
+    found = check.find_breach(behavior, parameters.given, place, craft.pose.yaw)
+    if found or made.plan is None or behavior not in _BY_TRACK:
+        return found
     track = track_of(made.plan)
     if not start:
         there = (at for at, each in enumerate(track) if math.dist(each, track[0]) > 1e-3)
@@ -128,29 +128,31 @@ class _Fenced:
     ) -> None:
         alone = behavior.type is BehaviorType.VEHICLE and any(r.resource for r in behavior.roles)
         start, certain = (self._start(task, name) if alone else None) or (None, True)
-        craft, made, reason = self._made(behavior, values, name, start)
-        if reason:
+        craft, made, breach = self._made(behavior, values, name, start)
+        if breach is not None:
             certain = certain or bool(self._made(behavior, values, name, None)[2])
             findings.add(
                 "outside-fence",
-                f"{name}: {reason}",
+                f"{name}: {breach}",
                 "move it inside, or widen the fleet's `fence`",
                 line=behavior.line,
                 severity=Severity.ERROR if certain else Severity.WARNING,
+                place=breach.place,
             )
         elif made is not None and made.plan is not None and name not in self._returned:
             home = self._frame.to_latlon(craft.home[:2])
             for place in track_of(made.plan):
                 at = self._frame.to_latlon(place)
-                if reason := self._fence.breach([home], at, lambda _: "its home"):
+                if breach := self._fence.find_breach([home], at, lambda _: "its home"):
                     self._returned.add(name)
                     findings.add(
                         "return-leaves-fence",
                         f"{name}: on a straight return from [{at[0]:.6f}, {at[1]:.6f}], as after a "
-                        f"failsafe, {reason}",
+                        f"failsafe, {breach}",
                         "move its home or its way, or set rally points",
                         line=behavior.line,
                         severity=Severity.WARNING,
+                        place=breach.place,
                     )
                     return
 
@@ -160,7 +162,7 @@ class _Fenced:
         values: Mapping[str, ResolvedValue],
         name: ResourceId,
         start: Pose | None,
-    ) -> tuple[Craft, Manoeuvre | None, str]:
+    ) -> tuple[Craft, Manoeuvre | None, Breach | None]:
         """Return what the vehicle would do from a start, and why the fence refuses that."""
         craft = self._vehicles[name].craft(0)
         if craft.flies:  # whether it has taken off is another check
@@ -175,10 +177,10 @@ class _Fenced:
         try:
             made = MANOEUVRES[does](craft, parameters)
         except RefusedError:
-            return craft, None, ""
-        moves = parameters.target_vehicle is not None  # where that is then is not known
-        reason = "" if moves else refusal(does, parameters, craft, made, start is not None)
-        return craft, made, reason
+            return craft, None, None
+        if parameters.target_vehicle is not None:  # where that is then is not known
+            return craft, made, None
+        return craft, made, refusal(does, parameters, craft, made, start is not None)
 
     def _start(self, node: FlowNode, name: ResourceId, depth: int = 0) -> _Start:
         """Return where a vehicle is when a task begins, and whether that is certain: it may not

@@ -174,8 +174,8 @@ class Planner:
         manoeuvre: Callable[..., Manoeuvre] = MANOEUVRES[request.behavior]
         made = [manoeuvre(craft, parameters) for craft in crafts]
         for craft, each in zip(crafts, made, strict=True):
-            if reason := refusal_of_fence(request.behavior, parameters, craft, each):
-                raise RefusedError(reason)
+            if breach := refusal_of_fence(request.behavior, parameters, craft, each):
+                raise RefusedError(str(breach))
             if request.behavior == "return_to_launch" and (reason := crossed(parameters, each)):
                 self._context.logger.warning("%s returns: %s", craft.name, reason)
         return [_assignment(*each) for each in zip(vehicles, made, strict=True)] + idle
@@ -196,9 +196,8 @@ class Planner:
             pose.place[0] + pose.velocity[0] * stops_s,
             pose.place[1] + pose.velocity[1] * stops_s,
         )
-        return fence.breach(way, place, lambda _: "its station at the target") or fence.leaves(
-            [pose.place[:2], ahead]
-        )
+        found = fence.find_breach(way, place, lambda _: "its station at the target")
+        return str(found or fence.leaves([pose.place[:2], ahead]) or "")
 
     def _fence(self, resource: ResourceId) -> Fence | None:
         area = self._connections[resource].fence

@@ -5,6 +5,7 @@ import pytest
 
 from tests.cli.conftest import Invoke
 from tests.command_line import FLEET, MISSION, CommandLine, install_plugin
+from tests.simulation.test_fence_findings import at, written
 
 DOUBTFUL = """<definitions xmlns="http://www.omg.org/spec/BPMN/20100524/MODEL" targetNamespace="x">
   <process id="P" isExecutable="true">
@@ -126,6 +127,22 @@ def test_findings_as_json(invoke: Invoke, doubtful: Path) -> None:
         "number",
     }
     assert json.loads(invoke("check", MISSION, "--format", "json")[1]) == []
+
+
+def test_findings_of_the_fence_have_their_place_as_json(invoke: Invoke, tmp_path: Path) -> None:
+    mission, fleet = written(
+        tmp_path, [("goto", "target", at(60, 180)), ("goto", "target", at(180, 180))]
+    )
+    status, out, _ = invoke("check", mission, "--fleet", fleet, "--format", "json")
+    found = {each["rule"]: each for each in json.loads(out)}
+    assert (status, [*found]) == (0, ["return-leaves-fence"])
+    place = found["return-leaves-fence"]["place"]
+    assert f"[{place[0]:.6f}, {place[1]:.6f}]" in found["return-leaves-fence"]["message"]
+    mission, fleet = written(tmp_path, [("goto", "target", at(250, 100))])
+    status, out, _ = invoke("check", mission, "--fleet", fleet, "--format", "json")
+    (finding,) = json.loads(out)
+    assert (status, finding["rule"]) == (1, "outside-fence")
+    assert str(finding["place"]) == at(250, 100)
 
 
 def test_a_plugins_findings_are_printed_too(m2pem: CommandLine, tmp_path: Path) -> None:

@@ -4,13 +4,16 @@ import itertools
 import json
 from pathlib import Path
 
+import pytest
+import shapely
+
 from m2pem.findings import Finding, Severity
 from m2pem.fleet.fleet_file import load_fleet
 from m2pem.scripting.sources import load_mission
 from m2pem.simulation.fencing import fence_findings
 from tests.simulation.conftest import place
 from tests.simulation.test_estimates import HEAD, TAIL, flows, task
-from tests.simulation.test_fencing import YARD
+from tests.simulation.test_fencing import YARD, local_of
 
 FLEET = """version: 1
 origin: {{lat: {0}, lon: {1}, alt: 0}}
@@ -21,13 +24,14 @@ fence: yard
 """
 
 
-def checked(
+def written(
     folder: Path,
     tasks: list[tuple[str, str, str]],
     more: str = "",
     home: tuple[float, float] = (20, 100),
-) -> list[Finding]:
-    """The findings of tasks in a row: behavior, its parameter and that one's value."""
+) -> tuple[Path, Path]:
+    """The files of a mission of tasks in a row (behavior, its parameter and that one's value), and
+    of its fleet."""
     rings = [
         [list(place(x, y)[1::-1]) for x, y, *_ in ring.coords]
         for ring in (YARD.exterior, *YARD.interiors)
@@ -40,8 +44,19 @@ def checked(
         task(id_, behavior, "v", **{name: value})
         for id_, (behavior, name, value) in zip(names[1:], tasks, strict=False)
     )
-    text = HEAD + nodes + more + flows(*itertools.pairwise(names)) + TAIL
-    return fence_findings(load_mission(text.encode()), load_fleet(path))
+    mission = folder / "mission.bpmn"
+    mission.write_text(HEAD + nodes + more + flows(*itertools.pairwise(names)) + TAIL)
+    return mission, path
+
+
+def checked(
+    folder: Path,
+    tasks: list[tuple[str, str, str]],
+    more: str = "",
+    home: tuple[float, float] = (20, 100),
+) -> list[Finding]:
+    mission, fleet = written(folder, tasks, more, home)
+    return fence_findings(load_mission(mission.read_bytes()), load_fleet(fleet))
 
 
 def at(east: float, north: float) -> str:
@@ -54,6 +69,7 @@ def test_a_target_outside_is_an_error_with_the_place_and_the_distance(tmp_path: 
     latitude, longitude, _ = place(250, 100)
     assert (found.severity, found.rule, found.element) == (Severity.ERROR, "outside-fence", "T0")
     assert f"v: the target, [{latitude:.6f}, {longitude:.6f}], is 50 m outside" in found.message
+    assert found.place == pytest.approx((latitude, longitude))
 
 
 def test_the_way_from_home_and_from_the_task_before_is_known(tmp_path: Path) -> None:
@@ -61,6 +77,7 @@ def test_the_way_from_home_and_from_the_task_before_is_known(tmp_path: Path) -> 
     (found,) = checked(tmp_path, [("goto", "target", at(180, 100))])
     assert found.severity is Severity.WARNING  # it may begin elsewhere than at its home
     assert "the way to the target leaves the fleet's fence by 20 m" in found.message
+    assert found.place == pytest.approx(place(100, 100)[:2], abs=1e-6)  # the middle of the hole
     (found,) = [
         each
         for each in checked(
@@ -98,6 +115,9 @@ def test_a_return_that_would_cross_a_hole_is_a_warning_before(tmp_path: Path) ->
     )
     assert (found_.severity, found_.rule) == (Severity.WARNING, "return-leaves-fence")
     assert "the way to its home leaves the fleet's fence by 16 m" in found_.message
+    inside = local_of(found_.place)
+    assert shapely.Point(inside).distance(YARD) == pytest.approx(16, abs=0.5)
+    assert f"at [{found_.place[0]:.6f}, {found_.place[1]:.6f}]" in found_.message
 
 
 def test_a_home_outside_is_named(tmp_path: Path) -> None:

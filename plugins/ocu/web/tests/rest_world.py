@@ -117,10 +117,10 @@ class Rest:
 
 
 @asynccontextmanager
-async def rest_world(folder: Path) -> AsyncIterator[Rest]:
+async def rest_world(folder: Path, fleet: Path = FLEET) -> AsyncIterator[Rest]:
     """Everything, with the missions in `folder`."""
     executive = Executive(
-        simulated_fleet(load_fleet(FLEET)),
+        simulated_fleet(load_fleet(fleet)),
         MemoryJournal(),
         PLUGINS,
         SystemClock(20.0),

@@ -13,6 +13,7 @@ from m2pem.plugins import PluginManager
 from m2pem.rehearsal.rehearsal import rehearse
 from m2pem.scripting.sources import arbiters_of
 from m2pem.verify.search.explore import Limits
+from tests.simulation.test_fence_findings import at, written
 
 NAMES = ("escort", "patrol", "search", "survey", "sweep_and_detect")
 ROUTE = {"type": "LineString", "coordinates": [[-77.319, 38.107], [-77.318, 38.107]]}
@@ -35,6 +36,14 @@ async def test_a_check_tells_findings_and_what_is_in_the_file(tmp_path: Path) ->
         )
         none = await rest.post("/checks", {"xml": "<a/>"})
         assert none["outline"] is None and none["findings"]
+
+
+async def test_a_finding_of_the_fence_has_its_place(tmp_path: Path) -> None:
+    mission, fleet = written(tmp_path, [("goto", "target", at(250, 100))])
+    async with rest_world(tmp_path, fleet) as rest:
+        answer = await rest.post("/checks", {"xml": mission.read_text()})
+        (place,) = [e["place"] for e in answer["findings"] if e["rule"] == "outside-fence"]
+        assert f"[{place[0]}, {place[1]}]" == at(250, 100)
 
 
 async def test_a_check_knows_what_is_beside_the_mission(tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar, TypeAlias
 
-from m2pem.api import BehaviorState, Fence, FleetBus, ResolvedValue, Value
+from m2pem.api import BehaviorState, Fence, FleetBus, LatLon, ResolvedValue, Value
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 
@@ -80,6 +80,12 @@ class Behavior(ABC):
     def refusal(self) -> str:
         """Return why the behavior cannot be executed; "" if it can. Send nothing."""
         return ""
+
+    def breach(self, place: LatLon, name: str) -> str:
+        """Return where the straight way to a place would leave the fence; "" if it does not."""
+        fence, here = self.context.fence, self.vehicle.state.position
+        start = None if here is None else here.latlon
+        return "" if fence is None else fence.breach([place], start, lambda _: name)
 
     @abstractmethod
     async def begin(self) -> None:

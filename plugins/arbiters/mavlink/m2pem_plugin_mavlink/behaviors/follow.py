@@ -4,7 +4,7 @@ arbiter."""
 import math
 
 from m2pem.api import BehaviorState, LatLon, LinkState, VehicleState, distance_m, offset
-from m2pem_plugin_mavlink.behaviors.arrival import accepts_mode, position_of, takeoff_required
+from m2pem_plugin_mavlink.behaviors.arrival import accepts_mode, takeoff_required
 from m2pem_plugin_mavlink.behaviors.behavior import Behavior, BehaviorContext, BehaviorFailedError
 from m2pem_plugin_mavlink.behaviors.parameters import VehicleParameters, state_of
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode, TargetPosition
@@ -33,6 +33,7 @@ class Follow(Behavior):
         super().__init__(context)
         self._parameters = VehicleParameters(context)
         self._target = self._parameters.target_vehicle or ""
+        self._place = f"its position relative to {self._target}"
         distance, bearing = self._parameters.offset_m, self._parameters.bearing_rad
         self._offset_m = OFFSET_M if distance is None else distance
         self._bearing_rad = BEHIND_RAD if bearing is None else bearing
@@ -46,7 +47,7 @@ class Follow(Behavior):
             return reason
         if self._target in ("", self.vehicle.resource):
             return "parameter 'target': another vehicle is expected"
-        return "" if self._state() is None else self._breach(self._relative_position())
+        return "" if self._state() is None else self.breach(self._relative_position(), self._place)
 
     async def begin(self) -> None:
         await self._parameters.wait_for_target()
@@ -67,7 +68,7 @@ class Follow(Behavior):
         if self._state() is None:
             await self._stop(f"{self._target} has sent no position for {STALE_S:g} s")
         position = self._relative_position()
-        if reason := self._breach(position):
+        if reason := self.breach(position, self._place):
             await self._stop(reason)
         if self._sent is None or distance_m(self._sent, position) > MOVED_M:
             self._sent = position
@@ -77,12 +78,6 @@ class Follow(Behavior):
     async def _stop(self, reason: str) -> None:
         await self.vehicle.driver.stop()
         raise BehaviorFailedError(reason)
-
-    def _breach(self, position: LatLon) -> str:
-        if self.context.fence is None:
-            return ""
-        name = f"its position relative to {self._target}"
-        return self.context.fence.breach([position], position_of(self.vehicle), lambda _: name)
 
     def _state(self) -> VehicleState | None:
         """Return the target's last state; None if there is none that is recent."""

@@ -75,19 +75,15 @@ class Goto(Behavior):
         """Check that an aircraft is in the air, and that the path is inside the fence."""
         if reason := takeoff_required(self.vehicle):
             return reason
-        return "" if self.parameters.target_is_unknown else self._breach(self.target())
-
-    def _breach(self, place: TargetPosition) -> str:
-        if self.context.fence is None:
+        if self.parameters.target_is_unknown:
             return ""
-        way, start = [place.latlon], position_of(self.vehicle)
-        return self.context.fence.breach(way, start, lambda _: "the target")
+        return self.breach(self.target().latlon, "the target")
 
     async def begin(self) -> None:
         self._stillness.forget()
         if self.parameters.target_is_unknown:
             await self.parameters.wait_for_target()
-            if reason := self._breach(self.target()):
+            if reason := self.breach(self.target().latlon, "the target"):
                 raise BehaviorFailedError(reason)
         self._place = self.target()
         await self.vehicle.driver.go_to(self._place, self.parameters.speed_m_s)

@@ -202,15 +202,7 @@ class MissionFlight(Behavior):
             return ""
         placed = [items[index] for index in self._moves if index <= self._end[0]]
         way = [item.latlon for item in placed]
-        start = position_of(self.vehicle)
-        if reason := self.context.fence.breach(way, start, self.named):
-            return reason
-        if not self.loop:
-            return ""
-        last = len(way) - 1
-        return self.context.fence.breach(
-            [way[-1], way[0]], None, lambda index: self.named(0 if index else last)
-        )
+        return self.context.fence.breach(way, position_of(self.vehicle), self.named, self.loop)
 
     async def begin(self) -> None:
         self._stillness.forget()

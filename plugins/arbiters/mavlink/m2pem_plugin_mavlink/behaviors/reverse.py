@@ -45,10 +45,8 @@ class Reverse(Behavior):
         """Check that position and heading are known, and that the path is inside the fence."""
         if self._from is None or self._yaw_rad is None:
             return "its position and heading are not known yet"
-        if self.context.fence is None:
-            return ""
-        way = [self._behind(self._from, self._yaw_rad, self._distance_m)]
-        return self.context.fence.breach(way, self._from, lambda _: "the place behind it")
+        behind = self._behind(self._from, self._yaw_rad, self._distance_m)
+        return self.breach(behind, "the place behind it")
 
     def adjust(self, speed_m_s: float) -> bool:
         self._speed_m_s = speed_m_s
