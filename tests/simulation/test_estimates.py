@@ -1,10 +1,12 @@
 """Estimates of missions, beside rehearsals of the same."""
 
+import json
 from pathlib import Path
 
 import pytest
 
 from m2pem.api.estimates import MissionEstimate
+from m2pem.api.runs import RunStatus
 from m2pem.fleet.fleet import Fleet
 from m2pem.fleet.fleet_file import load_fleet
 from m2pem.plugins import PluginManager
@@ -141,3 +143,43 @@ def test_the_check_warns_where_a_stated_endurance_is_not_enough(tmp_path: Path) 
     assert "the battery of uav is empty before the mission's end" in finding.message
     fleet(tmp_path, "30 min")
     assert check(tmp_path / "m.bpmn", tmp_path / "fleet.yaml") == ()
+
+
+@pytest.mark.parametrize("vehicle", ["rover", "uav"])
+def test_a_return_around_a_hole_takes_what_its_rehearsal_takes(
+    tmp_path: Path, vehicle: str
+) -> None:
+    """The straight way home leads through the hole, which is 400 m wide."""
+    rings = [
+        [[east / 87_500 - 77.3, north / 111_000 + 38.1] for east, north in ring]
+        for ring in (
+            [(-300, -100), (300, -100), (300, 700), (-300, 700), (-300, -100)],
+            [(-200, 200), (200, 200), (200, 300), (-200, 300), (-200, 200)],
+        )
+    ]
+    (tmp_path / "yard.geojson").write_text(json.dumps({"type": "Polygon", "coordinates": rings}))
+    fenced = tmp_path / "fenced.yaml"
+    fleet(tmp_path, "20 min")
+    text = (tmp_path / "fleet.yaml").read_text().replace("2 h", "20 min")
+    fenced.write_text(text + "areas: {yard: yard.geojson}\nfence: yard\n")
+    process = (
+        '<startEvent id="s"/><endEvent id="e"/>'
+        + task("Side", "goto", vehicle, target="[38.10225, -77.2968]")
+        + task("Far", "goto", vehicle, target="[38.1045, -77.3]")
+        + task("Back", "return_to_launch", vehicle)
+        + flows(("s", "Side"), ("Side", "Far"), ("Far", "Back"), ("Back", "e"))
+    )
+    source = (HEAD + process + TAIL).encode()
+    found = estimate_mission(load_mission(source), load_fleet(fenced))
+    played = rehearse(source, load_fleet(fenced), plugins=PluginManager(), telemetry_every_s=1.0)
+    assert played.summary.status is RunStatus.COMPLETED
+    assert found.time_s == pytest.approx(played.summary.took_s, rel=0.02)
+    back = next(each for each in found.tasks if each.element == "Back")
+    assert back.distance_m > 640  # 500 m straight on
+    charge = next(
+        state.battery_fraction
+        for name, state in played.telemetry[-1].vehicles.items()
+        if name == vehicle
+    )
+    (only,) = found.vehicles
+    assert only.battery_left == pytest.approx(charge, abs=0.02)
