@@ -8,18 +8,22 @@ import json
 import math
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 from m2pem.errors import M2pemError
 from m2pem.fleet.behaviors import ALTITUDE_FRAME, takes_altitude
 from m2pem.geo.geojson import GeometryError, coordinate, kind_of, parse_geojson
 from m2pem.geo.local_frame import Origin
 from m2pem.geo.positions import NO_ORIGIN, is_local, local_point, out_of_reach
+from m2pem.mission.behavior import Behavior
 from m2pem.mission.catalogue import BehaviorSpec, ParameterKind, ParameterSpec
 from m2pem.mission.geometry import Geometry, Point, VehiclePosition
 from m2pem.mission.values import Value
 from m2pem.suggestions import did_you_mean, suggest
 from m2pem.units import UNITS, Dimension, UnitError, article, plain_number, quantity
+
+if TYPE_CHECKING:
+    from m2pem.fleet.fleet import Fleet
 
 ResolvedValue: TypeAlias = float | int | bool | str | Geometry | None
 """A parameter's value after units and names are resolved: SI numbers, texts, geometries."""
@@ -128,6 +132,15 @@ def examine(
         elif name not in names and parameter.default is not None:
             values[name] = parameter.default
     return values, problems
+
+
+def examine_behavior(
+    behavior: Behavior, spec: BehaviorSpec, geometry: FindGeometry, fleet: "Fleet"
+) -> tuple[dict[str, ResolvedValue], list[ParameterProblem]]:
+    """As `examine`, of the parameters of a task's behavior as the mission's file gives them."""
+    literal = {p.name: p.value for p in behavior.parameters if isinstance(p.value, str)}
+    deferred = [p.name for p in behavior.parameters if p.name not in literal]
+    return examine(spec, literal, geometry, fleet.vehicles, deferred, fleet.origin)
 
 
 def _unknown(name: str, spec: BehaviorSpec, specs: Mapping[str, ParameterSpec]) -> ParameterProblem:
