@@ -11,7 +11,7 @@ from m2pem.fleet.fleet import SIMULATED, Fleet
 from m2pem.fleet.graph import Catalogue, ResourceGraph
 from m2pem.fleet.need_check import KnownFits, check_needs, places_of
 from m2pem.fleet.operator_roles import check_operator_roles
-from m2pem.fleet.parameters import ParameterProblem, examine
+from m2pem.fleet.parameters import ParameterProblem, examine_behavior
 from m2pem.fleet.same_vehicle import check_same_vehicle
 from m2pem.fleet.shortage import Demand, check_shortages
 from m2pem.fleet.space_check import check_space
@@ -450,16 +450,14 @@ class _Check:
         findings: TaskFindings,
     ) -> None:
         lines = {parameter.name: parameter.line for parameter in behavior.parameters}
-        literal = {p.name: p.value for p in behavior.parameters if isinstance(p.value, str)}
-        deferred = [p.name for p in behavior.parameters if not isinstance(p.value, str)]
+        given = {parameter.name: parameter.value for parameter in behavior.parameters}
         geometry = {**self.fleet.geometries, **self.mission.geometries}.get
-        values, problems = examine(
-            taker.spec, literal, geometry, self.fleet.vehicles, deferred, self.fleet.origin
-        )
+        values, problems = examine_behavior(behavior, taker.spec, geometry, self.fleet)
         for problem in problems:
             line = lines.get(problem.name, behavior.line)
             if problem.rule == "unknown-geometry":
-                self._unknown_geometry(problem, literal[problem.name], line, taker, findings)
+                name = str(given[problem.name])
+                self._unknown_geometry(problem, name, line, taker, findings)
             else:
                 message = taker.place + problem.message
                 findings.add(problem.rule, message, problem.remedy, line=line, role=taker.role)

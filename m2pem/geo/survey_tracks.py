@@ -6,8 +6,7 @@ piece of one.
 """
 
 import math
-from collections.abc import Iterable, Sequence
-from itertools import pairwise
+from collections.abc import Sequence
 from typing import TypeAlias
 
 from m2pem.geo.fence import Fence, rings_of
@@ -124,25 +123,17 @@ class SurveyTracks:
         The first ring is the outer one, the others are holes. It is empty where there is nothing,
         or where what they cover is not connected.
         """
-        strips = self._strips(from_m, to_m)
-        if self.holes:
-            level = self._beside_holes(strips)
-        else:
-            level = sorted(_outline(_slabs(strips, self.width_m)), key=_area, reverse=True)
-            if sum(_area(ring) > 0 for ring in level) != 1:
-                return []
-        return [[turned(corner, -self.yaw_rad) for corner in ring] for ring in level]
-
-    def _beside_holes(self, strips: Sequence[tuple[float, list[Span]]]) -> list[list[EastNorth]]:
-        """Return strips without the holes of the area, in axes that are turned as the passes."""
-        half_m = self.width_m / 2 + _SEAM_M
-        boxes = [
-            shapely.box(low, y - half_m, high, y + half_m)
-            for y, spans in strips
-            for low, high in spans
-        ]
+        strips, half_m = self._strips(from_m, to_m), self.width_m / 2 + _SEAM_M
+        slabs: list[Slab] = [(y - half_m, y + half_m, spans) for y, spans in strips]
+        if not self.holes:
+            slabs = _slabs(strips, self.width_m)
+        boxes = [shapely.box(x0, y0, x1, y1) for y0, y1, spans in slabs for x0, x1 in spans]
         holes = [[turned(corner, self.yaw_rad) for corner in ring] for ring in self.holes]
-        return rings_of(shapely.union_all(boxes).difference(Fence.around(holes).closed))
+        covered = shapely.union_all(boxes).difference(Fence.around(holes).closed)
+        return [
+            [turned(corner, -self.yaw_rad) for corner in ring]
+            for ring in rings_of(covered.simplify(0))
+        ]
 
     def _strips(self, from_m: float, to_m: float) -> list[tuple[float, list[Span]]]:
         """Return the middle of each strip and its spans, from the lowest strip to the highest."""
@@ -193,49 +184,3 @@ def _common(spans: Sequence[Span], others: Sequence[Span]) -> list[Span]:
         for other_low, other_high in others
     )
     return sorted((low, high) for low, high in found if high - low >= _SHORTEST_M)
-
-
-def _outline(slabs: Iterable[Slab]) -> list[list[EastNorth]]:
-    """Return the closed rings around slabs: counter-clockwise outside, clockwise around holes."""
-    boxes = [(x0, y0, x1, y1) for y0, y1, spans in slabs for x0, x1 in spans]
-    breaks = sorted({x for x0, _, x1, _ in boxes for x in (x0, x1)})
-    edges: set[tuple[EastNorth, EastNorth]] = set()
-    for x0, y0, x1, y1 in boxes:
-        xs = [x for x in breaks if x0 <= x <= x1]
-        sides = [((a, y0), (b, y0)) for a, b in pairwise(xs)]
-        sides += [((b, y1), (a, y1)) for a, b in pairwise(xs)]
-        sides += [((x1, y0), (x1, y1)), ((x0, y1), (x0, y0))]
-        for a, b in sides:
-            if (b, a) in edges:  # two boxes meet there
-                edges.remove((b, a))
-            else:
-                edges.add((a, b))
-    following: dict[EastNorth, EastNorth] = dict(sorted(edges))
-    if len(following) < len(edges):
-        return []  # two parts meet in one corner alone
-    rings = []
-    while following:
-        start = at = next(iter(following))
-        ring = [start]
-        while (at := following.pop(at)) != start and at in following:
-            ring.append(at)
-        rings.append(_straightened(ring))
-    return rings
-
-
-def _straightened(ring: Sequence[EastNorth]) -> list[EastNorth]:
-    """Return a closed ring without the corners on a straight side."""
-    kept = [
-        corner
-        for index, corner in enumerate(ring)
-        if not _aligned(ring[index - 1], corner, ring[(index + 1) % len(ring)])
-    ]
-    return [*kept, kept[0]]
-
-
-def _aligned(a: EastNorth, b: EastNorth, c: EastNorth) -> bool:
-    return (a[0] == b[0] == c[0]) or (a[1] == b[1] == c[1])
-
-
-def _area(ring: Sequence[EastNorth]) -> float:
-    return sum(a[0] * b[1] - b[0] * a[1] for a, b in pairwise(ring)) / 2

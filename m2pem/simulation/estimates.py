@@ -7,7 +7,6 @@ said in `left_out`.
 """
 
 import copy
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import cast
 
@@ -20,7 +19,7 @@ from m2pem.fleet.allocation import AllocationError, allocate
 from m2pem.fleet.behaviors import SHARED
 from m2pem.fleet.endurance import RESERVE
 from m2pem.fleet.fleet import Fleet, simulated_fleet
-from m2pem.fleet.parameters import ResolvedValue, examine
+from m2pem.fleet.parameters import ResolvedValue, examine_behavior
 from m2pem.fleet.space import may_wait_for_space
 from m2pem.mission.behavior import Behavior, BehaviorType
 from m2pem.mission.catalogue import ResourceId
@@ -32,7 +31,6 @@ from m2pem.mission.elements import (
     EventBasedGateway,
     FlowNode,
     IntermediateCatchEvent,
-    IntermediateThrowEvent,
     ManualTask,
     ReceiveTask,
     ScriptTask,
@@ -48,6 +46,7 @@ from m2pem.mission.events import (
     TimerEventDefinition,
 )
 from m2pem.mission.mission import Mission
+from m2pem.mission.reachability import following
 from m2pem.simulation.arbiters import bodies_at_home
 from m2pem.simulation.executions import Body
 from m2pem.simulation.single_behavior import simulate_behavior
@@ -219,8 +218,7 @@ class _Estimate:
             after = self._node(node, before)
             if isinstance(node, Activity):
                 self._leave_out_interruptions(node, after.at_us - before.at_us)
-            followers = _followers(node)
-            for to in followers:
+            for to in following(node):
                 if place[to] <= place[node]:
                     self._leave_out(to, "a loop: counted once")
                 else:
@@ -349,32 +347,13 @@ class _Estimate:
         if spec is None:
             self._leave_out(task, f"how long '{behavior.name}' takes is not known")
             return None
-        literal = {p.name: p.value for p in behavior.parameters if isinstance(p.value, str)}
-        deferred = [p.name for p in behavior.parameters if not isinstance(p.value, str)]
-        if deferred:
-            names = ", ".join(f"'{each}'" for each in deferred)
-            self._leave_out(task, f"{names} is known only when it starts")
-            return None
-        values, problems = examine(
-            spec,
-            literal,
-            self._geometries.get,
-            self._fleet.vehicles,
-            origin=self._fleet.origin,
-        )
-        if problems:
-            self._leave_out(task, problems[0].message)
+        values, problems = examine_behavior(behavior, spec, self._geometries.get, self._fleet)
+        deferred = [f"'{p.name}'" for p in behavior.parameters if not isinstance(p.value, str)]
+        if deferred or problems:
+            late = f"{', '.join(deferred)} is known only when it starts"
+            self._leave_out(task, late if deferred else problems[0].message)
             return None
         return values
-
-
-def _followers(node: FlowNode) -> Sequence[FlowNode]:
-    found = [flow.target for flow in node.outgoing]
-    if isinstance(node, Activity):
-        found += node.boundary
-    if isinstance(node, IntermediateThrowEvent) and node.links_to is not None:
-        found.append(node.links_to)
-    return found
 
 
 def _in_order(container: Container) -> list[FlowNode]:
@@ -382,15 +361,15 @@ def _in_order(container: Container) -> list[FlowNode]:
     seen: set[FlowNode] = set()
     done: list[FlowNode] = []
     for entry in reversed(container.entries):
-        stack = [(entry, iter(_followers(entry)))] if entry not in seen else []
+        stack = [(entry, iter(following(entry)))] if entry not in seen else []
         seen.add(entry)
         while stack:
-            node, following = stack[-1]
-            to = next((each for each in following if each not in seen), None)
+            node, rest = stack[-1]
+            to = next((each for each in rest if each not in seen), None)
             if to is None:
                 done.append(node)
                 stack.pop()
             else:
                 seen.add(to)
-                stack.append((to, iter(_followers(to))))
+                stack.append((to, iter(following(to))))
     return done[::-1]

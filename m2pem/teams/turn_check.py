@@ -7,7 +7,7 @@ from m2pem.findings import Finding, Severity
 from m2pem.fleet.allocation import resources_of
 from m2pem.fleet.behaviors import SHARED
 from m2pem.fleet.fleet import Fleet
-from m2pem.fleet.parameters import examine
+from m2pem.fleet.parameters import examine_behavior
 from m2pem.fleet.task_findings import TaskFindings
 from m2pem.geo.local_frame import LocalFrame
 from m2pem.mission.behavior import Behavior, BehaviorType
@@ -37,17 +37,15 @@ def check_turns(mission: Mission, fleet: Fleet) -> Iterator[Finding]:
 
 def _turns(behavior: Behavior, mission: Mission, fleet: Fleet) -> tuple[str, str]:
     given = {each.name: each.value for each in behavior.parameters}
-    literal = {name: value for name, value in given.items() if isinstance(value, str)}
-    values, problems = examine(
+    values, problems = examine_behavior(
+        behavior,
         SHARED[behavior.name, BehaviorType.TEAM],
-        literal,
         {**fleet.geometries, **mission.geometries}.get,
-        fleet.vehicles,
-        [name for name in given if name not in literal],
-        fleet.origin,
+        fleet,
     )
     route = values.get("route")
-    known = not {"shape", "spacing", "offsets"} & (given.keys() - literal.keys())
+    shaping = ("shape", "spacing", "offsets")
+    known = all(isinstance(given.get(name, ""), str) for name in shaping)
     if problems or not known or not isinstance(route, Route):
         return "", ""
     members = tuple(
