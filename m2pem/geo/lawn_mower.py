@@ -3,7 +3,6 @@
 Each strip of the given width is driven along its middle from where the polygon begins in the strip
 to where it ends, so that every point of the polygon is within half a spacing of a track. No pass
 enters a hole: where one has the middle of a strip, what is free beside it gets passes, too.
-Shapely, which is slow to load, is imported only for that.
 """
 
 import math
@@ -97,17 +96,19 @@ def passes_over(
 ) -> list[Pass]:
     """Return the passes of `lawn_mower`. One that ends at a hole does not go on beyond its end."""
     found: list[Pass] = []
-    closed = _turned_holes(rings[1:], yaw_rad)
+    fence = Fence.around(rings[1:]) if len(rings) > 1 else None
+    closed = None if fence is None else fence.closed
     low, _, width_m = _strips([turned(corner, yaw_rad) for corner in rings[0]], spacing_m)
-    for number, row in enumerate(rows(rings, spacing_m, yaw_rad)):
+    for number, row in enumerate(rows(rings[0], spacing_m, yaw_rad, closed)):
         backward = number % 2 == 1
-        for y, span in reversed(row) if backward else row:
-            low_m, high_m = (
-                overshoot_m if closed is None or is_free(closed, y, x, x + beyond) else 0.0
-                for x, beyond in ((span[0], -overshoot_m), (span[1], overshoot_m))
-            )
-            start = turned((span[0] - low_m, y), -yaw_rad)
-            end = turned((span[1] + high_m, y), -yaw_rad)
+        for y, (west, east) in reversed(row) if backward else row:
+            level = (west - overshoot_m, y), (west, y), (east, y), (east + overshoot_m, y)
+            before, start, end, beyond = (turned(each, -yaw_rad) for each in level)
+            low_m = high_m = 0.0
+            if fence is None or fence.is_free(start, before):
+                start, low_m = before, overshoot_m
+            if fence is None or fence.is_free(end, beyond):
+                end, high_m = beyond, overshoot_m
             left_m = y - (low + (number + 0.5) * width_m)
             one = Pass(start, end, low_m, high_m, left_m)
             found.append(Pass(end, start, high_m, low_m, -left_m) if backward else one)
@@ -115,50 +116,32 @@ def passes_over(
 
 
 def rows(
-    rings: Sequence[Ring],
-    spacing_m: float,
-    yaw_rad: float,
-    closed: "BaseGeometry | None" = None,
+    ring: Ring, spacing_m: float, yaw_rad: float, closed: "BaseGeometry | None" = None
 ) -> list[Row]:
     """Return the passes of each strip in axes that are turned by `yaw_rad`.
 
-    `closed`: where no pass is besides the holes, in axes that are not turned.
+    `closed`: where no pass is, such as holes, in axes that are not turned.
 
     Raises:
         ValueError: it would take more than `MAX_STRIPS` passes.
     """
-    level = [[turned(corner, yaw_rad) for corner in ring] for ring in rings]
-    low, strips, width_m = _strips(level[0], spacing_m)
+    level = [turned(corner, yaw_rad) for corner in ring]
+    low, strips, width_m = _strips(level, spacing_m)
     found: list[Row] = []
     for strip in range(strips):
         bottom = low + strip * width_m
         spans = _passes(level, bottom, bottom + width_m)
         found.append([(bottom + width_m / 2, span) for span in spans])
-    if closed is None and len(rings) == 1:
+    if closed is None:
         return found
-    obstacles = _turned_holes(rings[1:], yaw_rad) or shapely.Polygon()
-    if closed is not None:
-        around = shapely.affinity.rotate(closed, -yaw_rad, (0, 0), use_radians=True)
-        obstacles = obstacles.union(around)
-    region = valid(level[0]).difference(obstacles)
+    obstacles = shapely.affinity.rotate(closed, -yaw_rad, (0, 0), use_radians=True)
+    region = valid(level).difference(obstacles)
     if region.is_empty:
         return []
     return [
         _beside(row, region, obstacles, low + strip * width_m, width_m)
         for strip, row in enumerate(found)
     ]
-
-
-def is_free(closed: "BaseGeometry", y: float, from_x: float, to_x: float) -> bool:
-    """Whether a line along x stays out of what is closed; it may touch it."""
-    line = shapely.LineString(((from_x, y), (to_x, y)))
-    return line.length == 0.0 or line.intersection(closed).length < _SHORTEST_M
-
-
-def _turned_holes(holes: Sequence[Ring], yaw_rad: float) -> "BaseGeometry | None":
-    if not holes:
-        return None
-    return Fence.around([[turned(corner, yaw_rad) for corner in ring] for ring in holes]).closed
 
 
 def _beside(
@@ -230,14 +213,15 @@ def _strips(ring: Ring, spacing_m: float) -> tuple[float, int, float]:
     return low, strips, height / strips
 
 
-def _passes(rings: Sequence[Ring], bottom: float, top: float) -> list[Span]:
+def _passes(ring: Ring, bottom: float, top: float) -> list[Span]:
     """The spans of x that the polygon takes between two y."""
-    corners = sorted({y for ring in rings for _, y in ring if bottom < y < top} | {bottom, top})
+    corners = sorted({y for _, y in ring if bottom < y < top} | {bottom, top})
     spans: list[Span] = []
     for low, high in pairwise(corners):
         middle = (low + high) / 2
         # Between two corners' heights the edges do not cross, so their order in the middle holds.
-        edges = sorted(_edges_at(rings, middle), key=lambda edge: _x(edge, middle))
+        across = [(a, b) for a, b in pairwise(ring) if (a[1] <= middle) != (b[1] <= middle)]
+        edges = sorted(across, key=lambda edge: _x(edge, middle))
         for left, right in zip(edges[::2], edges[1::2], strict=False):
             spans.append(
                 (
@@ -246,13 +230,6 @@ def _passes(rings: Sequence[Ring], bottom: float, top: float) -> list[Span]:
                 )
             )
     return merged(spans)
-
-
-def _edges_at(rings: Sequence[Ring], y: float) -> Iterator[Edge]:
-    for ring in rings:
-        for a, b in pairwise(ring):
-            if (a[1] <= y) != (b[1] <= y):
-                yield a, b
 
 
 def _x(edge: Edge, y: float) -> float:

@@ -191,14 +191,14 @@ def _passes(pattern: SurveyPattern, ground: _Ground, yaw: float) -> list[Pass]:
     """Return the passes in the order in which they are flown or driven."""
     cells: list[Row] = []
     for part in polygons(ground.region):
-        rings = [[(x, y) for x, y, *_ in ring.coords] for ring in (part.exterior, *part.interiors)]
-        if _width_m(rings[0], yaw) > MAX_PASSES * pattern.spacing_m:
+        ring = [(x, y) for x, y, *_ in part.exterior.coords]
+        if _width_m(ring, yaw) > MAX_PASSES * pattern.spacing_m:
             raise GeometryError(
                 f"spacing: {pattern.spacing_m:g} m needs more than {MAX_PASSES} passes: "
                 "survey with a wider spacing, or a smaller area"
             )
         closed = None if ground.fence.closed.is_empty else ground.fence.closed
-        cells += _cells(rows(rings[:1], pattern.spacing_m, yaw, closed))
+        cells += _cells(rows(ring, pattern.spacing_m, yaw, closed))
     ordered = _ordered(cells, pattern.corner)
     return [(turned(a, -yaw), turned(b, -yaw)) for a, b in ordered]
 

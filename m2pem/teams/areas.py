@@ -9,7 +9,7 @@ from m2pem.fleet.parameters import accepted
 from m2pem.geo.fence import Fence, rings_of, valid
 from m2pem.geo.lawn_mower import Ring, longest_edge_yaw
 from m2pem.geo.lazy_imports import shapely
-from m2pem.geo.polygon import middle_of
+from m2pem.geo.polygon import middle_of, turned
 from m2pem.geo.survey_tracks import SurveyTracks
 from m2pem.geo.work_shares import owners, reach_m, split
 from m2pem.mission.geometry import Area, Route, VehiclePosition
@@ -38,13 +38,13 @@ def strips(
 ) -> list[list[list[Place]]]:
     """Return each member's band of an area as rings; an empty list for a member without a pass, or
     whose band is in several pieces."""
-    level = [[turned(corner, (0.0, 0.0), tracks.yaw_rad) for corner in ring] for ring in rings]
+    level = [[turned(corner, tracks.yaw_rad) for corner in ring] for ring in rings]
     west, east = (extreme(x for x, _ in level[0]) for extreme in (min, max))
     low, high = (extreme(y for _, y in level[0]) for extreme in (min, max))
     count = max(1, round((high - low) / tracks.width_m))
     lengths = [0.0] * count
     for index, *_ in tracks.passes:
-        y = turned(tracks.line.points[index], (0.0, 0.0), tracks.yaw_rad)[1]
+        y = turned(tracks.line.points[index], tracks.yaw_rad)[1]
         strip = min(count - 1, int((y - low) / tracks.width_m))
         lengths[strip] += tracks.line.segments[index].length_m
     whose = owners(lengths, shares)
@@ -57,19 +57,8 @@ def strips(
             continue
         bottom, top = low + mine[0] * tracks.width_m, low + (mine[-1] + 1) * tracks.width_m
         band = rings_of(area.intersection(shapely.box(west - 1, bottom, east + 1, top)))
-        parts.append(
-            [[turned(corner, (0.0, 0.0), -tracks.yaw_rad) for corner in ring] for ring in band]
-        )
+        parts.append([[turned(corner, -tracks.yaw_rad) for corner in ring] for ring in band])
     return parts
-
-
-def turned(
-    place: tuple[float, float], centre: tuple[float, float], angle_rad: float
-) -> tuple[float, float]:
-    """Return a place in a frame at `centre` whose first axis points to `angle_rad`."""
-    cos, sin = math.cos(angle_rad), math.sin(angle_rad)
-    east, north = place[0] - centre[0], place[1] - centre[1]
-    return east * cos + north * sin, north * cos - east * sin
 
 
 SURVEY_SPACING_M = 20.0
@@ -192,8 +181,8 @@ def _reach(
 ) -> float:
     """Return the distance from the centre to the outermost edge in a direction, in metres."""
     found = 0.0
-    for a, b in pairwise(ring):
-        (ax, ay), (bx, by) = (turned(corner, centre, angle_rad) for corner in (a, b))
+    around = [(east - centre[0], north - centre[1]) for east, north in ring]
+    for (ax, ay), (bx, by) in pairwise(turned(corner, angle_rad) for corner in around):
         if (ay <= 0) != (by <= 0):
             found = max(found, ax + (bx - ax) * ay / (ay - by))
     return found
