@@ -12,7 +12,7 @@ from m2pem.allocation.candidates import Candidates, Group, Place
 from m2pem.errors import ExpressionError
 from m2pem.fleet.allocation import resources_of
 from m2pem.fleet.facts import possible_resources, preference_s, unfit, vehicle_of
-from m2pem.mission.behavior import Behavior, Need, Role, RoleKind
+from m2pem.mission.behavior import Behavior, BehaviorType, Need, Role, RoleKind
 from m2pem.mission.candidate_facts import FLEET_FACTS, is_fact
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.expression import Expression
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 UNKNOWN_TRAVEL_S = 86_400.0
 """Travel time of a vehicle whose position is not known: it comes after all others."""
 
+_FOLLOW = frozenset({"follow", "escort"})
 _OF_PLACE = frozenset({"vehicle.distance", "vehicle.travel_time"})
 """Facts that depend on the place of the task."""
 
@@ -332,6 +333,8 @@ class RoleEvaluator:
 
     def _candidacy(self, need: Need, kind: RoleKind, task: Task) -> Candidacy:
         group, key = self.candidates.group(kind), _key(kind, need.condition, need.same, task)
+        if self._fenced(task):
+            key = (*key, task.place)
         excluded: Mapping[ResourceId, str]
         if task.lost:
             excluded = {**self._exclusions(key, need, kind, task), **_lost_here(task.lost)}
@@ -355,6 +358,7 @@ class RoleEvaluator:
 
             reasons = ((each, why_not(each)) for each in group.resources)
             of_telemetry = need.condition is not None and _reads_telemetry(need.condition)
+            of_telemetry = of_telemetry or self._fenced(task)
             excluded = {each: why for each, why in reasons if why}
             known = self._excluded[key] = _Exclusions(of_telemetry, excluded, group, why_not)
         elif known.stale:
@@ -375,10 +379,17 @@ class RoleEvaluator:
             return reason
         if reason := self._why_not_same(resource, need, task):
             return reason
+        if self._fenced(task) and (reason := self.candidates.breach(resource, task.place)):
+            return reason
         if need.condition is None:
             return ""
         read = self._reader(resource, group, task)
         return "" if need.condition.holds(read) else _false_part(need.condition, read)
+
+    def _fenced(self, task: Task) -> bool:
+        """Whether the fence says who can get to a task: not to one that follows a vehicle."""
+        goes = task.behavior.type is not BehaviorType.PAYLOAD and task.behavior.name not in _FOLLOW
+        return goes and self.candidates.fence is not None
 
     def _why_not_same(self, resource: ResourceId, need: Need, task: Task) -> str:
         """Return why it is not what an earlier role chose; "": it is, or nothing asks for that."""

@@ -78,7 +78,7 @@ from m2pem.fleet.fleet import Fleet
 from m2pem.fleet.space import waits_for_space
 from m2pem.geo.fence import Fence
 from m2pem.geo.geojson import GeometryError, as_geojson, parse_geojson
-from m2pem.geo.positions import NO_ORIGIN, geometry_out_of_reach
+from m2pem.geo.positions import NO_ORIGIN, geometry_out_of_reach, positions
 from m2pem.journal.base import Journal
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.geometry import Area, Geometry, Point, Route
@@ -589,8 +589,10 @@ class Supervisor:
             raise OperatorError(f"geometry {name!r}: {wrong[0]}; {wrong[1]}")
         geometry = as_geojson(parsed) if said else geometry
         fence = self.fleet.geometries.get(self.fleet.fence)
-        if isinstance(parsed, Route) and isinstance(fence, Area):
-            said.append(Fence(fence).breach([each[:2] for each in parsed.waypoints]))
+        if isinstance(fence, Area):
+            kind = {Route: "waypoint", Area: "corner"}.get(type(parsed), "point")
+            way = [each[:2] for each in positions(parsed)]
+            said.append(Fence(fence).breach(way, name=lambda index: f"{kind} {index + 1}"))
         for each in filter(None, said):
             self.events.publish(Alert(run or RunId(""), "GEOMETRY", f"geometry {name!r}: {each}"))
         item = GeometrySet(name, dict(geometry), by)

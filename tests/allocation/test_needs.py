@@ -1,5 +1,6 @@
 """Roles evaluated over a fleet whose telemetry changes: as if all were evaluated afresh."""
 
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -8,7 +9,7 @@ from hypothesis import strategies as st
 
 from m2pem.allocation.assignment import Request, assign
 from m2pem.allocation.candidates import Candidates, Place
-from m2pem.allocation.explanation import MAX_LISTED, lack, what_was_considered
+from m2pem.allocation.explanation import MAX_LISTED, lack, reason, what_was_considered
 from m2pem.allocation.needs import Occupancy, RoleEvaluator, Task
 from m2pem.api.telemetry import GeoPosition, VehicleState
 from m2pem.fleet.behaviors import SHARED
@@ -17,6 +18,7 @@ from m2pem.fleet.graph import ResourceGraph
 from m2pem.mission.behavior import Behavior, BehaviorType, Need, Role, RoleKind
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.expression import parse
+from m2pem.mission.geometry import Area
 
 NAMES = tuple(ResourceId(f"v{number}") for number in range(5))
 CONDITIONS = (
@@ -108,3 +110,38 @@ def test_what_a_task_lacks_names_the_first_candidates_of_a_large_fleet():
     occupied = {name: Occupancy("r9.b1") for name in names}
     found = evaluator.role(role, Task(behavior, Place, lambda _: None, (), occupied))
     assert list(lack((found,), {}).holders) == list(names[:MAX_LISTED])
+
+
+def test_a_vehicle_whose_way_leaves_the_fence_is_not_chosen_when_another_can_get_there():
+    def ring(*corners: tuple[float, float]) -> tuple[tuple[float, float, None], ...]:
+        return tuple((north / 1e5, east / 1e5, None) for east, north in (*corners, corners[0]))
+
+    pond = ring((40, 40), (60, 40), (60, 60), (40, 60))
+    area = Area((ring((0, 0), (100, 0), (100, 100), (0, 100)), pond))
+    fleet = replace(FLEET, geometries={"yard": area}, fence="yard")
+    near, far, *_ = NAMES
+    states = {
+        near: VehicleState(near, 0, GeoPosition(50e-5, 30e-5, 0.0)),  # across the pond
+        far: VehicleState(far, 0, GeoPosition(5e-5, 95e-5, 0.0)),
+    }
+    evaluator = RoleEvaluator(Candidates(fleet, GRAPH, states.get))
+    role = Role("driver", RoleKind.VEHICLE, "", 1, need=Need(parse("vehicle.name in ['v0','v1']")))
+
+    def given(behavior: str, place: tuple[float, float]) -> tuple[dict[str, Any], str]:
+        where = partial(Place, (place,))
+        kind = BehaviorType.VEHICLE
+        task = Task(Behavior(kind, behavior, 1, (), (role,)), where, lambda _: None, (), {})
+        found = evaluator.role(role, task)
+        chosen = assign([Request("a", (found.options,))], {n: i for i, n in enumerate(NAMES)})
+        return chosen.get("a", {}), reason((found,), {})
+
+    across = (50e-5, 70e-5)
+    assert given("goto", across)[0] == {"driver": (far,)}
+    assert given("follow", across)[0] == {"driver": (near,)}  # where its target is, it may not be
+    assert given("goto", (5e-5, 5e-5))[0] == {"driver": (near,)}
+    nothing, why = given("goto", (50e-5, 150e-5))
+    assert nothing == {}
+    assert "v0 is excluded (where the task begins, [0.000500, 0.001500], is 56 m outside" in why
+    states[near] = VehicleState(near, 0, GeoPosition(50e-5, 65e-5, 0.0))
+    evaluator.look_again()
+    assert given("goto", across)[0] == {"driver": (near,)}

@@ -68,7 +68,7 @@ def test_an_area_is_mended_once_and_operators_read_of_it(play: Any) -> None:
     assert "geometry 'field': its edge from [50.1, 7.1] to [50.2, 7.1]" in alert.text
 
 
-def test_a_route_that_leaves_the_fence_is_said(play: Any) -> None:
+def test_what_leaves_the_fence_is_said_with_the_place_and_the_distance(play: Any) -> None:
     ring = ((50.0, 7.0, None), (50.0, 7.1, None), (50.1, 7.1, None), (50.1, 7.0, None))
 
     async def story(world: World) -> Any:
@@ -80,11 +80,23 @@ def test_a_route_that_leaves_the_fence_is_said(play: Any) -> None:
         await control.set_geometry("inside", inside, by="anna")
         outside = {"type": "LineString", "coordinates": [[7.05, 50.05], [7.05, 50.2]]}
         await control.set_geometry("outside", outside, by="anna")
+        await control.set_geometry("gate", {"type": "Point", "coordinates": [7.05, 50.2]}, by="ben")
+        field = [[[7.05, 50.05], [7.06, 50.05], [7.06, 50.2], [7.05, 50.05]]]
+        await control.set_geometry("field", {"type": "Polygon", "coordinates": field}, by="ben")
         return await control.alerts()
 
-    (alert,) = play(story)
-    assert "geometry 'outside': waypoint 2, [50.200000, 7.050000], is 11" in alert.text
-    assert "outside the fleet's fence" in alert.text
+    alerts = play(story)
+    for alert, place in zip(
+        alerts,
+        (
+            "geometry 'outside': waypoint 2, [50.200000, 7.050000], is 11",
+            "geometry 'gate': point 1, [50.200000, 7.050000], is 11",
+            "geometry 'field': corner 3, [50.200000, 7.060000], is 11",
+        ),
+        strict=True,
+    ):
+        assert place in alert.text
+        assert "outside the fleet's fence" in alert.text
 
 
 def test_the_next_executive_knows_them(play: Any) -> None:
