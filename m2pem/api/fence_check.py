@@ -10,7 +10,7 @@ from m2pem.fleet.parameters import ResolvedValue
 from m2pem.geo.fence import Breach, Fence
 from m2pem.geo.local_frame import LatLon, offset
 from m2pem.mission.catalogue import ResourceId
-from m2pem.mission.geometry import Point
+from m2pem.mission.geometry import Area, Point
 
 OFFSET_M = 15.0
 BEHIND_RAD = math.pi
@@ -25,15 +25,20 @@ Stance = tuple[LatLon, float]
 
 
 class FenceCheck:
-    """Where the behaviors of a vehicle would leave a fence.
+    """Where the behaviors of a vehicle would leave a fence; None: nowhere.
 
     `stance`: of a vehicle by its name, None if it is not known; of targets that move, only the
     current position is known.
     """
 
-    def __init__(self, fence: Fence, stance: Callable[[str], Stance | None]) -> None:
+    def __init__(self, fence: Fence | None, stance: Callable[[str], Stance | None]) -> None:
         self.fence = fence
         self._stance = stance
+
+    @classmethod
+    def of(cls, area: Area | None, bus: FleetBus) -> "FenceCheck":
+        """Return the check of an area's fence for vehicles where their telemetry says."""
+        return cls(None if area is None else Fence(area), stance_on(bus))
 
     def refusal(
         self,
@@ -54,6 +59,8 @@ class FenceCheck:
     ) -> Breach | None:
         """Return where the way would leave the fence; None: it does not. `start` and `yaw_rad` are
         those of the vehicle. Without them, the way from the vehicle is not checked."""
+        if self.fence is None:
+            return None
         parameters = BehaviorParameters(values)
         stance = self._stance(parameters.target_vehicle or "")
         place, name = None, ""

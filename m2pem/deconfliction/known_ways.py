@@ -21,7 +21,7 @@ from m2pem.deconfliction.shared_space import SharedRegion, regions_of
 from m2pem.deconfliction.team_volumes import TEAM_BEHAVIORS, end_of_member, member_volume
 from m2pem.fleet.behaviors import SHARED
 from m2pem.fleet.fleet import Domain, Fleet
-from m2pem.fleet.parameters import ResolvedValue, examine
+from m2pem.fleet.parameters import ResolvedValue, examine_behavior
 from m2pem.fleet.space import BY_HAND, STOPS
 from m2pem.geo.geojson import GeometryError
 from m2pem.geo.local_frame import EastNorth, LocalFrame
@@ -236,17 +236,15 @@ class FleetWays:
         )
         if spec is None:
             return None
-        given = {each.name: each.value for each in behavior.parameters}
-        deferred = [name for name, value in given.items() if isinstance(value, Expression)]
-        if not _HEIGHTS.issuperset(deferred):
-            return None
-        fleet = self._fleet
-        raw = {name: value for name, value in given.items() if not isinstance(value, Expression)}
-        if any(isinstance(value, str) and value in self._changeable for value in raw.values()):
-            return None
-        values, problems = examine(
-            spec, raw, self._geometries.get, fleet.vehicles, deferred, fleet.origin
-        )
+        for each in behavior.parameters:
+            late = (
+                each.name not in _HEIGHTS
+                if isinstance(each.value, Expression)
+                else each.value in self._changeable
+            )
+            if late:
+                return None
+        values, problems = examine_behavior(behavior, spec, self._geometries.get, self._fleet)
         return None if problems else values
 
 

@@ -75,9 +75,8 @@ def crossed(parameters: LocalParameters, made: Manoeuvre) -> str:
     track = track_of(made.plan)
     way = [to for at, to in pairwise(track) if math.dist(at, to) > 1e-3]
     start, *places = map(fence.frame.to_latlon, (track[0], *way))
-    return fence.breach(
-        places, start, lambda at: "its home" if at == len(way) - 1 else "a corner of its way home"
-    )
+    names = [*["a corner of its way home"] * (len(way) - 1), "its home"]
+    return fence.breach(places, start, names.__getitem__)
 
 
 def fence_findings(mission: Mission, fleet: Fleet) -> list[Finding]:
@@ -90,6 +89,7 @@ def fence_findings(mission: Mission, fleet: Fleet) -> list[Finding]:
 class _Fenced:
     def __init__(self, mission: Mission, fleet: Fleet, area: Area) -> None:
         self._mission = mission
+        self._flow = TokenFlow(mission)
         self._frame = FlatFrame(fleet.origin)
         self._fence = Fence(area, frame=self._frame)
         self._vehicles: dict[ResourceId, SimVehicle] = {}
@@ -118,14 +118,13 @@ class _Fenced:
     def found(self) -> Iterator[Finding]:
         starts = {name: self._starts(name) for name in {*chain(*self._named.values())}}
         returned: set[ResourceId] = set()
-        for task, values in self._values.items():
+        for task in self._values:
             behavior, findings = self._tasks[task], TaskFindings(self._mission.file_of(task), task)
             for name in self._named[task] or [*self._vehicles][:1]:  # of a role by need, one
-                start = starts[name].get(task) if name in self._named[task] else None
-                plan, breach = self._planned(behavior, values, name, start)
+                start = starts.get(name, {}).get(task)
+                plan, breach = self._planned(task, name, start)
                 if breach is not None:
-                    certain = start is None or start[1]
-                    certain = certain or self._planned(behavior, values, name, None)[1] is not None
+                    certain = start is None or start[1] or self._planned(task, name, None)[1]
                     findings.add(
                         "outside-fence",
                         f"{name}: {breach}",
@@ -135,15 +134,15 @@ class _Fenced:
                         place=breach.place,
                     )
                 elif plan is not None and name not in returned:
-                    self._check_return(name, plan, behavior.line, findings)
-                    returned.update({name} if findings.found else ())
+                    returned.update(self._crossing(name, plan, behavior.line, findings))
                 if behavior.type is BehaviorType.TEAM and findings.found:
                     break  # of the others is the same
             yield from findings.found
 
-    def _check_return(
+    def _crossing(
         self, name: ResourceId, plan: Plan[Pose], line: int, findings: TaskFindings
-    ) -> None:
+    ) -> list[ResourceId]:
+        """Find where a return of a vehicle leaves the fence; return the vehicle, if it does."""
         home = self._frame.to_latlon(self._vehicles[name].home[:2])
         for at in map(self._frame.to_latlon, track_of(plan)):
             if breach := self._fence.find_breach([home], at, lambda _: "its home"):
@@ -156,7 +155,8 @@ class _Fenced:
                     severity=Severity.WARNING,
                     place=breach.place,
                 )
-                return
+                return [name]
+        return []
 
     def _starts(self, name: ResourceId) -> Mapping[Activity, _Start]:
         """Return where a vehicle is when its tasks begin, and whether that is certain: it may not
@@ -167,36 +167,33 @@ class _Fenced:
             if name in self._named[task] or not all(role.resource for role in behavior.roles)
         ]
         main = self._mission.process()
-        last = TokenFlow(self._mission).last_of(own, main)
+        last = self._flow.last_of(own, main)
         ends: dict[Activity | Process | None, _Start] = {None: None}
         ends[main] = self._vehicles[name].pose(0), False
         starts: dict[Activity, _Start] = {}
         while ready := [each for each in own if each not in starts and last[each] in ends]:
             for task in ready:
-                behavior, values, end = self._tasks[task], self._values.get(task), None
+                behavior, end = self._tasks[task], None
                 alone = behavior.type is BehaviorType.VEHICLE and name in self._named[task]
                 starts[task] = start = ends[last[task]] if alone else None
-                if start is not None and values is not None:
-                    plan, _ = self._planned(behavior, values, name, start)
-                    if plan is not None and not math.isinf(plan.duration_s):
+                if start is not None and task in self._values:
+                    plan, _ = self._planned(task, name, start)
+                    if plan is not None and plan.duration_s < math.inf:
                         sure = start[1] or behavior.name in _ENDS_AT_A_PLACE
                         end = plan.at(plan.duration_s), sure
                 ends[task] = end
         return starts
 
     def _planned(
-        self,
-        behavior: Behavior,
-        values: Mapping[str, ResolvedValue],
-        name: ResourceId,
-        start: _Start,
+        self, task: Activity, name: ResourceId, start: _Start
     ) -> tuple[Plan[Pose] | None, Breach | None]:
         """Return what the vehicle would do from a start, and why the fence refuses that."""
-        craft = self._vehicles[name].craft(0)
+        craft, does = self._vehicles[name].craft(0), self._tasks[task].name
         if start is not None:
             craft = replace(craft, pose=start[0])
-        does = "single_vehicle_routing" if behavior.name in _AS_ROUTES else behavior.name
-        parameters = LocalParameters(values, self._frame, self._poses.get, self._fence)
+        if does in _AS_ROUTES:
+            does = "single_vehicle_routing"
+        parameters = LocalParameters(self._values[task], self._frame, self._poses.get, self._fence)
         try:
             made = MANOEUVRES[does](craft, parameters)
         except RefusedError:

@@ -186,18 +186,13 @@ class Planner:
         fence = self._fence(body.id)
         if fence is None or not isinstance(chase, Pursuit) or not isinstance(body, SimVehicle):
             return ""
-        target = self.pose_of(chase.target, now_us)
-        station = None if target is None else chase.station(target)[:2]
-        place = self._frame.to_latlon(body.pose(now_us).place[:2])
-        way = [] if station is None else [self._frame.to_latlon(station)]
-        pose = body.pose(now_us)
+        pose, target = body.pose(now_us), self.pose_of(chase.target, now_us)
+        place = self._frame.to_latlon(pose.place[:2])
+        way = [] if target is None else [self._frame.to_latlon(chase.station(target)[:2])]
         stops_s = 2 * STEP_S + pose.speed / (2 * body.kinematics.deceleration_m_s2)
-        ahead = (
-            pose.place[0] + pose.velocity[0] * stops_s,
-            pose.place[1] + pose.velocity[1] * stops_s,
-        )
+        east, north = (pose.place[i] + pose.velocity[i] * stops_s for i in (0, 1))
         found = fence.find_breach(way, place, lambda _: "its station at the target")
-        return str(found or fence.leaves([pose.place[:2], ahead]) or "")
+        return str(found or fence.leaves([pose.place[:2], (east, north)]) or "")
 
     def _fence(self, resource: ResourceId) -> Fence | None:
         area = self._connections[resource].fence

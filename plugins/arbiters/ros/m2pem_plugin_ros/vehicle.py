@@ -15,7 +15,6 @@ from m2pem.api import (
     BehaviorState,
     BehaviorTracker,
     Connection,
-    Fence,
     FenceCheck,
     LatestTask,
     Limits,
@@ -27,7 +26,6 @@ from m2pem.api import (
     Value,
     VehiclePosition,
     VehicleState,
-    stance_on,
 )
 from m2pem.api.remember import remember
 from m2pem.errors import PluginError
@@ -104,10 +102,7 @@ class Vehicle:
         self._limits = setup.limits
         self._ros_connection = ros_connection
         self._sensors, self.endpoints = ros_connection.sensors, ros_connection.endpoints
-        fence = setup.connection.fence
-        self._fence_check = (
-            None if fence is None else FenceCheck(Fence(fence), stance_on(setup.context.bus))
-        )
+        self._fence_check = FenceCheck.of(setup.connection.fence, setup.context.bus)
         self._log_throttle = LogThrottle(setup.context.logger, self.resource)
         self._behaviors: dict[UUID, BehaviorId] = {}
         self._runs: dict[str, BehaviorId] = {}
@@ -579,8 +574,6 @@ class Vehicle:
 
     def _breach(self, request: BehaviorRequest) -> str:
         """Return where the request would leave the fence of the fleet; "" if it does not."""
-        if self._fence_check is None:
-            return ""
         where = self._sensors.localization
         start = None if where.position is None else where.position.latlon
         yaw_rad = None if where.pose is None else where.pose.yaw_rad

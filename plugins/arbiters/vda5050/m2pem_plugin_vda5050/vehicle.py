@@ -16,7 +16,6 @@ from m2pem.api import (
     BehaviorState,
     BehaviorTracker,
     Connection,
-    Fence,
     FenceCheck,
     GeoPosition,
     Limits,
@@ -25,7 +24,6 @@ from m2pem.api import (
     Point,
     ResolvedValue,
     VehicleState,
-    stance_on,
 )
 from m2pem_plugin_vda5050.catalogue import (
     DRIVING_PARAMETERS,
@@ -118,10 +116,7 @@ class Vehicle:
         self._commander = Commander(self._headers, self._clock, setup.publish)
         self._pause = PauseControl(self._commander, self._clock)
         self._own = {own.spec.name: own for own in settings.own_behaviors}
-        fence = setup.connection.fence
-        self._fence_check = (
-            None if fence is None else FenceCheck(Fence(fence), stance_on(setup.context.bus))
-        )
+        self._fence_check = FenceCheck.of(setup.connection.fence, setup.context.bus)
         self._factsheet: Factsheet | None = None
         self._state: State | None = None
         self._state_us = 0
@@ -603,7 +598,7 @@ class Vehicle:
     def _breach(self, request: BehaviorRequest) -> str:
         """Return where the request would leave the fence of the fleet; "" if it does not."""
         position = self.position()
-        if self._fence_check is None or position is None:
+        if position is None:
             return ""
         parameters = BehaviorParameters(request.parameters)
         behavior = request.behavior
