@@ -266,13 +266,13 @@ class Fence:
 
 def area_in(rings: Sequence[Sequence[Coordinate]], frame: LocalFrame) -> "BaseGeometry":
     """Return the area that rings bound, made valid."""
-    outer, *holes = (valid([frame.to_local(corner[:2]) for corner in ring]) for ring in rings)
-    return outer.difference(shapely.union_all(holes))
+    return valid(*([frame.to_local(corner[:2]) for corner in ring] for ring in rings))
 
 
-def valid(ring: Sequence[EastNorth]) -> "BaseGeometry":
-    """Return what a closed ring bounds, made valid."""
-    return shapely.make_valid(shapely.Polygon(ring), method="structure", keep_collapsed=False)
+def valid(ring: Sequence[EastNorth], *holes: Sequence[EastNorth]) -> "BaseGeometry":
+    """Return what a closed ring bounds beside its holes, made valid."""
+    drawn = shapely.Polygon(ring, holes)
+    return shapely.make_valid(drawn, method="structure", keep_collapsed=False)
 
 
 def rings_of(area: "BaseGeometry") -> list[list[EastNorth]]:

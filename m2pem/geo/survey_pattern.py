@@ -93,8 +93,7 @@ def survey_routes(pattern: SurveyPattern, surveyors: Sequence[Surveyor]) -> list
     for each in surveyors:
         if not 0 < each.speed_m_s < math.inf:
             raise GeometryError(f"{each.name or 'speed'}: {each.speed_m_s:g} m/s is not above 0")
-    frame = LocalFrame(pattern.area.rings[0][0][:2])
-    ground = _Ground.of(pattern, frame)
+    ground = _Ground.of(pattern)
     yaw = _yaw(pattern, ground)
     passes = _passes(pattern, ground, yaw)
     if pattern.cross_hatch:
@@ -106,7 +105,7 @@ def survey_routes(pattern: SurveyPattern, surveyors: Sequence[Surveyor]) -> list
     routes = []
     for surveyor, own in zip(surveyors, _shared(passes, surveyors), strict=True):
         if own:
-            routes.append(_route(pattern, frame, ground, surveyor, own))
+            routes.append(_route(pattern, ground, surveyor, own))
     return routes
 
 
@@ -118,8 +117,7 @@ def best_heading_rad(pattern: SurveyPattern) -> float:
         GeometryError: as `survey_routes`.
     """
     free = replace(pattern, heading_rad=None)
-    frame = LocalFrame(pattern.area.rings[0][0][:2])
-    heading = (math.pi / 2 - _yaw(free, _Ground.of(free, frame))) % math.pi
+    heading = (math.pi / 2 - _yaw(free, _Ground.of(free))) % math.pi
     return 0.0 if math.pi - heading < _SAME_HEADING_RAD else heading
 
 
@@ -131,8 +129,8 @@ class _Ground:
     fence: Fence
 
     @classmethod
-    def of(cls, pattern: SurveyPattern, frame: LocalFrame) -> "_Ground":
-        """Return it in the frame.
+    def of(cls, pattern: SurveyPattern) -> "_Ground":
+        """Return it in a frame at the area's first corner.
 
         Raises:
             GeometryError: the spacing is not above 0, or there are too many corners.
@@ -145,24 +143,12 @@ class _Ground:
                 f"the area and what is kept out have more than {MAX_CORNERS} corners: simplify them"
             )
         outer, *holes = (Area((ring,)) for ring in pattern.area.rings)
+        frame = LocalFrame(outer.rings[0][0][:2])
         fence = Fence(None, [*holes, *pattern.keep_out], pattern.clearance_m, frame)
         region = area_in(outer.rings, frame)
         if pattern.margin_m:
             region = region.buffer(pattern.margin_m, join_style="mitre")
         return cls(region.difference(fence.closed), fence)
-
-    def way(self, a: EastNorth, b: EastNorth) -> list[EastNorth]:
-        """Return the places to pass between two places on the shortest way around.
-
-        Raises:
-            GeometryError: there is none.
-        """
-        if (places := self.fence.way(a, b)) is None:
-            raise GeometryError(
-                "a part of the area cannot be reached without entering what is kept out: "
-                "survey the parts on their own"
-            )
-        return places
 
 
 def _yaw(pattern: SurveyPattern, ground: _Ground) -> float:
@@ -274,19 +260,20 @@ def _shared(passes: Sequence[Pass], surveyors: Sequence[Surveyor]) -> list[list[
 
 
 def _route(
-    pattern: SurveyPattern,
-    frame: LocalFrame,
-    ground: _Ground,
-    surveyor: Surveyor,
-    passes: Sequence[Pass],
+    pattern: SurveyPattern, ground: _Ground, surveyor: Surveyor, passes: Sequence[Pass]
 ) -> SurveyRoute:
     places: list[EastNorth] = []
     for start, end in passes:
         begin = _beyond(end, start, pattern.turn_around_m, ground)
-        if places:
-            places += ground.way(places[-1], begin)
+        around = ground.fence.way(places[-1], begin) if places else []
+        if around is None:
+            raise GeometryError(
+                "a part of the area cannot be reached without entering what is kept out: "
+                "survey the parts on their own"
+            )
+        places += around
         places += [begin, _beyond(start, end, pattern.turn_around_m, ground)]
-    waypoints = [(*frame.to_latlon(place), pattern.altitude_m) for place in places]
+    waypoints = [(*ground.fence.frame.to_latlon(place), pattern.altitude_m) for place in places]
     return SurveyRoute(
         surveyor,
         Route(tuple(waypoints), pattern.altitude_frame),

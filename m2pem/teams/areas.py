@@ -6,7 +6,7 @@ from itertools import pairwise
 from typing import TypeAlias
 
 from m2pem.fleet.parameters import accepted
-from m2pem.geo.fence import Fence, rings_of, valid
+from m2pem.geo.fence import rings_of, valid
 from m2pem.geo.lawn_mower import Ring, longest_edge_yaw
 from m2pem.geo.lazy_imports import shapely
 from m2pem.geo.polygon import middle_of, turned
@@ -48,7 +48,7 @@ def strips(
         strip = min(count - 1, int((y - low) / tracks.width_m))
         lengths[strip] += tracks.line.segments[index].length_m
     whose = owners(lengths, shares)
-    area = valid(level[0]).difference(Fence.around(level[1:]).closed)
+    area = valid(*level)
     parts: list[list[list[Place]]] = []
     for member in range(len(shares)):
         mine = [strip for strip, owner in enumerate(whose) if owner == member]
