@@ -40,16 +40,6 @@ class FenceCheck:
         """Return the check of an area's fence for vehicles where their telemetry says."""
         return cls(None if area is None else Fence(area), stance_on(bus))
 
-    def refusal(
-        self,
-        behavior: str,
-        values: Mapping[str, ResolvedValue],
-        start: LatLon | None,
-        yaw_rad: float | None = None,
-    ) -> str:
-        """Return where the way would leave the fence, as `find_breach`; "" if it does not."""
-        return str(self.find_breach(behavior, values, start, yaw_rad) or "")
-
     def find_breach(
         self,
         behavior: str,

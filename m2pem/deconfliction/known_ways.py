@@ -236,14 +236,10 @@ class FleetWays:
         )
         if spec is None:
             return None
-        for each in behavior.parameters:
-            late = (
-                each.name not in _HEIGHTS
-                if isinstance(each.value, Expression)
-                else each.value in self._changeable
-            )
-            if late:
-                return None
+        late = {each.name for each in behavior.parameters if isinstance(each.value, Expression)}
+        named = {each.value for each in behavior.parameters if isinstance(each.value, str)}
+        if late - _HEIGHTS or not named.isdisjoint(self._changeable):
+            return None
         values, problems = examine_behavior(behavior, spec, self._geometries.get, self._fleet)
         return None if problems else values
 

@@ -456,8 +456,7 @@ class _Check:
         for problem in problems:
             line = lines.get(problem.name, behavior.line)
             if problem.rule == "unknown-geometry":
-                name = str(given[problem.name])
-                self._unknown_geometry(problem, name, line, taker, findings)
+                self._unknown_geometry(problem, str(given[problem.name]), line, taker, findings)
             else:
                 message = taker.place + problem.message
                 findings.add(problem.rule, message, problem.remedy, line=line, role=taker.role)

@@ -37,12 +37,9 @@ def check_turns(mission: Mission, fleet: Fleet) -> Iterator[Finding]:
 
 def _turns(behavior: Behavior, mission: Mission, fleet: Fleet) -> tuple[str, str]:
     given = {each.name: each.value for each in behavior.parameters}
-    values, problems = examine_behavior(
-        behavior,
-        SHARED[behavior.name, BehaviorType.TEAM],
-        {**fleet.geometries, **mission.geometries}.get,
-        fleet,
-    )
+    spec = SHARED[behavior.name, BehaviorType.TEAM]
+    geometry = {**fleet.geometries, **mission.geometries}.get
+    values, problems = examine_behavior(behavior, spec, geometry, fleet)
     route = values.get("route")
     shaping = ("shape", "spacing", "offsets")
     known = all(isinstance(given.get(name, ""), str) for name in shaping)

@@ -577,7 +577,8 @@ class Vehicle:
         where = self._sensors.localization
         start = None if where.position is None else where.position.latlon
         yaw_rad = None if where.pose is None else where.pose.yaw_rad
-        return self._fence_check.refusal(request.behavior, request.parameters, start, yaw_rad)
+        values, check = request.parameters, self._fence_check
+        return str(check.find_breach(request.behavior, values, start, yaw_rad) or "")
 
     def _health(self) -> Health:
         try:

@@ -607,7 +607,8 @@ class Vehicle:
         elif isinstance(parameters.target, Point):
             behavior = "goto"
         yaw_rad = None if self._place is None else self._frame.to_yaw(self._place.theta)
-        return self._fence_check.refusal(behavior, request.parameters, position.latlon, yaw_rad)
+        values, start = request.parameters, position.latlon
+        return str(self._fence_check.find_breach(behavior, values, start, yaw_rad) or "")
 
     def _velocity_enu(self) -> tuple[float, float, float] | None:
         place, velocity = self._place, self._velocity
