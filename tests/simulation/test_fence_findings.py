@@ -126,3 +126,47 @@ def test_a_home_outside_is_named(tmp_path: Path) -> None:
     assert "is 0.5 m outside the fleet's fence" in found.message
     (found,) = checked(tmp_path, [("goto", "target", at(180, 100))], home=(-0.5, 100))
     assert (found.severity, found.rule) == (Severity.WARNING, "outside-fence")  # across the hole
+
+
+def drawn(folder: Path, nodes: str, *ways: tuple[str, str]) -> list[tuple[str, str, Severity]]:
+    """The findings of a mission as it is drawn: task, rule and severity."""
+    mission, fleet = written(folder, [])
+    mission.write_text(HEAD + nodes + flows(*ways) + TAIL)
+    found = fence_findings(load_mission(mission.read_bytes()), load_fleet(fleet))
+    return [(each.element, each.rule, each.severity) for each in found]
+
+
+ENDS = '<startEvent id="S"/><endEvent id="E"/>'
+
+
+def test_a_vehicle_is_followed_through_gateways_calls_and_joins_that_do_not_move_it(
+    tmp_path: Path,
+) -> None:
+    west, east = (task(name, "goto", "v", target=at(x, 100)) for name, x in (("W", 60), ("A", 180)))
+    gateways = '<exclusiveGateway id="X"/><exclusiveGateway id="Y"/>'
+    ways = (("S", "W"), ("W", "X"), ("X", "Y"), ("Y", "A"), ("A", "E"))
+    other = '<sequenceFlow id="X-Y2" sourceRef="X" targetRef="Y"/>'
+    found = drawn(tmp_path, ENDS + west + gateways + other + east, *ways)
+    assert found == [("A", "outside-fence", Severity.ERROR)]
+    inside = f'<subProcess id="P"><startEvent id="s"/>{east}{flows(("s", "A"))}</subProcess>'
+    ways = (("S", "W"), ("W", "P"), ("P", "E"))
+    assert drawn(tmp_path, ENDS + west + inside, *ways) == [("A", "outside-fence", Severity.ERROR)]
+
+
+def test_where_another_task_may_move_it_nothing_is_supposed_of_the_start(tmp_path: Path) -> None:
+    west, east = (task(name, "goto", "v", target=at(x, 100)) for name, x in (("W", 60), ("A", 180)))
+    fork = '<parallelGateway id="F"/>' + task("B", "goto", "v", target=at(180, 180))
+    ways = (("S", "W"), ("W", "F"), ("F", "A"), ("F", "B"), ("A", "E"), ("B", "E"))
+    beside = drawn(tmp_path, ENDS + west + fork + east, *ways)
+    assert ("A", "outside-fence") not in [each[:2] for each in beside]
+    need = task("N", "goto", "v", target=at(60, 20)).replace('vehicle="v"', 'requires="true"')
+    ways = (("S", "W"), ("W", "N"), ("N", "A"), ("A", "E"))
+    between = drawn(tmp_path, ENDS + west + need + east, *ways)
+    assert ("A", "outside-fence") not in [each[:2] for each in between]
+    timer = (
+        '<boundaryEvent id="T" attachedToRef="W"><timerEventDefinition><timeDuration>PT1S'
+        "</timeDuration></timerEventDefinition></boundaryEvent>"
+    )
+    ways = (("S", "W"), ("W", "E"), ("T", "A"), ("A", "E"))
+    interrupted = drawn(tmp_path, ENDS + west + timer + east, *ways)
+    assert ("A", "outside-fence") not in [each[:2] for each in interrupted]
