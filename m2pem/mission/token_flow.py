@@ -27,6 +27,7 @@ class TokenFlow:
             if isinstance(node, e.CallActivity):
                 self._callers.setdefault(node.called, []).append(node)
         self._forks: dict[e.Container, list[_Fork]] = {}
+        self._compensation = [each for each in mission.activities() if each.for_compensation]
 
     def led_to(self, begun: Iterable[e.FlowNode], ends: Collection[e.FlowNode]) -> set[e.FlowNode]:
         """Return the nodes that tokens may enter that enter those of `begun` first.
@@ -51,7 +52,7 @@ class TokenFlow:
         """Return where tokens may be, or may enter next, while a task goes on."""
         yield from self._interrupted(task)
         yield from self._beside(task)
-        yield from (each for each in self._mission.activities() if each.for_compensation)
+        yield from self._compensation
 
     def last_of(
         self, tasks: Collection[e.Activity], process: e.Process
@@ -120,15 +121,16 @@ class TokenFlow:
 
     def _forks_in(self, container: e.Container) -> list[_Fork]:
         if container not in self._forks:
-            forks: list[_Fork] = [[((each,), reach((each,))) for each in container.entries]]
+            forks = self._forks[container] = list[_Fork]()
+            if len(container.entries) > 1:
+                forks.append([((each,), reach((each,))) for each in container.entries])
             for node in container.nodes:
                 after: list[e.FlowNode] = [flow.target for flow in node.outgoing]
-                if isinstance(node, e.Activity):
-                    beside = [each for each in node.boundary if not each.interrupting]
+                boundary = node.boundary if isinstance(node, e.Activity) else ()
+                if beside := [each for each in boundary if not each.interrupting]:
                     own = ((node, *after), {node, *reach(after, node)})
                     forks.append([own, *(((each,), reach((each,), node)) for each in beside)])
                 one = isinstance(node, e.EventBasedGateway) and not node.parallel
-                if not one and not isinstance(node, e.ExclusiveGateway):
+                if len(after) > 1 and not one and not isinstance(node, e.ExclusiveGateway):
                     forks.append([((each,), reach((each,), node)) for each in after])
-            self._forks[container] = [each for each in forks if len(each) > 1]
         return self._forks[container]
