@@ -143,9 +143,11 @@ class Candidates:
         state = self._latest(vehicle_of(self.fleet, resource).id)
         if self.fence is None or not isinstance(state, VehicleState) or state.position is None:
             return ""
-        begins, start = "where the task begins", state.position.latlon
-        found = [self.fence.breach([each], start, lambda _: begins) for each in place.corners]
-        return found[0] if found and all(found) else ""
+        found, start = "", state.position.latlon
+        for each in place.corners:
+            if not (found := self.fence.breach([each], start, lambda _: "where the task begins")):
+                break
+        return found
 
     def group(self, kind: RoleKind) -> Group:
         """Return what roles of a kind choose from: payloads, or vehicles."""

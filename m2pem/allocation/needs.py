@@ -11,8 +11,9 @@ from m2pem.allocation.assignment import MAX_COST_S, RoleOptions
 from m2pem.allocation.candidates import Candidates, Group, Place
 from m2pem.errors import ExpressionError
 from m2pem.fleet.allocation import resources_of
+from m2pem.fleet.behaviors import ALONG_ROUTES
 from m2pem.fleet.facts import possible_resources, preference_s, unfit, vehicle_of
-from m2pem.mission.behavior import Behavior, BehaviorType, Need, Role, RoleKind
+from m2pem.mission.behavior import Behavior, Need, Role, RoleKind
 from m2pem.mission.candidate_facts import FLEET_FACTS, is_fact
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.expression import Expression
@@ -27,7 +28,9 @@ if TYPE_CHECKING:
 UNKNOWN_TRAVEL_S = 86_400.0
 """Travel time of a vehicle whose position is not known: it comes after all others."""
 
-_FOLLOW = frozenset({"follow", "escort"})
+_GOES_THERE = frozenset({"goto", "single_vehicle_routing", "area_survey", *ALONG_ROUTES})
+"""Behaviors that go to the place of their task, not around it or beside it."""
+
 _OF_PLACE = frozenset({"vehicle.distance", "vehicle.travel_time"})
 """Facts that depend on the place of the task."""
 
@@ -332,9 +335,8 @@ class RoleEvaluator:
     # --- who may fill it --------------------------------------------------------------------------
 
     def _candidacy(self, need: Need, kind: RoleKind, task: Task) -> Candidacy:
-        group, key = self.candidates.group(kind), _key(kind, need.condition, need.same, task)
-        if self._fenced(task):
-            key = (*key, task.place)
+        group = self.candidates.group(kind)
+        key = *_key(kind, need.condition, need.same, task), self._fenced(task) and task.place
         excluded: Mapping[ResourceId, str]
         if task.lost:
             excluded = {**self._exclusions(key, need, kind, task), **_lost_here(task.lost)}
@@ -387,9 +389,8 @@ class RoleEvaluator:
         return "" if need.condition.holds(read) else _false_part(need.condition, read)
 
     def _fenced(self, task: Task) -> bool:
-        """Whether the fence says who can get to a task: not to one that follows a vehicle."""
-        goes = task.behavior.type is not BehaviorType.PAYLOAD and task.behavior.name not in _FOLLOW
-        return goes and self.candidates.fence is not None
+        """Whether the fence says who can get to a task."""
+        return task.behavior.name in _GOES_THERE and self.candidates.fence is not None
 
     def _why_not_same(self, resource: ResourceId, need: Need, task: Task) -> str:
         """Return why it is not what an earlier role chose; "": it is, or nothing asks for that."""

@@ -26,6 +26,9 @@ ADJUSTABLE = frozenset({"single_vehicle_routing", "goto", "area_survey", "revers
 """Behaviors of a vehicle whose speed can be changed on the way, if its arbiter adjusts: they are
 over at a place, not after a time."""
 
+ALONG_ROUTES = ("formation", "road_following_formation", "road_sweep", "bridge_crossing")
+"""Behaviors of teams that move along their route."""
+
 FLOWN = frozenset(
     {"single_vehicle_routing", "goto", "change_altitude", "area_survey", "orbit", "follow"}
 ) | {"area_observe"}

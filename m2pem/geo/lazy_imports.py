@@ -1,7 +1,4 @@
-"""Libraries of geometry that are slow to load: each is imported when it is first used.
-
-Most fleets have no fence, and most missions no area with holes. Loading Shapely takes 0.3 s.
-"""
+"""Libraries of geometry that take 0.3 s to load: each is imported when it is first used."""
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any

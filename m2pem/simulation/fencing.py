@@ -16,7 +16,7 @@ from m2pem.api.fence_check import FenceCheck
 from m2pem.errors import FleetError
 from m2pem.findings import Finding, Severity
 from m2pem.fleet.allocation import resources_of
-from m2pem.fleet.behaviors import SHARED
+from m2pem.fleet.behaviors import ALONG_ROUTES, SHARED
 from m2pem.fleet.fleet import Fleet
 from m2pem.fleet.parameters import ResolvedValue, examine_behavior
 from m2pem.fleet.task_findings import TaskFindings
@@ -44,10 +44,8 @@ _ENDS_AT_A_PLACE = ("area_survey", "goto", "single_vehicle_routing")
 
 _Start: TypeAlias = tuple[Pose, bool] | None
 
-_AS_ROUTES = ("formation", "road_following_formation", "road_sweep", "bridge_crossing")
 
-
-def refusal(
+def breach_of(
     behavior: str, parameters: LocalParameters, craft: Craft, made: Manoeuvre, start: bool = True
 ) -> Breach | None:
     """Return where a manoeuvre would leave the fence, in the words of all arbiters; None: it does
@@ -112,7 +110,7 @@ class _Fenced:
             self._named[task] = [each for each in named if each in self._vehicles]
             if (spec := SHARED.get((behavior.name, behavior.type))) is not None:
                 values, problems = examine_behavior(behavior, spec, geometry, fleet)
-                if not problems and behavior.name in (*MANOEUVRES, *_AS_ROUTES):
+                if not problems and behavior.name in (*MANOEUVRES, *ALONG_ROUTES):
                     self._values[task] = values
 
     def found(self) -> Iterator[Finding]:
@@ -191,7 +189,7 @@ class _Fenced:
         craft, does = self._vehicles[name].craft(0), self._tasks[task].name
         if start is not None:
             craft = replace(craft, pose=start[0])
-        if does in _AS_ROUTES:
+        if does in ALONG_ROUTES:
             does = "single_vehicle_routing"
         parameters = LocalParameters(self._values[task], self._frame, self._poses.get, self._fence)
         try:
@@ -200,4 +198,4 @@ class _Fenced:
             return None, None
         if parameters.target_vehicle is not None:  # where that is then is not known
             return made.plan, None
-        return made.plan, refusal(does, parameters, craft, made, start is not None)
+        return made.plan, breach_of(does, parameters, craft, made, start is not None)

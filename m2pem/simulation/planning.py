@@ -18,8 +18,7 @@ from m2pem.mission.behavior import BehaviorType
 from m2pem.mission.catalogue import BehaviorSpec, ResourceId
 from m2pem.simulation.course import RefusedError
 from m2pem.simulation.executions import Aim, Body, Chase
-from m2pem.simulation.fencing import crossed
-from m2pem.simulation.fencing import refusal as refusal_of_fence
+from m2pem.simulation.fencing import breach_of, crossed
 from m2pem.simulation.frame import FlatFrame
 from m2pem.simulation.gimbals import GAZES, MAST_M, Shots
 from m2pem.simulation.local_parameters import LocalParameters
@@ -174,7 +173,7 @@ class Planner:
         manoeuvre: Callable[..., Manoeuvre] = MANOEUVRES[request.behavior]
         made = [manoeuvre(craft, parameters) for craft in crafts]
         for craft, each in zip(crafts, made, strict=True):
-            if breach := refusal_of_fence(request.behavior, parameters, craft, each):
+            if breach := breach_of(request.behavior, parameters, craft, each):
                 raise RefusedError(str(breach))
             if request.behavior == "return_to_launch" and (reason := crossed(parameters, each)):
                 self._context.logger.warning("%s returns: %s", craft.name, reason)

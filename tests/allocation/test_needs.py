@@ -137,7 +137,8 @@ def test_a_vehicle_whose_way_leaves_the_fence_is_not_chosen_when_another_can_get
 
     across = (50e-5, 70e-5)
     assert given("goto", across)[0] == {"driver": (far,)}
-    assert given("follow", across)[0] == {"driver": (near,)}  # where its target is, it may not be
+    for beside in ("follow", "orbit"):  # where the target is, the vehicle need not be
+        assert given(beside, (50e-5, 50e-5))[0] == {"driver": (near,)}
     assert given("goto", (5e-5, 5e-5))[0] == {"driver": (near,)}
     nothing, why = given("goto", (50e-5, 150e-5))
     assert nothing == {}
