@@ -43,7 +43,7 @@ def expression_remedy(text: str) -> str:
         inner = text.strip().removeprefix("return ").removesuffix(";").strip()
         if _reads(parse, inner):
             return f"write {shorten(inner)}, without a language"
-        feel = f"= {inner.replace('==', '=')}"
+        feel = f"= {inner.replace('==', '=')}".replace("'", '"')
         if "=" in inner and _reads(parse, feel):
             return f"write {shorten(feel)}, as FEEL does"
     return EXPRESSION

@@ -20,7 +20,7 @@ from m2pem.mission.elements import ServiceTask
         ("return x > 10;", "write x > 10, without a language"),
         ("foo == 'left'", "write foo == 'left', without a language"),
         ('Vacation Approval = "Approved"', 'write = Vacation Approval = "Approved", as FEEL does'),
-        ("Service Level == 'Premium'", "write = Service Level = 'Premium', as FEEL does"),
+        ("Service Level == 'Premium'", 'write = Service Level = "Premium", as FEEL does'),
         ("some condition", EXPRESSION),
         ("return person.isTall();", EXPRESSION),
         ("x" * 100_000, EXPRESSION),

@@ -273,7 +273,7 @@ def test_what_cannot_be_armed_opens_no_second_incident_and_hides_no_other_event(
 
 def test_what_a_wrong_timer_of_a_revision_has_ended_is_not_armed() -> None:
     wrong = """
-        <boundaryEvent id="late" attachedToRef="job">timer ${x * nothing}</boundaryEvent>
+        <boundaryEvent id="late" attachedToRef="job">timer ${x * 'a'}</boundaryEvent>
         <boundaryEvent id="wrong" attachedToRef="job">error EXPRESSION</boundaryEvent>
         late -> end
         wrong -> end

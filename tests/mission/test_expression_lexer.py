@@ -36,13 +36,6 @@ def test_words_keep_their_meaning_beside_characters_beyond_ascii():
     ]
 
 
-@pytest.mark.parametrize("low", ["1", ".5", "a.b", "true", "for.x"])
-def test_a_range_ends_what_stands_before_its_points(low):
-    kinds = [kind for kind, _, _ in tokens(f"[{low}..2]", Dialect.FEEL)]
-    assert len(kinds) == 6
-    assert tokens(f"[{low}..2]", Dialect.FEEL)[2] == ("operator", "..", 1 + len(low))
-
-
 @pytest.mark.parametrize(
     ("text", "position", "message"),
     [
@@ -66,15 +59,6 @@ def test_what_is_no_token_is_said_with_its_place(text, position, message):
         tokens(text)
     assert message in str(caught.value)
     assert caught.value.position == position
-
-
-@pytest.mark.parametrize("word", ["for", "function", "instance"])
-def test_feel_words_that_are_not_supported_are_names_elsewhere(word):
-    with pytest.raises(ExpressionSyntaxError, match=f"FEEL's '{word}' is not supported"):
-        tokens(word, Dialect.FEEL)
-    assert tokens(word)[0] == ("name", word, 0)
-    assert tokens(f"{word}s", Dialect.FEEL)[0] == ("name", f"{word}s", 0)
-    assert tokens(f"{word}.x", Dialect.FEEL)[0] == ("name", f"{word}.x", 0)
 
 
 def test_xpath_names_before_a_bracket_are_functions_but_for_operators():

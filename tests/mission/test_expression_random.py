@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from m2pem.errors import ExpressionError, ExpressionSyntaxError
 from m2pem.mission.expression import literal, parse, template
-from m2pem.mission.expression.functions import FEEL_NAMES, FUNCTIONS
+from m2pem.mission.expression.feel_functions import FEEL_FUNCTIONS
+from m2pem.mission.expression.functions import FUNCTIONS
 from m2pem.mission.expression.tree import (
     And,
     Arithmetic,
@@ -62,7 +63,7 @@ def _inner(inner, calls):
     several = st.lists(inner, min_size=2, max_size=4).map(tuple)
     nodes = [
         st.builds(Compare, st.sampled_from(Comparison), inner, inner),
-        st.builds(Arithmetic, st.sampled_from(Operation), inner, inner),
+        st.builds(Arithmetic, st.sampled_from([*Operation][:4]), inner, inner),
         st.builds(And, several),
         st.builds(Or, several),
         st.builds(Not, inner),
@@ -264,7 +265,7 @@ WORDS = [
     ],
     *["a", "b.c", "größe", " ", "\n", "\ud800", "\x00", "😀", "٣", "@", "__class__", "eval"],
     *FUNCTIONS,
-    *FEEL_NAMES,
+    *FEEL_FUNCTIONS,
 ]
 any_text = st.one_of(
     st.text(st.characters(codec=None), max_size=60),

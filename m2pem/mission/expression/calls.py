@@ -4,11 +4,11 @@ JUEL: methods of texts and lists, Camunda's `execution.getVariable('x')`, and Fl
 `var:equals(x, 1)`. XPath: the functions that BPMN adds to it (BPMN 2.0.2, clause 10.4.3).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 
 from m2pem.mission.expression.dialect import Dialect
+from m2pem.mission.expression.feel_functions import FEEL_FUNCTIONS, FeelFunction
 from m2pem.mission.expression.functions import (
-    FEEL_NAMES,
     FUNCTIONS,
     OWN,
     Function,
@@ -43,9 +43,8 @@ def meaning(name: str, arguments: Arguments, dialect: Dialect) -> Node:
     Raises:
         CallError: the dialect has no such function, or it takes other arguments.
     """
-    if name in _CLOCK and not arguments and (name == "now" or dialect is Dialect.FEEL):
-        made = _CLOCK[name] if dialect is Dialect.FEEL else "date"
-        return _function(made, (Name(NOW),), dialect)
+    if name == "now" and not arguments:
+        return _function("date", (Name(NOW),), dialect)
     match dialect:
         case Dialect.JUEL if ":" in name:
             return _of_variable(name, arguments)
@@ -61,9 +60,42 @@ def meaning(name: str, arguments: Arguments, dialect: Dialect) -> Node:
             if name in _XPATH_SHAPES:
                 return _built(name, _XPATH_SHAPES[name], arguments)
             name = XPATH_NAMES.get(name, name)
-        case Dialect.FEEL:
-            name = FEEL_NAMES.get(name, name)
     return _function(name, arguments, dialect)
+
+
+def feel_call(name: str, arguments: Arguments, names: Sequence[str]) -> Node:
+    """The tree of a call in FEEL; `names`: of the arguments, in their order, or none.
+
+    Raises:
+        CallError: there is no such function.
+    """
+    if name in ("now", "today") and not arguments:
+        moment = Call("FEEL date and time", (Name(NOW),))
+        return moment if name == "now" else Call("FEEL date", (moment,))
+    function = FEEL_FUNCTIONS.get(name)
+    if function is None:
+        if name in ("now", "today"):
+            return Call("FEEL date and time", arguments or (Literal(None),))
+        if name in FUNCTIONS and not names:
+            return _function(name, arguments)
+        known = (*FEEL_FUNCTIONS, *FUNCTIONS, "now", "today")
+        hint = did_you_mean(name, known) or "docs/conditions.md lists them"
+        raise CallError(f"there is no function {name[:40]!r}; {hint}")
+    if names:
+        name, arguments = _in_order(function, dict(zip(names, arguments, strict=True)))
+    return Call(f"FEEL {name}", arguments)
+
+
+def _in_order(function: FeelFunction, given: Mapping[str, Node]) -> tuple[str, Arguments]:
+    """Which way to call a function the names mean, and its arguments as that has them; too many
+    where a name is wrong."""
+    for number, each in enumerate((function, *function.others)):
+        known = [parameter.name for parameter in each.parameters]
+        if given.keys() <= {*known}:
+            last = max((known.index(name) for name in given), default=-1)
+            name = f"{function.name}/{number}" if function.others else function.name
+            return name, tuple(given.get(each, Literal(None)) for each in known[: last + 1])
+    return function.name, (*given.values(), *[Literal(None)] * (len(function.parameters) + 1))
 
 
 def method_call(receiver: Node, method: str, arguments: Arguments) -> Node:
@@ -91,7 +123,7 @@ def _function(name: str, arguments: Arguments, dialect: Dialect = Dialect.JUEL) 
     if function is None:
         if "." in name:
             raise CallError(f"{name[:40]!r} would run a method of an object, which m2pem does not")
-        hint = did_you_mean(name, functions) or "there are " + ", ".join((*functions, *_CLOCK))
+        hint = did_you_mean(name, functions) or "there are " + ", ".join((*functions, "now"))
         raise CallError(f"there is no function {name[:40]!r}; {hint}")
     if not function.accepts(len(arguments)):
         raise CallError(f"expected {function.signature}, found {len(arguments)} arguments")
@@ -139,9 +171,6 @@ _lower, _exists, _empty = map(_calling, ("lower", "exists", "is_empty"))
 def _contains(container: Node, item: Node, *more: Node) -> tuple[Node, ...]:
     return tuple(Call("contains", (container, each)) for each in (item, *more))
 
-
-_CLOCK = {"now": "date and time", "today": "date"}
-"""Functions of the time of the input that is decided, by what they make of it."""
 
 METHODS = {
     "contains": "contains",

@@ -6,13 +6,14 @@ from functools import lru_cache
 from typing import NoReturn
 
 from m2pem.errors import ExpressionError
+from m2pem.mission.expression import feel_values
 from m2pem.mission.expression.dialect import Dialect, Span, locate, split
 from m2pem.mission.expression.evaluate import evaluate
 from m2pem.mission.expression.feel import FeelParser
 from m2pem.mission.expression.literals import shorten, show_scalar
-from m2pem.mission.expression.operators import begin_work
+from m2pem.mission.expression.operators import begin_work, truth
 from m2pem.mission.expression.parser import Parser
-from m2pem.mission.expression.rules import RULES
+from m2pem.mission.expression.rules import RULES, Rules
 from m2pem.mission.expression.tree import Join, Literal, Node, names
 from m2pem.mission.values import ReadValue, Value
 
@@ -24,16 +25,19 @@ _INTEGER = re.compile(r"-?[0-9]{1,18}")
 class Expression:
     """A parsed expression; never changes. Equal to another of the same text and dialect.
 
-    `text` is what was written, `tree` what it means, `names` the dotted names that it reads.
+    `text` is what was written, `tree` what it means, `names` the dotted names that it reads,
+    `rules` what its operators do.
     """
 
     text: str
     dialect: Dialect
     tree: Node
     names: frozenset[str] = field(init=False)
+    rules: Rules = field(init=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "names", names(self.tree))
+        object.__setattr__(self, "rules", RULES[self.dialect])
 
     @property
     def constant(self) -> bool:
@@ -52,9 +56,11 @@ class Expression:
         if new_limit:
             begin_work()
         try:
-            rules = RULES[self.dialect]
+            rules = self.rules
+            if rules.ternary:
+                feel_values.begin()
             value = evaluate(self.tree, read, rules)
-            return rules.result(value) if rules.result else value  # type: ignore[return-value]
+            return rules.result(value) if rules.result else value
         except ExpressionError as error:
             self._explain(error)
 
@@ -66,11 +72,18 @@ class Expression:
         """
         begin_work()
         try:
-            rules = RULES[self.dialect]
+            rules = self.rules
+            if rules.ternary:
+                return self._feel_holds(read)
             value = evaluate(self.tree, read, rules)
             return value if value is True or value is False else rules.truth(value, "a condition")
         except ExpressionError as error:
             self._explain(error)
+
+    def _feel_holds(self, read: ReadValue) -> bool:
+        feel_values.begin()
+        value = evaluate(self.tree, read, self.rules)
+        return truth(feel_values.result(value), "a condition")
 
     def _explain(self, error: ExpressionError) -> NoReturn:
         raise ExpressionError(f"{error}, in {shorten(self.text.strip())!r}") from error

@@ -1,125 +1,609 @@
-"""Parses what FEEL alone has: its words, ranges, names with spaces (DMN 1.3, clause 10.3.1.2)."""
+"""Parses FEEL (DMN 1.5, clause 10.3.1.2).
 
-from m2pem.mission.expression.dialect import Dialect, Span
-from m2pem.mission.expression.lexer import Token
-from m2pem.mission.expression.parser import Parser
+Names may hold spaces and signs: those of contexts, variables and functions are known as they are
+written; of other names, words that follow each other are one name.
+"""
+
+import re
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple, NoReturn
+
+from m2pem.errors import ExpressionSyntaxError
+from m2pem.mission.expression.calls import CallError, feel_call
+from m2pem.mission.expression.dialect import Span
+from m2pem.mission.expression.feel_functions import FEEL_FUNCTIONS, NAME_HEADS, NAMES
+from m2pem.mission.expression.literals import read_number
 from m2pem.mission.expression.tree import (
+    MAX_DEPTH,
     And,
+    Arithmetic,
     Call,
     Compare,
     Comparison,
+    ContextOf,
+    Every,
+    Filter,
+    For,
     If,
     In,
+    InstanceOf,
+    Invoke,
+    Lambda,
     ListOf,
     Literal,
+    Name,
+    Negate,
     Node,
     Not,
+    Operation,
+    Or,
+    Path,
+    RangeOf,
     Some,
+    TypeName,
+    walk,
 )
-from m2pem.mission.expression.vocabulary import COMPARISON, LOWEST
+
+MAX_ITEMS = 1_000
+MAX_PARTS = 20_000
+
+_SPACE = re.compile(r"(?:\s|//[^\n]*|/\*.*?\*/)*", re.DOTALL)
+_SIGNS = re.compile(r"\*\*|\.\.|->|<=|>=|!=|[-+*/()\[\]{},.:<>=@]")
+_NUMBER = re.compile(r"(?:[0-9]+(?:\.[0-9]+)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+_TEXT = re.compile(r'"(?:[^"\\]|\\.)*"', re.DOTALL)
+_WORD = re.compile(r"(?:[^\W\d]|[\U00010000-\U000EFFFF])[\w\U00010000-\U000EFFFF]*")
+_INSIDE = re.compile(r"[\w\U00010000-\U000EFFFF]")
+_NAMED = re.compile(r"([^\W\d]\w*(?:\s+\w+)*)\s*:(?!=)")
+_PART = re.compile(r"[\w\U00010000-\U000EFFFF]+|[^\s\w]")
+_ESCAPE = re.compile(r"\\(?:u([0-9A-Fa-f]{4})|U([0-9A-Fa-f]{6})|(.))", re.DOTALL)
+_ESCAPED = {"n": "\n", "t": "\t", "r": "\r", "b": "\b", "f": "\f", "\\": "\\", '"': '"', "'": "'"}
+_KEYWORDS = frozenset(
+    {
+        *("and", "between", "else", "every", "false", "for", "function", "if", "in", "instance"),
+        *("null", "or", "return", "satisfies", "some", "then", "true"),
+    }
+)
+_COMPARISONS = {
+    "=": Comparison.EQUAL,
+    **{each.value: each for each in Comparison if each is not Comparison.EQUAL},
+}
+_AND, _COMPARISON = 2, 3
+_STRENGTHS = {
+    **{"or": 1, "and": _AND, "between": _COMPARISON, "in": _COMPARISON, "**": 6},
+    **dict.fromkeys(_COMPARISONS, _COMPARISON),
+    **dict.fromkeys("+-", 4),
+    **dict.fromkeys("*/", 5),
+}
+"""How strongly an operator binds."""
+
+_PROPERTIES = ("time offset", "start included", "end included")
+_TYPES = (
+    *("years and months duration", "days and time duration", "date and time", "date", "time"),
+    *("Any", "number", "string", "boolean", "list", "context", "range", "function", "Null"),
+)
 
 
-class FeelParser(Parser):
-    """Reads one expression in FEEL."""
+class _Token(NamedTuple):
+    """`kind`: "number", "text", "name", "word" (a keyword), "sign" or "end"."""
+
+    kind: str
+    text: str
+    start: int
+    stop: int
+
+
+class FeelParser:
+    """Reads one expression in FEEL, which is in `text` at `span`.
+
+    Raises:
+        ExpressionSyntaxError: it is none, or is beyond the limits.
+    """
 
     def __init__(self, text: str, span: Span) -> None:
-        super().__init__(text, span, Dialect.FEEL)
+        self._text = text
+        self._stop = span.stop
+        self._names: dict[str, re.Pattern[str]] = {}
+        self._locals: list[str] = []
+        self._nesting = 0
+        self._in_range = False
+        self._token = self._read(span.start)
 
-    def _prefix(self, minimum: int) -> Node:
-        token = self._token
-        if token.kind == "operator" and token.text in ("if", "some", "every"):
-            self._next()
-            return self._if(token) if token.text == "if" else self._quantified(token)
-        return super()._prefix(minimum)
-
-    def _binary(self, left: Node, strength: int) -> Node:
-        if self._take("between"):
-            node = self._between(left)
-        elif self._take("in"):
-            node = self._in(left)
-        else:
-            return super()._binary(left, strength)
-        self._refuse_chain()
+    def parse(self) -> Node:
+        """Parse the whole text, and return its tree."""
+        if self._token.kind == "end":
+            self._fail("an expression is missing")
+        node = self._expression()
+        if self._token.kind != "end":
+            self._fail(f"expected an operator or the end, found {self._found}")
+        for parts, (_, depth) in enumerate(walk(node)):
+            if depth > MAX_DEPTH:
+                self._fail(
+                    f"nested deeper than {MAX_DEPTH} levels; use parentheses or fewer operators"
+                )
+            if parts > MAX_PARTS:
+                self._fail("too large, written out; use fewer ranges in each other")
         return node
 
-    def _not(self, token: Token, minimum: int) -> Node:
-        opening = self._expect("(", "after FEEL's 'not'")
-        node = self._expression(LOWEST)
-        self._expect(")", "to close 'not('", opening)
-        return Not(node)
+    # --- tokens -----------------------------------------------------------------------------------
 
-    def _name(self, token: Token) -> Node:
-        # Two names in a row can only be one that holds spaces.
-        text = token.text
-        while self._token.kind == "name":
-            text += " " + self._next().text
-        return super()._name(token._replace(text=text))
+    def _read(self, position: int) -> _Token:
+        space = _SPACE.match(self._text, position, self._stop)
+        start = space.end() if space else position
+        if start >= self._stop:
+            return _Token("end", "the end", self._stop, self._stop)
+        for pattern in self._names.values():
+            if (named := pattern.match(self._text, start, self._stop)) and not self._goes_on(named):
+                key = next(key for key, each in self._names.items() if each is pattern)
+                return _Token("name", key, start, named.end())
+        if word := _WORD.match(self._text, start, self._stop):
+            return self._name(word)
+        for kind, pattern in (("number", _NUMBER), ("text", _TEXT), ("sign", _SIGNS)):
+            if found := pattern.match(self._text, start, self._stop):
+                if kind == "number":
+                    self._alone(found)
+                return _Token(kind, found[0], start, found.end())
+        self._refuse(start)
 
-    def _key(self, opening: Token) -> Node:
-        """FEEL counts from 1, and takes a condition for a filter."""
-        match self._expression(LOWEST):
-            case Literal(int(place)) if place and not isinstance(place, bool):
-                return Literal(place - 1 if place > 0 else place)
-        self._fail("of FEEL's filters only the number of an item is read, from 1 on", opening)
+    def _goes_on(self, found: re.Match[str]) -> bool:
+        return bool(
+            _INSIDE.match(self._text, found.end(), self._stop) and _INSIDE.match(found[0][-1])
+        )
 
-    def _if(self, token: Token) -> Node:
-        condition = self._expression(LOWEST)
-        self._expect("then", "after 'if'", token)
-        then = self._expression(LOWEST)
-        self._expect("else", "after 'if'", token)
-        return If(condition, then, self._expression(LOWEST))
+    def _name(self, word: re.Match[str]) -> _Token:
+        if word[0] in NAME_HEADS:
+            for pattern, name in NAMES:
+                if found := pattern.match(self._text, word.start(), self._stop):
+                    return _Token("name", name, word.start(), found.end(1))
+        if word[0] == "not":
+            after = _SPACE.match(self._text, word.end(), self._stop)
+            self._fail("expected '(' after FEEL's 'not'", after.end() if after else word.end())
+        if word[0] in _KEYWORDS:
+            return _Token("word", word[0], word.start(), word.end())
+        text, stop = word[0], word.end()
+        while text not in self._locals and text not in FEEL_FUNCTIONS:
+            space = _SPACE.match(self._text, stop, self._stop)
+            following = _WORD.match(self._text, space.end() if space else stop, self._stop)
+            if following is None or following[0] in _KEYWORDS or following.start() == stop:
+                break
+            text, stop = f"{text} {following[0]}", following.end()
+        return _Token("name", text, word.start(), stop)
 
-    def _quantified(self, token: Token) -> Node:
-        variable = self._next()
-        if variable.kind != "name":
-            self._fail(f"expected a name after '{token.text}'", variable)
-        self._expect("in", f"after '{token.text}'")
-        collection = self._expression(LOWEST)
-        self._expect("satisfies", f"after '{token.text}' (of one list)", token)
-        condition = self._expression(LOWEST)
-        if token.text == "some":
-            return Some(variable.text, collection, condition)
-        # Of null, FEEL's 'every' is null, which no condition takes for true.
-        failing = Some(variable.text, collection, Not(condition))
-        return And((Call("exists", (collection,)), Not(failing)))
+    def _alone(self, number: re.Match[str]) -> None:
+        following = self._text[number.end() : number.end() + 1]
+        if number.end() < self._stop and _INSIDE.match(following):
+            self._fail(f"a number cannot be followed by {following!r}", number.end())
+        if following == "." and self._text[number.end() : number.end() + 2] != "..":
+            self._fail("a number cannot be followed by '.'", number.end())
 
-    def _between(self, left: Node) -> Node:
-        low = self._expression(COMPARISON)
-        self._expect("and", "after 'between'")
-        return self._within(left, Comparison.GREATER_EQUAL, low, self._expression(COMPARISON))
+    def _refuse(self, start: int) -> NoReturn:
+        character = self._text[start]
+        if character == '"':
+            self._fail('the text is not closed by "', start)
+        hints = {"'": 'write texts in double quotes: "..."', "!": "write not(...)"}
+        hints |= {"?": "write 'if a then b else c'"}
+        hints |= {"&": "write 'and'", "|": "write 'or'", "%": "write modulo(x, y)"}
+        hint = hints.get(character)
+        self._fail(f"unexpected {character!r}" + (f": {hint}" if hint else ""), start)
 
-    def _within(
-        self,
-        item: Node,
-        above: Comparison,
-        low: Node,
-        high: Node,
-        below: Comparison = Comparison.LESS_EQUAL,
-    ) -> Node:
-        return And((Compare(above, item, low), Compare(below, item, high)))
+    @property
+    def _found(self) -> str:
+        return self._token.text if self._token.kind == "end" else repr(self._token.text)
 
-    def _in(self, left: Node) -> Node:
-        """`in` a list that a value gives, a written list, some values `(1, 2)`, or a range."""
-        opening = self._token
-        if not any(self._take(bracket) for bracket in "[(]"):
-            return In(left, self._expression(COMPARISON))
-        if opening.text == "[" and self._take("]"):
-            return In(left, ListOf(()))
-        items = [self._expression(LOWEST)]
-        if self._take(".."):
-            high = self._expression(LOWEST)
-            closing = self._next()
-            if closing.kind != "operator" or closing.text not in ("]", ")", "["):
-                self._fail("expected ']' or ')' to close the range", closing)
-            above = Comparison.GREATER_EQUAL if opening.text == "[" else Comparison.GREATER
-            below = Comparison.LESS_EQUAL if closing.text == "]" else Comparison.LESS
-            return self._within(left, above, items[0], high, below)
-        if opening.text == "]":
-            self._expect("..", "in a range", opening)
-        if self._take(","):
-            items += self._items("]" if opening.text == "[" else ")", opening)
+    def _next(self) -> _Token:
+        token = self._token
+        self._token = self._read(token.stop)
+        return token
+
+    def _is(self, *texts: str) -> bool:
+        return self._token.kind in ("sign", "word") and self._token.text in texts
+
+    def _take(self, *texts: str) -> _Token | None:
+        return self._next() if self._is(*texts) else None
+
+    def _expect(self, text: str, why: str) -> _Token:
+        if token := self._take(text):
+            return token
+        self._fail(f"expected '{text}' {why}, found {self._found}")
+
+    def _fail(self, message: str, position: int | None = None) -> NoReturn:
+        at = self._token.start if position is None else position
+        raise ExpressionSyntaxError(message, self._text, at)
+
+    def _known(self, name: str) -> str:
+        """Note a name that may hold spaces and signs, and return it without more spaces."""
+        parts = _PART.findall(name)
+        if len(parts) > 1:
+            pattern = r"\s*".join(map(re.escape, parts))
+            pattern = re.sub(r"(?<=\w)\\s\*(?=\w)", r"\\s+", pattern)
+            self._names[name] = re.compile(pattern)
+        return name
+
+    # --- expressions ------------------------------------------------------------------------------
+
+    def _expression(self) -> Node:
+        self._nesting += 1
+        if self._nesting > MAX_DEPTH:
+            self._fail(f"nested deeper than {MAX_DEPTH} levels")
+        if self._take("if"):
+            node = self._if()
+        elif self._is("for", "some", "every"):
+            node = self._iteration(self._next().text)
         else:
-            self._expect("]" if opening.text == "[" else ")", f"to close '{opening.text}'", opening)
-        if opening.text == "(" and len(items) == 1 and not isinstance(items[0], Literal):
-            return In(left, items[0])
-        return In(left, ListOf(tuple(items)))
+            node = self._operators()
+        self._nesting -= 1
+        return node
+
+    def _if(self) -> Node:
+        condition = self._expression()
+        self._expect("then", "after 'if'")
+        then = self._expression()
+        self._expect("else", "after 'if'")
+        return If(condition, then, self._expression())
+
+    def _iteration(self, word: str) -> Node:
+        known = len(self._locals)
+        iterators: list[tuple[str, Node]] = []
+        while not iterators or self._take(","):
+            name = self._variable(f"after '{word}'")
+            self._expect("in", f"after '{word}'")
+            low = self._expression()
+            if self._take(".."):
+                low = RangeOf(low, self._expression(), True, True, descends=True)
+            iterators.append((name, low))
+            self._locals.append(name)
+        if word == "for":
+            self._locals.append("partial")
+        self._expect("return" if word == "for" else "satisfies", f"after '{word}'")
+        node = self._expression()
+        del self._locals[known:]
+        if word == "for":
+            return For(tuple(iterators), node)
+        for name, collection in reversed(iterators):
+            node = (Some if word == "some" else Every)(name, collection, node)
+        return node
+
+    def _variable(self, why: str) -> str:
+        """A name that is defined here: all up to what follows it."""
+        if self._token.kind != "name":
+            self._fail(f"expected a name {why}, found {self._found}")
+        token = self._next()
+        return self._known(token.text)
+
+    def _operators(self, minimum: int = 0) -> Node:
+        """The longest expression whose operators bind more strongly than `minimum`."""
+        node = self._signed()
+        while self._token.kind in ("sign", "word"):
+            strength = _STRENGTHS.get(self._token.text, 0)
+            if strength <= minimum:
+                break
+            node = self._binary(node, strength)
+        return node
+
+    def _binary(self, left: Node, strength: int) -> Node:
+        word = self._token.text
+        if strength <= _AND:
+            operands = [left]
+            while self._take(word):
+                operands.append(self._operators(strength))
+            return Or(tuple(operands)) if word == "or" else And(tuple(operands))
+        self._next()
+        if strength > _COMPARISON:
+            return Arithmetic(Operation(word), left, self._operators(strength))
+        if word == "in":
+            node = self._tests(left)
+        elif word == "between":
+            low = self._operators(_COMPARISON)
+            self._expect("and", "after 'between'")
+            node = _within(left, RangeOf(low, self._operators(_COMPARISON), True, True))
+        else:
+            node = Compare(_COMPARISONS[word], left, self._operators(_COMPARISON))
+        if self._is("between", "in", *_COMPARISONS):
+            self._fail("comparisons do not chain; write 'a < b and b < c', or use parentheses")
+        return node
+
+    def _signed(self) -> Node:
+        negative = 0
+        while self._take("-"):
+            negative += 1
+            if negative > MAX_DEPTH:
+                self._fail(f"nested deeper than {MAX_DEPTH} levels")
+        node = self._value()
+        if negative and isinstance(node, Literal) and _is_number(node):
+            node = Literal(-node.value if negative % 2 else node.value)  # type: ignore[operator]
+            negative = 0
+        for _ in range(negative):
+            node = Negate(node)
+        return node
+
+    # --- values -----------------------------------------------------------------------------------
+
+    def _value(self) -> Node:
+        node = self._primary()
+        while True:
+            if self._take("."):
+                node = self._member(node)
+            elif self._is("[") and not (self._in_range and _is_number(node)):
+                self._next()
+                self._locals.append("item")
+                node = Filter(node, self._expression())
+                self._locals.pop()
+                self._expect("]", "to close '['")
+            elif self._is("(") and not isinstance(node, Name):
+                arguments, names = self._arguments()
+                node = Invoke(node, arguments, names)
+            elif self._take("instance"):
+                if self._token.text.split()[0] != "of":
+                    self._fail(f"expected 'of' after 'instance', found {self._found}")
+                self._token = self._read(self._token.start + len("of"))
+                node = InstanceOf(node, self._type())
+            else:
+                return node
+
+    def _member(self, node: Node) -> Node:
+        token = self._token
+        for name in _PROPERTIES:
+            pattern = re.compile(name.replace(" ", r"\s+") + r"\b")
+            if found := pattern.match(self._text, token.start, self._stop):
+                self._token = self._read(found.end())
+                return Path(node, name)
+        if token.kind not in ("name", "word"):
+            self._fail(f"expected a name after '.', found {self._found}")
+        self._next()
+        if isinstance(node, Name) and node.name.partition(".")[0] not in self._locals:
+            return Name(f"{node.name}.{token.text}")
+        return Path(node, token.text)
+
+    def _primary(self) -> Node:
+        token = self._token
+        match token.kind:
+            case "number":
+                self._next()
+                try:
+                    return Literal(read_number(token.text))
+                except ValueError as error:
+                    self._fail(str(error), token.start)
+            case "text":
+                self._next()
+                return Literal(_unescaped(token.text[1:-1]))
+            case "name":
+                return self._named(self._next())
+            case "end":
+                self._fail("expected a value, found the end")
+        match token.text:
+            case "true" | "false" | "null":
+                self._next()
+                return Literal({"true": True, "false": False}.get(token.text))
+            case "function":
+                return self._function()
+            case "@":
+                self._next()
+                if self._token.kind != "text":
+                    self._fail("expected a text after '@'")
+                return Call("FEEL @", (Literal(_unescaped(self._next().text[1:-1])),))
+            case "{":
+                return self._context()
+            case "[" | "]" | "(":
+                return self._bracketed()
+        self._fail(f"expected a value, found {self._found}")
+
+    def _named(self, token: _Token) -> Node:
+        if not self._is("("):
+            return Name(token.text)
+        if token.text == "not":
+            self._next()
+            node = self._expression()
+            self._expect(")", "to close 'not('")
+            return Not(node)
+        arguments, names = self._arguments()
+        if token.text in self._locals:
+            return Invoke(Name(token.text), arguments, names)
+        try:
+            return feel_call(token.text, arguments, names)
+        except CallError as error:
+            self._fail(str(error), token.start)
+
+    def _arguments(self) -> tuple[tuple[Node, ...], tuple[str, ...]]:
+        self._expect("(", "before arguments")
+        arguments, names = list[Node](), list[str]()
+        while not self._is(")"):
+            if arguments and not self._take(","):
+                break
+            if len(arguments) == MAX_ITEMS:
+                self._fail(f"more than {MAX_ITEMS} items")
+            if named := _NAMED.match(self._text, self._token.start, self._stop):
+                names.append(re.sub(r"\s+", " ", named[1]))
+                self._token = self._read(named.end())
+            elif names:
+                self._fail("all arguments have names, or none")
+            arguments.append(self._expression())
+        self._expect(")", "to close the arguments")
+        if names and len(names) < len(arguments):
+            self._fail("all arguments have names, or none")
+        return tuple(arguments), tuple(names)
+
+    def _function(self) -> Node:
+        self._next()
+        self._expect("(", "after 'function'")
+        known, parameters = len(self._locals), list[str]()
+        while not self._is(")"):
+            if parameters:
+                self._expect(",", "between parameters")
+            name = self._variable("of a parameter")
+            if self._take(":"):
+                self._type()
+            parameters.append(name)
+        self._locals += parameters
+        self._expect(")", "to close the parameters")
+        if self._token.text == "external":
+            self._fail("functions of Java or PMML are not run")
+        body = self._expression()
+        del self._locals[known:]
+        return Lambda(tuple(parameters), body)
+
+    def _context(self) -> Node:
+        opening = self._next()
+        known = len(self._locals)
+        entries: list[tuple[str, Node]] = []
+        while not self._is("}"):
+            if entries and not self._take(","):
+                break
+            key = self._key()
+            if key in (each for each, _ in entries):
+                self._fail(f"the key {key!r} is there twice")
+            entries.append((key, self._expression()))
+            self._locals.append(self._known(key))
+            if len(entries) > MAX_ITEMS:
+                self._fail(f"more than {MAX_ITEMS} items")
+            self._token = self._read(self._token.start)  # with the key as a name
+        self._expect("}", f"to close '{{' at column {opening.start + 1}")
+        del self._locals[known:]
+        return ContextOf(tuple(entries))
+
+    def _key(self) -> str:
+        start = self._token.start
+        if self._token.kind == "text":
+            key = _unescaped(self._next().text[1:-1])
+            self._expect(":", "after a key")
+            return key
+        colon = self._text.find(":", start, self._stop)
+        if colon < 0 or self._token.kind not in ("name", "word"):
+            self._fail(f"expected a key, found {self._found}")
+        key = re.sub(r"\s+", " ", self._text[start:colon].strip())
+        if re.search(r'[\[\](){}",:]', key):
+            self._fail("expected ':' after a key", start)
+        self._token = self._read(colon + 1)
+        return key
+
+    def _bracketed(self) -> Node:
+        """A list, a range, or an expression in parentheses."""
+        opening = self._next()
+        if opening.text == "(" and self._is("<", "<=", ">", ">=", "=", "!="):
+            node = self._open_range()
+            self._expect(")", "to close '('")
+            return node
+        if opening.text == "[" and self._take("]"):
+            return ListOf(())
+        items = [self._item(opening)]
+        if self._take(".."):
+            high = self._end()
+            closing = self._take("]", ")", "[")
+            if closing is None:
+                self._fail("expected ']' or ')' to close the range")
+            return RangeOf(items[0], high, opening.text == "[", closing.text == "]")
+        if opening.text == "]":
+            self._expect("..", "in a range")
+        if opening.text == "(":
+            self._expect(")", f"to close '(' at column {opening.start + 1}")
+            return items[0]
+        while self._take(","):
+            if len(items) == MAX_ITEMS:
+                self._fail(f"more than {MAX_ITEMS} items")
+            items.append(self._item(opening))
+        self._expect("]", f"to close '[' at column {opening.start + 1}")
+        return ListOf(tuple(items))
+
+    def _end(self) -> Node:
+        """The high end of a range; a [ after a number closes it."""
+        outer, self._in_range = self._in_range, True
+        node = self._expression()
+        self._in_range = outer
+        return node
+
+    def _item(self, opening: _Token) -> Node:
+        if opening.text == "[" and self._is("<", "<=", ">", ">=", "!="):
+            return self._open_range()
+        return self._expression()
+
+    def _open_range(self) -> Node:
+        """`< x` and the like, as a range."""
+        operator = self._next().text
+        value = self._operators(_COMPARISON)
+        match operator:
+            case "<" | "<=":
+                return RangeOf(None, value, False, operator == "<=")
+            case ">" | ">=":
+                return RangeOf(value, None, operator == ">=", False)
+            case "=":
+                return RangeOf(value, value, True, True)
+        return RangeOf(value, None, False, False, negated=True)
+
+    def _tests(self, left: Node) -> Node:
+        """What follows `in`: a test, or some of them in parentheses."""
+        if self._is(*_COMPARISONS):
+            return self._test(left)
+        if not self._is("("):
+            return _within(left, self._operators(_COMPARISON))
+        opening = self._next()
+        tests = [self._test(left, alone=False)]
+        if self._take(".."):
+            low = self._low
+            high = self._end()
+            closing = self._take("]", ")", "[")
+            if closing is None:
+                self._fail("expected ']' or ')' to close the range")
+            return _within(left, RangeOf(low, high, False, closing.text == "]"))
+        while self._take(","):
+            tests.append(self._test(left, alone=False))
+        self._expect(")", f"to close '(' at column {opening.start + 1}")
+        if all(isinstance(each, In) and isinstance(each.container, Literal) for each in tests):
+            return In(left, ListOf(tuple(each.container for each in tests)))  # type: ignore[union-attr]
+        return Or(tuple(tests)) if len(tests) > 1 else tests[0]
+
+    def _test(self, left: Node, *, alone: bool = True) -> Node:
+        if self._is(*_COMPARISONS):
+            operator = _COMPARISONS[self._next().text]
+            return Compare(operator, left, self._operators(_COMPARISON))
+        self._low = self._expression()
+        return _within(left, self._low)
+
+    # --- types ------------------------------------------------------------------------------------
+
+    def _type(self) -> TypeName:
+        for name in _TYPES:
+            pattern = re.compile(name.replace(" ", r"\s+") + r"(?!\w)")
+            if found := pattern.match(self._text, self._token.start, self._stop):
+                self._token = self._read(found.end())
+                return name, tuple(self._parts(name))
+        self._fail(f"expected a type such as number or list<string>, found {self._found}")
+
+    def _parts(self, name: str) -> Iterable[tuple[str, TypeName]]:
+        parts = list[tuple[str, TypeName]]()
+        if name not in ("list", "context", "range", "function") or not self._take("<"):
+            return parts
+        while not self._is(">"):
+            if parts:
+                self._expect(",", "between types")
+            key = self._key() if name == "context" else ""
+            parts.append((key, self._type()))
+        self._expect(">", "to close the type")
+        if name == "function":
+            self._expect("->", "before the type of a function's values")
+            parts.append(("->", self._type()))
+        return parts
+
+
+def _within(item: Node, container: Node) -> Node:
+    """`item in container`; of a range, as comparisons, which a verifier translates."""
+    if not isinstance(container, RangeOf) or container.low is None or container.high is None:
+        return In(item, container)
+    above = Comparison.GREATER_EQUAL if container.low_included else Comparison.GREATER
+    below = Comparison.LESS_EQUAL if container.high_included else Comparison.LESS
+    return And((Compare(above, item, container.low), Compare(below, item, container.high)))
+
+
+def _is_number(node: Node) -> bool:
+    return isinstance(node, Literal) and type(node.value) in (int, float)
+
+
+def _unescaped(text: str) -> str:
+    def replaced(found: re.Match[str]) -> str:
+        if code := found[1] or found[2]:
+            value = int(code, 16)
+            return chr(value) if value <= 0x10FFFF else found[0]
+        return _ESCAPED.get(found[3], found[0])
+
+    written = _ESCAPE.sub(replaced, text)
+    return written.encode("utf-16", "surrogatepass").decode("utf-16", "replace")
+
+
+__all__: Sequence[str] = ("FeelParser",)

@@ -9,6 +9,7 @@ from typing import Any
 import m2pem.mission.timers as times  # imports this package too: only its name is bound yet
 from m2pem.errors import ExpressionError, ExpressionSyntaxError
 from m2pem.mission.expression import xpath
+from m2pem.mission.expression.feel_functions import ALTERNATIVES, FEEL_FUNCTIONS, FeelFunction
 from m2pem.mission.expression.literals import NUMBER, read_number
 from m2pem.mission.expression.operators import (
     TEXT_AS_VALUE,
@@ -20,18 +21,7 @@ from m2pem.mission.expression.operators import (
     look_at,
     text_of,
 )
-from m2pem.mission.expression.temporal import (
-    DATE,
-    DAYS,
-    KINDS,
-    MOMENT,
-    MONTHS,
-    Computed,
-    read_cycle,
-    read_date,
-    read_duration,
-    read_moment,
-)
+from m2pem.mission.expression.temporal import Computed
 
 EARTH_RADIUS_M = 6_371_008.8
 """Mean radius of the WGS-84 ellipsoid (2a + b) / 3.
@@ -40,7 +30,7 @@ EARTH_RADIUS_M = 6_371_008.8
 `m2pem.geo`: missions and journals that exist must always give the same values.
 """
 
-_ANY = ("null", "boolean", "number", "text", "list", "map", *KINDS.values())
+_ANY = ("null", "boolean", "number", "text", "list", "map")
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,7 +213,6 @@ def _distance(a: list[Computed], b: list[Computed]) -> Computed:
 _NUMBER = ("number",)
 _TEXT = ("text",)
 _BOOLEAN = ("boolean",)
-_DURATIONS = (DAYS, MONTHS)
 
 FUNCTIONS: dict[str, Function] = {
     function.name: function
@@ -253,21 +242,6 @@ FUNCTIONS: dict[str, Function] = {
     )
 }
 
-FEEL_FUNCTIONS: dict[str, Function] = {
-    function.name: function
-    for function in (
-        Function("date(x)", (("text", "number", DATE, MOMENT), _NUMBER, _NUMBER), read_date,
-                 gives=(DATE,), optional=2),
-        Function("date and time(x)", (("text", DATE, MOMENT),), read_moment, gives=(MOMENT,)),
-        Function("duration(x)", (("text", *_DURATIONS),), read_duration, gives=_DURATIONS),
-        Function("cycle(x, y)", (("number", *_DURATIONS), _DURATIONS), read_cycle, gives=_TEXT,
-                 optional=1),
-        Function("string(x)", (("boolean", "number", "text", DATE, MOMENT, *_DURATIONS),), text_of,
-                 gives=_TEXT),
-    )
-}  # fmt: skip
-"""What FEEL alone has, or has otherwise: dates and durations are values of their kinds."""
-
 XPATH_FUNCTIONS: dict[str, Function] = {
     function.name: function
     for function in (
@@ -291,25 +265,12 @@ XPATH_FUNCTIONS: dict[str, Function] = {
 }  # fmt: skip
 """XPath's own, which convert what they take (XPath 1.0, clause 4)."""
 
-OWN = {"FEEL": FEEL_FUNCTIONS, "XPATH": XPATH_FUNCTIONS}
+OWN: dict[str, dict[str, Function]] = {"XPATH": XPATH_FUNCTIONS}
 """Functions that one language has, or has otherwise, by how their names begin in a tree."""
 
-LISTED = {
+LISTED: dict[str, Function | FeelFunction] = {
     **FUNCTIONS,
-    **{f"{of} {name}": each for of, own in OWN.items() for name, each in own.items()},
+    **{f"XPATH {name}": each for name, each in XPATH_FUNCTIONS.items()},
+    **{f"FEEL {name}": each for name, each in (FEEL_FUNCTIONS | ALTERNATIVES).items()},
 }
 """All functions, by their names in a tree."""
-
-FEEL_NAMES = {
-    "ceiling": "ceil",
-    "count": "length",
-    "ends with": "ends_with",
-    "is defined": "exists",
-    "list contains": "contains",
-    "lower case": "lower",
-    "modulo": "mod",
-    "starts with": "starts_with",
-    "string length": "length",
-    "upper case": "upper",
-}
-"""What FEEL calls them (DMN 1.3, clause 10.3.4); it may use the names above too."""

@@ -20,6 +20,8 @@ from m2pem.mission.values import Value
 _LONG = re.compile(r"[+-]?[0-9]+")
 _DOUBLE = re.compile(r"\s*[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?\s*")
 _OF_DOUBLES = frozenset(".eE")
+_DIRECT = frozenset({bool, int, str})
+"""Types whose values Python compares as Java does."""
 
 
 def truth(value: Computed, what: str) -> bool:
@@ -37,7 +39,7 @@ def result(value: Computed) -> Value:
     """What data holds of a value: no number that is infinite or none."""
     if isinstance(value, float):
         bounded(value, "the expression")
-    return value  # type: ignore[return-value]
+    return value  # type: ignore[no-any-return]
 
 
 def _is_double(value: Computed) -> bool:
@@ -156,6 +158,8 @@ def _ordered_double(value: Computed) -> tuple[float, float]:
 def _equal(left: Computed, right: Computed) -> bool:
     if left is None or right is None:
         return left is right
+    if type(left) is type(right) and type(left) in _DIRECT:
+        return bool(left == right)
     one, other = _pair(left, right, ordered=False)
     return equal(one, other) if isinstance(one, list | dict) else bool(one == other)
 
@@ -164,6 +168,8 @@ def _ordering(compare: Callable[[Any, Any], bool], *, of_null: bool) -> Test:
     def test(left: Computed, right: Computed) -> bool:
         if left is None or right is None:
             return of_null and left is right
+        if type(left) is type(right) and type(left) in _DIRECT:
+            return compare(left, right)
         return compare(*_pair(left, right, ordered=True))
 
     return test

@@ -1,22 +1,31 @@
 """Which kinds of values an expression can have, whatever is in the data."""
 
+from collections.abc import Sequence
 from itertools import chain, product, repeat
 
+from m2pem.mission.expression.feel_functions import FeelFunction, Parameter
 from m2pem.mission.expression.functions import LISTED
 from m2pem.mission.expression.operators import kind
 from m2pem.mission.expression.temporal import DAYS, MONTHS, result_kind
 from m2pem.mission.expression.tree import (
     Arithmetic,
     Call,
+    ContextOf,
+    Filter,
+    For,
     If,
     Index,
+    Invoke,
     Join,
+    Lambda,
     ListOf,
     Literal,
     Name,
     Negate,
     Node,
     Operation,
+    Path,
+    RangeOf,
 )
 
 _DATA = frozenset({"boolean", "number", "text", "list", "map"})
@@ -32,10 +41,13 @@ def kinds(node: Node, *, coerced: bool = False) -> frozenset[str]:
             return frozenset({"number"})
         case Literal(value):
             return frozenset() if value is None else frozenset({kind(value)})
-        case Name() | Index():
+        case Name() | Index() | Filter() | Path() | Invoke():
             return _DATA
         case Call(function, arguments):
             called = LISTED[function]
+            if isinstance(called, FeelFunction):
+                given = [kinds(each) for each in arguments]
+                return (frozenset(called.gives) or _DATA) if _fits(called, given) else frozenset()
             takes = chain(called.takes, repeat(called.takes[-1]))
             fits = all(
                 (kinds(each, coerced=coerced) | {"null"}) & {*next(takes)} for each in arguments
@@ -51,9 +63,25 @@ def kinds(node: Node, *, coerced: bool = False) -> frozenset[str]:
             return frozenset(each for each in found if each is not None)
         case Join():
             return frozenset({"text"})
-        case ListOf():
+        case ListOf() | For():
             return frozenset({"list"})
+        case ContextOf() | RangeOf() | Lambda():
+            return frozenset({"map"})
     return frozenset({"boolean"})
+
+
+def _fits(called: FeelFunction, given: Sequence[frozenset[str]]) -> bool:
+    """Whether there is a way to call a function of FEEL with arguments of some kinds."""
+    for each in (called, *called.others):
+        if each.rest or (each.accepts(len(given)) and all(map(_takes, each.parameters, given))):
+            return True
+    return False
+
+
+def _takes(parameter: Parameter, given: frozenset[str]) -> bool:
+    known = {"context" if each == "map" else each for each in given}
+    anything = not parameter.kinds or not given or "list" in {*parameter.kinds, *given}
+    return anything or not known.isdisjoint(parameter.kinds)
 
 
 def _result(left: str, sign: Operation, right: str) -> str | None:

@@ -6,7 +6,7 @@ from typing import NamedTuple, NoReturn
 from m2pem.errors import ExpressionSyntaxError
 from m2pem.mission.expression.dialect import Dialect, Span
 from m2pem.mission.expression.literals import NUMBER, unescape
-from m2pem.mission.expression.vocabulary import LOWEST, MEANINGS, SYMBOLS, UNSUPPORTED
+from m2pem.mission.expression.vocabulary import LOWEST, MEANINGS, SYMBOLS
 
 
 class Token(NamedTuple):
@@ -34,7 +34,7 @@ _HINTS = {
     "^": "there is no power operator",
     "?": "write 'if a then b else c'",
     "/": "paths into XML are not read; a division is written 'div'",
-    "@": 'paths into XML are not read; for FEEL\'s @"PT5S" write duration("PT5S")',
+    "@": "paths into XML are not read",
     "{": "maps cannot be written",
     "$": "put the whole expression into one '${...}', or write it without '${' and '}'",
     "#": "put the whole expression into one '${...}', or write it without '#{' and '}'",
@@ -45,7 +45,6 @@ _HINTS = {
 }
 
 _CALLED = {
-    Dialect.FEEL: r"date and time(?=\s*\()",
     Dialect.JUEL: r"(?:var|vars|variables):\w+(?=\s*\()",
     Dialect.XPATH: r"(?!(?:and|or|div|mod)\s*+\()(?:[^\W\d][\w.-]*+:)?[^\W\d][\w-]*+(?=\s*+\()",
 }
@@ -62,14 +61,13 @@ def _pattern(dialect: Dialect) -> re.Pattern[str]:
     """Space and the token after it, whose kind is the group's name.
 
     It does not match what is left to `_Closely`: a name or number right before a point or a
-    character beyond ASCII, a word that is not supported, a wrong text, and what is no token.
+    character beyond ASCII, a wrong text, and what is no token.
     """
     called = _CALLED.get(dialect, _NOTHING)
-    unsupported = "|".join(UNSUPPORTED.get(dialect, ())) or _NOTHING
     symbols = sorted(map(re.escape, SYMBOLS[dialect]), key=len, reverse=True)
     return re.compile(
         rf"\s*+(?:(?P<called>{called})"
-        rf"|(?!(?:{unsupported})\b)(?P<name>{_ASCII_NAME.pattern}){_ALONE}"
+        rf"|(?P<name>{_ASCII_NAME.pattern}){_ALONE}"
         rf"|(?P<number>{NUMBER.pattern}){_ALONE}"
         rf"|(?P<constant>{_QUOTED})"
         rf"|(?!\.[0-9])(?P<operator>{'|'.join(symbols)}))"
@@ -144,7 +142,7 @@ class _Closely:
             start += 1
         name_end = scan_name(self._text, start, self._end)
         if name_end > start:
-            return "name", start, self._word(start, name_end)
+            return "name", start, self._word(name_end)
         if number := NUMBER.match(self._text, start, self._end):
             return "number", start, self._number(number.end())
         character = self._text[start]
@@ -153,23 +151,16 @@ class _Closely:
         hint = _HINTS.get(character)
         self._fail(f"unexpected {character!r}" + (f": {hint}" if hint else ""), start)
 
-    def _word(self, start: int, end: int) -> int:
-        word = self._text[start:end]
-        if self._text.startswith(".", end) and end < self._end and not self._is_range(end):
+    def _word(self, end: int) -> int:
+        if self._text.startswith(".", end) and end < self._end:
             self._fail("a part of the name is missing after '.'", end)
-        if word in UNSUPPORTED.get(self._dialect, ()):
-            self._fail(f"FEEL's '{word}' is not supported", start)
         return end
 
     def _number(self, end: int) -> int:
-        following = self._text[end] if end < self._end and not self._is_range(end) else ""
+        following = self._text[end] if end < self._end else ""
         if following and (_continues_name(following) or following == "."):
             self._fail(f"a number cannot be followed by {following!r}", end)
         return end
-
-    def _is_range(self, position: int) -> bool:
-        """Whether the `..` between two ends of a range stands there."""
-        return ".." in SYMBOLS[self._dialect] and self._text.startswith("..", position)
 
     def _quoted(self, start: int) -> None:
         """Says what is wrong with a text."""

@@ -9,17 +9,7 @@ from typing import Any
 from m2pem.errors import ExpressionError
 from m2pem.mission.expression import literals
 from m2pem.mission.expression.literals import MAX_INTEGER, MIN_INTEGER, show_scalar
-from m2pem.mission.expression.temporal import (
-    DAYS,
-    KINDS,
-    MONTHS,
-    Computed,
-    Temporal,
-    calculate,
-    iso,
-    parts,
-    result_kind,
-)
+from m2pem.mission.expression.temporal import Computed
 from m2pem.mission.expression.tree import Comparison, Operation
 
 MAX_SIZE = 100_000
@@ -73,14 +63,12 @@ def kind(value: Computed) -> str:
             return "list"
         case dict():
             return "map"
-    return KINDS[type(value)]
+    raise TypeError(type(value))
 
 
 def describe(value: Computed) -> str:
     """The value with its kind, shortened, for a message."""
-    if type(value) in KINDS:
-        return f"the {kind(value)} {iso(value)}"  # type: ignore[arg-type]
-    return literals.describe(value)  # type: ignore[arg-type]
+    return literals.describe(value)
 
 
 def truth(value: Computed, what: str) -> bool:
@@ -113,8 +101,8 @@ def _equal(left: Computed, right: Computed, depth: int) -> bool:
             _equal(value, right[key], depth - 1) for key, value in left.items()
         )
     if type(left) is type(right):
-        return left == right
-    return kind(left) == kind(right) and left == right
+        return bool(left == right)
+    return kind(left) == kind(right) and bool(left == right)
 
 
 def contains(container: Computed, item: Computed) -> bool:
@@ -136,8 +124,6 @@ def index(container: Computed, key: Computed) -> Computed:
         return container[key] if -len(container) <= key < len(container) else None
     if isinstance(container, dict) and isinstance(key, str):
         return container.get(key)
-    if type(container) in KINDS and isinstance(key, str) and key in (found := parts(container)):  # type: ignore[arg-type]
-        return found[key]
     raise ExpressionError(f"{describe(container)} has no item under {describe(key)}")
 
 
@@ -146,15 +132,10 @@ def _ordering(symbol: Comparison, compare: Callable[[Any, Any], bool]) -> Test:
         if type(left) in _NUMBERS and type(right) in _NUMBERS:
             return compare(left, right)
         kinds = {kind(left), kind(right)}
-        if kinds in ({"number"}, {"text"}) or (len(kinds) == 1 and type(left) in KINDS):
+        if kinds in ({"number"}, {"text"}):
             return compare(left, right)
         if "null" in kinds:
             return False
-        if type(left) in KINDS or type(right) in KINDS:
-            raise ExpressionError(
-                f"'{symbol}' compares {describe(left)} with {describe(right)}; FEEL's duration(x), "
-                "date(x) and date and time(x) make the one of the other's kind"
-            )
         if len(kinds) > 1:
             return False
         raise ExpressionError(f"'{symbol}' cannot order {describe(left)} and {describe(right)}")
@@ -192,7 +173,7 @@ def bounded_text(value: str, what: str) -> str:
 def bounded_list(items: list[Computed]) -> list[Computed]:
     """A new list, when it is not too large: lists of lists could double with every step."""
     size = 0
-    waiting: list[tuple[Computed, int]] = [(items, 0)]  # type: ignore[list-item]
+    waiting: list[tuple[Computed, int]] = [(items, 0)]
     while waiting:
         value, depth = waiting.pop()
         size += 1
@@ -234,9 +215,6 @@ def _arithmetic(
             return bounded(result, f"'{symbol}'", left, right)
         if symbol is Operation.ADD and isinstance(left, str) and isinstance(right, str):
             return bounded_text(left + right, "'+'")
-        kinds = kind(left), kind(right)
-        if result_kind(kinds[0], symbol, kinds[1]) is not None:
-            return calculate(left, symbol, right, kinds)
         hint = "; text(x) turns a value into a text" if "text" in (kind(left), kind(right)) else ""
         raise ExpressionError(
             f"'{symbol}' takes {takes}, not {describe(left)} and {describe(right)}"
@@ -260,18 +238,14 @@ def negate(value: Computed) -> Computed:
         return None
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         return bounded(-value, "'-'", value)
-    if kind(value) in (DAYS, MONTHS):
-        return calculate(value, Operation.MULTIPLY, -1, (kind(value), "number"))
     raise ExpressionError(f"'-' takes a number, not {describe(value)}")
 
 
-def text_of(value: bool | int | float | str | Temporal) -> str:
+def text_of(value: bool | int | float | str) -> str:
     """The value as a text."""
-    if type(value) in KINDS:
-        return iso(value)  # type: ignore[arg-type]
     if isinstance(value, (int, float)):
         bounded(value, "text()", value)
-    return show_scalar(value)  # type: ignore[arg-type]
+    return show_scalar(value)
 
 
 def join(values: list[Computed]) -> str:

@@ -1,4 +1,4 @@
-"""Parses tokens of any dialect to the one syntax tree, by precedence climbing.
+"""Parses tokens of any dialect but FEEL to the one syntax tree, by precedence climbing.
 
 From weak to strong: `a ? b : c`, `or`, `and`, `not`, comparisons (which do not chain), `+ -`,
 `* /`, unary `-`. In JUEL `not` (`!`) and `empty` bind like unary `-`; in it and in XPath
@@ -57,7 +57,7 @@ _OPERATIONS = {each.value: each for each in Operation}
 
 
 class Parser:
-    """Reads one expression, which stands in `text` at `span`; FEEL's own words are `FeelParser`'s.
+    """Reads one expression, which is in `text` at `span`.
 
     Raises:
         ExpressionSyntaxError: it is none, or is beyond the limits.

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from m2pem.mission.expression.evaluate import evaluate
 from m2pem.mission.expression.expression import Expression
 from m2pem.mission.expression.operators import begin_work
-from m2pem.mission.expression.rules import RULES, Rules
+from m2pem.mission.expression.rules import Rules
 from m2pem.mission.expression.tree import And, If, Node, Not, Or, names
 from m2pem.mission.values import ReadValue
 
@@ -23,13 +23,13 @@ def possible_truth(expression: Expression, known: IsKnown, read: ReadValue) -> b
         ExpressionError: a part that is known has a wrong type.
     """
     begin_work()
-    return _truth(expression.tree, known, read, RULES[expression.dialect])
+    return _truth(expression.tree, known, read, expression.rules)
 
 
 def first_false(expression: Expression, known: IsKnown, read: ReadValue) -> frozenset[str]:
     """Return the names of the first part of a false conjunction that makes it false."""
     begin_work()
-    tree, rules = expression.tree, RULES[expression.dialect]
+    tree, rules = expression.tree, expression.rules
     for part in tree.operands if isinstance(tree, And) else (tree,):
         if _truth(part, known, read, rules) is False:
             return names(part)

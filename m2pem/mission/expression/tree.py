@@ -5,7 +5,7 @@ Dataclass equality takes `Literal(1)`, `Literal(1.0)` and `Literal(True)` for th
 does; compare `repr` where the type matters.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import TypeAlias, Union
@@ -27,13 +27,14 @@ class Comparison(StrEnum):
 
 
 class Operation(StrEnum):
-    """Arithmetic. `+` also joins two texts; `%` is of JUEL and XPath, with the dividend's sign."""
+    """Arithmetic. `+` also joins two texts; `%` is of JUEL and XPath, `**` of FEEL."""
 
     ADD = "+"
     SUBTRACT = "-"
     MULTIPLY = "*"
     DIVIDE = "/"
     MODULO = "%"
+    POWER = "**"
 
     __hash__ = str.__hash__
 
@@ -148,6 +149,88 @@ class Some:
 
 
 @dataclass(frozen=True, slots=True)
+class Every:
+    """As `Some`: whether the condition is true with each item. FEEL's."""
+
+    variable: str
+    collection: "Node"
+    condition: "Node"
+
+
+@dataclass(frozen=True, slots=True)
+class For:
+    """The list of `result` for each combination of items; `partial` is what there is so far."""
+
+    iterators: "tuple[tuple[str, Node], ...]"
+    result: "Node"
+
+
+@dataclass(frozen=True, slots=True)
+class Filter:
+    """`container[condition]` of FEEL: the item of a number, or the items for which it is true."""
+
+    container: "Node"
+    condition: "Node"
+
+
+@dataclass(frozen=True, slots=True)
+class Path:
+    """`container.key` of FEEL: an entry, of lists that of each item, or a property."""
+
+    container: "Node"
+    key: str
+
+
+@dataclass(frozen=True, slots=True)
+class ContextOf:
+    """`{key: value}`; a value may read the entries before it."""
+
+    entries: "tuple[tuple[str, Node], ...]"
+
+
+@dataclass(frozen=True, slots=True)
+class RangeOf:
+    """`[low..high]`; None: without that end. `negated`: all but `low`. `descends`: of an iteration,
+    which may go from a higher value to a lower one."""
+
+    low: "Node | None"
+    high: "Node | None"
+    low_included: bool
+    high_included: bool
+    negated: bool = False
+    descends: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Lambda:
+    """`function(a, b) body`."""
+
+    parameters: tuple[str, ...]
+    body: "Node"
+
+
+@dataclass(frozen=True, slots=True)
+class Invoke:
+    """A call of a function that an expression defines. `names`: of its arguments, or none."""
+
+    function: "Node"
+    arguments: "tuple[Node, ...]"
+    names: tuple[str, ...] = ()
+
+
+TypeName: TypeAlias = tuple[str, tuple[tuple[str, "TypeName"], ...]]
+"""A type of FEEL: its name, and the types of its parts by their names ("" where they have none)."""
+
+
+@dataclass(frozen=True, slots=True)
+class InstanceOf:
+    """`value instance of type`."""
+
+    value: "Node"
+    type: TypeName
+
+
+@dataclass(frozen=True, slots=True)
 class Join:
     """A text with `${...}` parts; each part's value is written into it."""
 
@@ -169,6 +252,15 @@ Node: TypeAlias = Union[
     If,
     Index,
     Some,
+    Every,
+    For,
+    Filter,
+    Path,
+    ContextOf,
+    RangeOf,
+    Lambda,
+    Invoke,
+    InstanceOf,
     Join,
 ]
 
@@ -194,8 +286,24 @@ def children(node: Node) -> tuple[Node, ...]:
             return node.items
         case If():
             return (node.condition, node.then, node.otherwise)
-        case Some():
+        case Some() | Every():
             return (node.collection, node.condition)
+        case For():
+            return (*(each for _, each in node.iterators), node.result)
+        case Filter():
+            return (node.container, node.condition)
+        case Path():
+            return (node.container,)
+        case ContextOf():
+            return tuple(each for _, each in node.entries)
+        case RangeOf():
+            return tuple(each for each in (node.low, node.high) if each is not None)
+        case Lambda():
+            return (node.body,)
+        case Invoke():
+            return (node.function, *node.arguments)
+        case InstanceOf():
+            return (node.value,)
         case Join():
             return node.parts
 
@@ -222,15 +330,37 @@ def names(node: Node) -> frozenset[str]:
     waiting: list[Node] = [node]
     while waiting:
         current = waiting.pop()
-        if isinstance(current, Name):
-            found.add(current.name)
-        elif isinstance(current, Some):
-            waiting.append(current.collection)
-            inside = names(current.condition)
-            found.update(name for name in inside if not binds(current.variable, name))
-        elif not isinstance(current, Literal):
-            waiting += children(current)
+        match current:
+            case Name(name):
+                found.add(name)
+            case Literal():
+                pass
+            case Some() | Every():
+                waiting.append(current.collection)
+                found |= _names_but(current.condition, (current.variable,))
+            case For():
+                bound: list[str] = []
+                for variable, collection in current.iterators:
+                    found |= _names_but(collection, bound)
+                    bound.append(variable)
+                found |= _names_but(current.result, (*bound, "partial"))
+            case Filter():
+                waiting.append(current.container)
+                found |= _names_but(current.condition, ("item",))
+            case ContextOf():
+                bound = []
+                for key, value in current.entries:
+                    found |= _names_but(value, bound)
+                    bound.append(key)
+            case Lambda():
+                found |= _names_but(current.body, current.parameters)
+            case _:
+                waiting += children(current)
     return frozenset(found)
+
+
+def _names_but(node: Node, bound: Sequence[str]) -> set[str]:
+    return {name for name in names(node) if not any(binds(each, name) for each in bound)}
 
 
 def binds(variable: str, name: str) -> bool:

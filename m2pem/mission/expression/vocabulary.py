@@ -6,7 +6,7 @@ LOWEST, OR, AND, NOT, EQUALITY, COMPARISON, SUM, PRODUCT, UNARY = range(9)
 _BINARY = {
     "or": OR,
     "and": AND,
-    **dict.fromkeys(("in", "between", "not"), COMPARISON),
+    **dict.fromkeys(("in", "not"), COMPARISON),
     **dict.fromkeys(("==", "!=", "<", "<=", ">", ">="), COMPARISON),
     **dict.fromkeys("+-", SUM),
     **dict.fromkeys("*/%", PRODUCT),
@@ -34,7 +34,6 @@ SYMBOLS = {
         "!": "not",
         "%": "%",
     },
-    Dialect.FEEL: {**_SYMBOLS, "=": "==", "..": ".."},
     Dialect.XPATH: {s: s for s in _SYMBOLS if s not in "/[]."} | {"=": "=="},
 }
 WORDS = {
@@ -51,14 +50,8 @@ WORDS = {
         "mod": "%",
         "empty": "empty",
     },
-    Dialect.FEEL: {
-        **_WORDS,
-        **{word: word for word in ("between", "else", "every", "if", "satisfies", "some", "then")},
-    },
     Dialect.XPATH: {"and": "and", "or": "or", "div": "/", "mod": "%"},
 }
-UNSUPPORTED = {Dialect.FEEL: ("for", "function", "instance")}
-"""Words that are neither operators nor names."""
 
 
 def _meanings(dialect: Dialect) -> dict[str, tuple[str, str, int]]:
