@@ -23,7 +23,7 @@ VERY_MANY_TRANSITIONS = 513350847
 
 def test_transitions_that_change_the_same_are_followed_by_the_same() -> None:
     net = translate(notation(structured(Random(VERY_MANY_TRANSITIONS))))
-    assert len(net.transitions) > 20_000
+    assert len(net.transitions) > 15_000
     affected = affected_transitions(Encoding(net))
     named = sum(len(each) for each in {id(each): each for each in affected}.values())
     assert named < 2_000_000 < sum(map(len, affected))

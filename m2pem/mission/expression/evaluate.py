@@ -149,8 +149,8 @@ def _compare(node: Compare, read: ReadValue, rules: Rules) -> Computed:
     value = _EVALUATE[type(node.left)](node.left, read, rules)
     if type(right) is Literal:
         other = right.value
-        # What conditions mostly are; for a text or null, Python's `==` is the same.
-        if rules.compare is COMPARISONS and (other is None or type(other) is str):
+        # What conditions mostly are; Python's `==` is the same.
+        if rules.compare is COMPARISONS and (other is None or type(other) is type(value) is str):
             if operator is Comparison.EQUAL:
                 return value == other
             if operator is Comparison.NOT_EQUAL:

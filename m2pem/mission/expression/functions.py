@@ -133,7 +133,7 @@ def _extreme(name: str, pick: Callable[[Any], Any]) -> Callable[..., Computed]:
 
 def _contains(container: list[Computed] | str, item: Computed) -> Computed:
     if isinstance(container, list):
-        return any(equal(each, item) for each in container)
+        return any(kind(each) == kind(item) and equal(each, item) for each in container)
     if item is None:
         return None
     if not isinstance(item, str):

@@ -81,7 +81,8 @@ def truth(value: Computed, what: str) -> bool:
 
 
 def equal(left: Computed, right: Computed) -> bool:
-    """Same kind and same value; integers and doubles compare by exact value."""
+    """Same kind and same value; integers and doubles compare by exact value. A number and a text
+    are an error."""
     return _equal(left, right, MAX_VALUE_DEPTH)
 
 
@@ -102,14 +103,26 @@ def _equal(left: Computed, right: Computed, depth: int) -> bool:
         )
     if type(left) is type(right):
         return bool(left == right)
-    return kind(left) == kind(right) and bool(left == right)
+    kinds = kind(left), kind(right)
+    if {*kinds} == _CONFUSED:
+        raise ExpressionError(_confusion("==", left, right))
+    return kinds[0] == kinds[1] and bool(left == right)
+
+
+_CONFUSED = {"number", "text"}
+
+
+def _confusion(symbol: str, left: Computed, right: Computed) -> str:
+    """Why a number is not compared with a text."""
+    pair = f"{describe(left)} with {describe(right)}"
+    return f"'{symbol}' compares {pair}; number(x) or text(x) makes one of the other's kind"
 
 
 def contains(container: Computed, item: Computed) -> bool:
     """`item in container`; nothing is in null."""
     if isinstance(container, list):
         look_at(len(container))
-        return any(equal(each, item) for each in container)
+        return any(kind(each) == kind(item) and equal(each, item) for each in container)
     if container is None:
         return False
     hint = "; use contains(text, part)" if isinstance(container, str) else ""
@@ -136,6 +149,8 @@ def _ordering(symbol: Comparison, compare: Callable[[Any, Any], bool]) -> Test:
             return compare(left, right)
         if "null" in kinds:
             return False
+        if kinds == _CONFUSED:
+            raise ExpressionError(_confusion(symbol, left, right))
         if len(kinds) > 1:
             return False
         raise ExpressionError(f"'{symbol}' cannot order {describe(left)} and {describe(right)}")

@@ -139,7 +139,8 @@ def representatives(compared: Iterable[tuple[str, Value]]) -> list[tuple[Value, 
     other = "something else"
     while other in texts:
         other += "!"
-    found.append((other, False))
+    if texts or not numbers:  # a text beside a number is an error
+        found.append((other, False))
     for place, number in enumerate(numbers):
         assert isinstance(number, int | float)
         found.append((number, True))
