@@ -47,16 +47,25 @@ from m2pem.mission.expression.tree import (
 MAX_ITEMS = 1_000
 MAX_PARTS = 20_000
 
-_SPACE = re.compile(r"(?:\s|//[^\n]*|/\*.*?\*/)*", re.DOTALL)
-_SIGNS = re.compile(r"\*\*|\.\.|->|<=|>=|!=|[-+*/()\[\]{},.:<>=@]")
-_NUMBER = re.compile(r"(?:[0-9]+(?:\.[0-9]+)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
-_TEXT = re.compile(r'"(?:[^"\\]|\\.)*"', re.DOTALL)
-_WORD = re.compile(r"(?:[^\W\d]|[\U00010000-\U000EFFFF])[\w\U00010000-\U000EFFFF]*")
+_BETWEEN = r"(?:\s|//[^\n]*(?:\n|\Z)|/\*.*?\*/)*"
+_WORD_TEXT = r"(?:[^\W\d]|[\U00010000-\U000EFFFF])[\w\U00010000-\U000EFFFF]*"
+_SPACE = re.compile(_BETWEEN, re.DOTALL)
+_WORD = re.compile(_WORD_TEXT)
+_NEXT = re.compile(
+    rf"{_BETWEEN}(?:(?P<word>{_WORD_TEXT})"
+    r"|(?P<number>(?:[0-9]+(?:\.[0-9]+)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)"
+    r'|(?P<text>"(?:[^"\\]|\\.)*")'
+    r"|(?P<sign>\*\*|\.\.|->|<=|>=|!=|/(?![/*])|[-+*()\[\]{},.:<>=@]))",
+    re.DOTALL,
+)
+"""A token and the space and comments before it; its group is its kind."""
+
 _INSIDE = re.compile(r"[\w\U00010000-\U000EFFFF]")
 _NAMED = re.compile(r"([^\W\d]\w*(?:\s+\w+)*)\s*:(?!=)")
 _PART = re.compile(r"[\w\U00010000-\U000EFFFF]+|[^\s\w]")
 _ESCAPE = re.compile(r"\\(?:u([0-9A-Fa-f]{4})|U([0-9A-Fa-f]{6})|(.))", re.DOTALL)
 _ESCAPED = {"n": "\n", "t": "\t", "r": "\r", "b": "\b", "f": "\f", "\\": "\\", '"': '"', "'": "'"}
+_SPELLED = ("sign", "word")
 _KEYWORDS = frozenset(
     {
         *("and", "between", "else", "every", "false", "for", "function", "if", "in", "instance"),
@@ -92,6 +101,9 @@ class _Token(NamedTuple):
     stop: int
 
 
+_new = tuple.__new__  # takes half as long as calling the class
+
+
 class FeelParser:
     """Reads one expression in FEEL, which is in `text` at `span`.
 
@@ -110,11 +122,14 @@ class FeelParser:
 
     def parse(self) -> Node:
         """Parse the whole text, and return its tree."""
+        start = self._token.start
         if self._token.kind == "end":
             self._fail("an expression is missing")
         node = self._expression()
         if self._token.kind != "end":
             self._fail(f"expected an operator or the end, found {self._found}")
+        if self._stop - start <= MAX_DEPTH:  # each level takes a character at least
+            return node
         for parts, (_, depth) in enumerate(walk(node)):
             if depth > MAX_DEPTH:
                 self._fail(
@@ -127,46 +142,59 @@ class FeelParser:
     # --- tokens -----------------------------------------------------------------------------------
 
     def _read(self, position: int) -> _Token:
+        if self._names and (named := self._written(position)):
+            return named
+        found = _NEXT.match(self._text, position, self._stop)
+        if found is None:
+            return self._end_of_text(position)
+        kind = found.lastgroup or ""
+        if kind == "word":
+            return self._name(found["word"], found.start("word"), found.end())
+        if kind == "number":
+            self._alone(found)
+        return _new(_Token, (kind, found[kind], found.start(kind), found.end()))
+
+    def _end_of_text(self, position: int) -> _Token:
         space = _SPACE.match(self._text, position, self._stop)
         start = space.end() if space else position
-        if start >= self._stop:
-            return _Token("end", "the end", self._stop, self._stop)
-        for pattern in self._names.values():
-            if (named := pattern.match(self._text, start, self._stop)) and not self._goes_on(named):
-                key = next(key for key, each in self._names.items() if each is pattern)
-                return _Token("name", key, start, named.end())
-        if word := _WORD.match(self._text, start, self._stop):
-            return self._name(word)
-        for kind, pattern in (("number", _NUMBER), ("text", _TEXT), ("sign", _SIGNS)):
-            if found := pattern.match(self._text, start, self._stop):
-                if kind == "number":
-                    self._alone(found)
-                return _Token(kind, found[0], start, found.end())
-        self._refuse(start)
+        if start < self._stop:
+            self._refuse(start)
+        return _new(_Token, ("end", "the end", self._stop, self._stop))
+
+    def _written(self, position: int) -> _Token | None:
+        """A name that was defined and holds spaces or signs, if it is next."""
+        space = _SPACE.match(self._text, position, self._stop)
+        start = space.end() if space else position
+        for key, pattern in self._names.items():
+            named = pattern.match(self._text, start, self._stop)
+            if named and not self._goes_on(named):
+                return _new(_Token, ("name", key, start, named.end()))
+        return None
 
     def _goes_on(self, found: re.Match[str]) -> bool:
         return bool(
             _INSIDE.match(self._text, found.end(), self._stop) and _INSIDE.match(found[0][-1])
         )
 
-    def _name(self, word: re.Match[str]) -> _Token:
-        if word[0] in NAME_HEADS:
+    def _name(self, word: str, start: int, stop: int) -> _Token:
+        if word in NAME_HEADS:
             for pattern, name in NAMES:
-                if found := pattern.match(self._text, word.start(), self._stop):
-                    return _Token("name", name, word.start(), found.end(1))
-        if word[0] == "not":
-            after = _SPACE.match(self._text, word.end(), self._stop)
-            self._fail("expected '(' after FEEL's 'not'", after.end() if after else word.end())
-        if word[0] in _KEYWORDS:
-            return _Token("word", word[0], word.start(), word.end())
-        text, stop = word[0], word.end()
+                if found := pattern.match(self._text, start, self._stop):
+                    return _new(_Token, ("name", name, start, found.end(1)))
+        if word == "not":
+            after = _SPACE.match(self._text, stop, self._stop)
+            self._fail("expected '(' after FEEL's 'not'", after.end() if after else stop)
+        if word in _KEYWORDS:
+            return _new(_Token, ("word", word, start, stop))
+        text = word
         while text not in self._locals and text not in FEEL_FUNCTIONS:
-            space = _SPACE.match(self._text, stop, self._stop)
-            following = _WORD.match(self._text, space.end() if space else stop, self._stop)
-            if following is None or following[0] in _KEYWORDS or following.start() == stop:
+            following = _NEXT.match(self._text, stop, self._stop)
+            if following is None or following.lastgroup != "word":
                 break
-            text, stop = f"{text} {following[0]}", following.end()
-        return _Token("name", text, word.start(), stop)
+            if following["word"] in _KEYWORDS:
+                break
+            text, stop = f"{text} {following['word']}", following.end()
+        return _new(_Token, ("name", text, start, stop))
 
     def _alone(self, number: re.Match[str]) -> None:
         following = self._text[number.end() : number.end() + 1]
@@ -195,10 +223,12 @@ class FeelParser:
         return token
 
     def _is(self, *texts: str) -> bool:
-        return self._token.kind in ("sign", "word") and self._token.text in texts
+        token = self._token
+        return token.text in texts and token.kind in _SPELLED
 
     def _take(self, *texts: str) -> _Token | None:
-        return self._next() if self._is(*texts) else None
+        token = self._token
+        return self._next() if token.text in texts and token.kind in _SPELLED else None
 
     def _expect(self, text: str, why: str) -> _Token:
         if token := self._take(text):
