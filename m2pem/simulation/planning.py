@@ -24,8 +24,8 @@ from m2pem.simulation.gimbals import GAZES, MAST_M, Shots
 from m2pem.simulation.local_parameters import LocalParameters
 from m2pem.simulation.manoeuvres import MANOEUVRES, Manoeuvre
 from m2pem.simulation.payloads import SimPayload
-from m2pem.simulation.pursuit import STEP_S, Pursuit
-from m2pem.simulation.segments import Pose
+from m2pem.simulation.pursuit import STEP_US, Pursuit
+from m2pem.simulation.segments import Pose, along
 from m2pem.simulation.trajectory import Plan
 from m2pem.simulation.vehicles import SimVehicle, carrier_of
 from m2pem.suggestions import suggest
@@ -180,18 +180,19 @@ class Planner:
         return [_assignment(*each) for each in zip(vehicles, made, strict=True)] + idle
 
     def strays(self, body: Body, chase: Chase, now_us: int) -> str:
-        """Return where a vehicle that stays with another one would leave the fence; "" if it does
-        not."""
+        """Return where a vehicle that stays with another one would leave the fence before it looks
+        again, or when it stops then; "" if it does not."""
         fence = self._fence(body.id)
         if fence is None or not isinstance(chase, Pursuit) or not isinstance(body, SimVehicle):
             return ""
-        pose, target = body.pose(now_us), self.pose_of(chase.target, now_us)
-        place = self._frame.to_latlon(pose.place[:2])
+        here, halfway, then = (body.pose(now_us + part * STEP_US // 2) for part in range(3))
+        place, target = self._frame.to_latlon(here.place[:2]), self.pose_of(chase.target, now_us)
         way = [] if target is None else [self._frame.to_latlon(chase.station(target)[:2])]
-        stops_s = 2 * STEP_S + pose.speed / (2 * body.kinematics.deceleration_m_s2)
-        east, north = (pose.place[i] + pose.velocity[i] * stops_s for i in (0, 1))
+        stops_s = then.speed / (2 * body.kinematics.deceleration_m_s2)
+        track = [here] if fence.outside_m(place) else [here, halfway, then]
+        stop = along(then.place, then.velocity, stops_s)
         found = fence.find_breach(way, place, lambda _: "its station at the target")
-        return str(found or fence.leaves([pose.place[:2], (east, north)]) or "")
+        return str(found or fence.leaves([*(each.place[:2] for each in track), stop[:2]]) or "")
 
     def _fence(self, resource: ResourceId) -> Fence | None:
         area = self._connections[resource].fence

@@ -7,8 +7,10 @@ import msgspec
 from m2pem.simulation.course import turned
 from m2pem.simulation.kinematics import Kinematics
 from m2pem.simulation.segments import Pose, Steer, Vector, along
+from m2pem.units import US_PER_S
 
 STEP_S = 1.0
+STEP_US = round(STEP_S * US_PER_S)
 """How often a pursuit looks where its target is."""
 
 _SLOWEST_TURNING_M_S = 0.3

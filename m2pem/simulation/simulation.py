@@ -27,11 +27,10 @@ from m2pem.simulation.kinematics import STANDING_LOAD
 from m2pem.simulation.links import Links
 from m2pem.simulation.payloads import SimPayload
 from m2pem.simulation.planning import Assignment, Planner
-from m2pem.simulation.pursuit import STEP_S, Pursuit, steer
+from m2pem.simulation.pursuit import STEP_US, Pursuit, steer
 from m2pem.simulation.state_file import Memory
 from m2pem.simulation.trajectory import Plan
 from m2pem.simulation.vehicles import SimVehicle
-from m2pem.units import US_PER_S
 
 STEP = 0.05
 """Of a full battery."""
@@ -59,9 +58,6 @@ class Batteries:
             self._entries[vehicle.id] = self._event_queue.at(
                 due, lambda at_us: self._drained(vehicle, at_us), background=True
             )
-
-
-STEP_US = round(STEP_S * US_PER_S)
 
 
 def next_step(part: Part, planner: Planner, now_us: int) -> None:
@@ -443,10 +439,10 @@ class Simulation:
         part.timer = self._next_step(execution, part, now_us)
 
     def _chase(self, execution: Execution, part: Part, now_us: int) -> None:
+        self._step(execution, part, now_us)
         if part.chase and (reason := self._planner.strays(part.body, part.chase, now_us)):
             self._finish(execution, Outcome(BehaviorState.FAILED, "FAILED", reason), now_us)
             return
-        self._step(execution, part, now_us)
         self._changed(part.body, now_us)
         self.memory.save(execution)
 
