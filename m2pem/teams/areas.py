@@ -36,8 +36,8 @@ def lanes(tracks: SurveyTracks, shares: Sequence[float]) -> list[list[Place]]:
 def strips(
     rings: Sequence[Ring], tracks: SurveyTracks, shares: Sequence[float]
 ) -> list[list[list[Place]]]:
-    """Return each member's band of an area as rings; an empty list for a member without a pass, or
-    whose band is in several pieces."""
+    """Return each member's band of an area as rings, an empty list for a member without a pass; or
+    nothing where a band is in several pieces."""
     level = [[turned(corner, tracks.yaw_rad) for corner in ring] for ring in rings]
     west, east = (extreme(x for x, _ in level[0]) for extreme in (min, max))
     low, high = (extreme(y for _, y in level[0]) for extreme in (min, max))
@@ -57,9 +57,14 @@ def strips(
             continue
         bottom, top = low + mine[0] * tracks.width_m, low + (mine[-1] + 1) * tracks.width_m
         band = rings_of(area.intersection(shapely.box(west - 1, bottom, east + 1, top)))
+        if not band:
+            return []
         parts.append([[turned(corner, -tracks.yaw_rad) for corner in ring] for ring in band])
     return parts
 
+
+_CORNER_M = 0.2
+"""Vehicles round corners, the less the shorter the legs are."""
 
 SURVEY_SPACING_M = 20.0
 STANDOFF_M = 20.0
@@ -71,7 +76,8 @@ def survey(context: PlanningContext) -> Plan:
     """Divide the passes over the area into one band for each member, by speed and endurance.
 
     If all members offer `area_survey`, each surveys the area of its band, so that its arbiter can
-    trigger a camera; else each moves along its passes.
+    trigger a camera. Else each moves along its passes, as it does where the area has holes: who
+    surveys a band does not know those beside it.
     """
     area = context.parameters.area
     if area is None:
@@ -87,32 +93,51 @@ def survey(context: PlanningContext) -> Plan:
     speed_m_s = context.parameters.speed_m_s
     lengths = [tracks.line.segments[index].length_m for index, *_ in tracks.passes]
     shares = context.split or _shares(context, rings[0], lengths, speed_m_s)
-    themselves = all("area_survey" in context.offered[member] for member in context.members)
-    bands = strips(rings, tracks, shares) if themselves else [[] for _ in shares]
+    themselves, along = (
+        all(behavior in context.offered[member] for member in context.members)
+        for behavior in ("area_survey", "single_vehicle_routing")
+    )
+    holes = Fence.around(rings[1:]) if along and rings[1:] else None
+    bands = strips(rings, tracks, shares) if themselves and holes is None else []
     legs: list[Leg] = []
-    for member, band, ends in zip(context.members, bands, lanes(tracks, shares), strict=True):
-        if band:
+    for index, (member, ends) in enumerate(
+        zip(context.members, lanes(tracks, shares), strict=True)
+    ):
+        if bands and bands[index]:
             own = {
                 **context.parameters.only("speed", "overshoot"),
-                "area": _band_area(context, area, band),
+                "area": _band_area(context, area, bands[index]),
                 "heading": (math.pi / 2 - yaw) % math.tau,
                 # With the spacing itself, rounding may give a band one pass more than it has here.
-                "spacing": tracks.spacing_m(band),
+                "spacing": tracks.spacing_m(bands[index]),
             }
             legs.append(context.leg(member, "area_survey", own))
-        elif ends:
+        elif ends and not bands:
             here = context.poses[member].place
             if math.dist(here, ends[-1]) < math.dist(here, ends[0]):
                 ends.reverse()
-            places = tuple(context.coordinate(place, None) for place in ends)
+            way_there = holes.way(here[:2], ends[0]) if holes is not None else None
+            way = _cornered([*(way_there or ()), *ends])
+            places = tuple(context.coordinate(place, None) for place in way)
             parameters = {"route": Route(places), "speed": speed_m_s}
             legs.append(context.leg(member, "single_vehicle_routing", parameters))
-    behavior = "area_survey" if themselves else "single_vehicle_routing"
+    behavior = "area_survey" if bands else "single_vehicle_routing"
     takes = {
         member: frozenset(accepted(context.offered[member][behavior])) for member in context.members
     }
     speeds = {member: speed_m_s or context.motion(member).nominal_m_s for member in context.members}
     return Plan(tuple(legs), shared=True, takes=takes, speeds_m_s=speeds, split=tuple(shares))
+
+
+def _cornered(places: Sequence[Place]) -> list[Place]:
+    """Return a way with further places beside its corners, at which vehicles then hardly cut it."""
+    found: list[Place] = [places[0]]
+    for a, b in pairwise(places):
+        if (length_m := math.dist(a, b)) > 2 * _CORNER_M:
+            step = (b[0] - a[0]) * _CORNER_M / length_m, (b[1] - a[1]) * _CORNER_M / length_m
+            found += [(a[0] + step[0], a[1] + step[1]), (b[0] - step[0], b[1] - step[1])]
+        found.append(b)
+    return found
 
 
 def _shares(
