@@ -3,7 +3,6 @@
 import logging
 import math
 from dataclasses import replace
-from random import Random
 from typing import Any
 
 import pytest
@@ -12,9 +11,8 @@ import shapely
 from m2pem.api.arbiter import Connection
 from m2pem.api.clock import Clock, run_virtual
 from m2pem.geo.geojson import parse_geojson
-from m2pem.geo.local_frame import LocalFrame
 from m2pem.mission.catalogue import BehaviorState, ResourceId
-from m2pem.mission.geometry import Area, Point, Route, VehiclePosition
+from m2pem.mission.geometry import Area, Point, VehiclePosition
 from m2pem.simulation.arbiters import SimArbiter
 from m2pem.testing.contracts.arbiter_harness import ArbiterHarness, context
 from tests.simulation.conftest import JOURNAL, START_US, local, place, route
@@ -209,122 +207,3 @@ def test_a_bend_does_not_cut_into_what_is_kept_out() -> None:
     )
     assert state is BehaviorState.SUCCEEDED, reason
     assert entered_m(fence, POND, way) == 0
-
-
-# --- random fences ------------------------------------------------------------------------------
-
-
-def star(random: Random, at: tuple[float, float], least: float, most: float) -> shapely.Polygon:
-    count = random.randint(4, 9)
-    turn = random.random()
-    return shapely.Polygon(
-        [
-            (
-                at[0] + r * math.cos(math.tau * (i + turn) / count),
-                at[1] + r * math.sin(math.tau * (i + turn) / count),
-            )
-            for i, r in enumerate(random.uniform(least, most) for _ in range(count))
-        ]
-    )
-
-
-def spiked(random: Random) -> Any:
-    """What drawing programs do: an edge out and back, a corner twice, a spike with corners."""
-
-    def spike(corners: list[tuple[float, float]]) -> list[tuple[float, float]]:
-        at = random.randrange(len(corners) - 1)
-        corner, length = corners[at], random.choice((0.05, 1.0, 60.0))
-        turn = random.uniform(0, math.tau)
-        out = (corner[0] + length * math.cos(turn), corner[1] + length * math.sin(turn))
-        more = random.choice(
-            ([out, corner], [corner], [out, out, corner], [out, corner, out, corner])
-        )
-        return [*corners[: at + 1], *more, *corners[at + 1 :]]
-
-    return spike
-
-
-def trial(seed: int) -> None:
-    random = Random(seed)
-    rim = star(random, (0, 0), 60, 200)
-    holes = shapely.union_all(
-        [
-            star(random, (random.uniform(-120, 120), random.uniform(-120, 120)), 5, 35)
-            for _ in range(random.randint(1, 4))
-        ]
-    )
-    shape = rim.difference(holes)
-    shape = max(getattr(shape, "geoms", [shape]), key=lambda each: each.area)
-    kept_out = shapely.union_all([shapely.Polygon(each) for each in shape.interiors])
-    drawn = [spiked(random)] if seed % 3 == 0 else []
-    fence = area(shape, *drawn)
-
-    def somewhere() -> tuple[float, float]:
-        return random.uniform(-150, 150), random.uniform(-150, 150)
-
-    def inside() -> tuple[float, float]:
-        while not shape.covers(shapely.Point(at := somewhere())):
-            pass
-        return at
-
-    home = random.choice((inside, inside, somewhere))()
-    if seed % 5 == 0:  # just outside of the rim
-        rim_at = shape.exterior.interpolate(random.random(), normalized=True)
-        home = (rim_at.x + random.uniform(-1, 1), rim_at.y + random.uniform(-1, 1))
-    behaviors: list[tuple[str, dict[str, Any]]] = []
-    for _ in range(6):
-        kind = random.randrange(6)
-        if kind <= 2:
-            behaviors.append(("goto", {"target": Point(place(*inside()))}))
-        elif kind == 3:
-            behaviors.append(
-                ("single_vehicle_routing", {"route": route(*(inside() for _ in range(3)))})
-            )
-        elif kind == 4:
-            behaviors.append(
-                ("orbit", {"target": Point(place(*inside())), "radius": random.uniform(3, 30)})
-            )
-        else:
-            x, y = inside()
-            field = area(shapely.box(x, y, x + random.uniform(9, 60), y + random.uniform(9, 60)))
-            behaviors.append(("area_survey", {"area": field, "spacing": 7.0}))
-    behaviors.append(("return_to_launch", {}))
-    at = home
-    for (behavior, given), (state, reason, way) in zip(
-        behaviors, play(fence, home, behaviors), strict=True
-    ):
-        where = f"seed {seed}: {behavior}: {reason}"
-        if state is BehaviorState.REJECTED:
-            assert "fleet's fence" in reason, where
-            places = []
-            if isinstance(given.get("target"), Point) and behavior == "goto":
-                places = [at, given["target"].position]
-            elif isinstance(given.get("route"), Route):
-                places = [at, *given["route"].waypoints]
-            if places:  # it is not refused in vain
-                line = [places[0], *(local_of(each) for each in places[1:])]
-                assert shapely.LineString(line).difference(shape).length > 0.05, where
-            continue
-        assert state is BehaviorState.SUCCEEDED, where
-        if behavior == "return_to_launch" and depth_m(shape, home) > TOLERANCE_M:
-            near_m = 3 * depth_m(shape, home) + 1.5  # which is said
-            entered = entered_m(shape, kept_out, [p for p in way if math.dist(p, home) > near_m])
-        else:
-            entered = entered_m(shape, kept_out, way)
-        assert entered < 0.5, where
-        at = way[-1] if way else at
-
-
-def local_of(place_: tuple[float, ...]) -> tuple[float, float]:
-    return LocalFrame(place(0, 0)[:2]).to_local((place_[0], place_[1]))
-
-
-@pytest.mark.parametrize("seed", range(12))
-def test_on_random_fences_no_metre_is_inside_what_is_kept_out(seed: int) -> None:
-    trial(seed)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("seed", range(12, 300))
-def test_on_many_random_fences_no_metre_is_inside_what_is_kept_out(seed: int) -> None:
-    trial(seed)
