@@ -111,11 +111,11 @@ def test_waypoints_are_left_at_their_own_speeds(firmware) -> None:
         assert end.state is SUCCEEDED, end
         commands = [(item.command, item.params[1]) for item in bench.body.mission]
         assert commands == [
-            (WAYPOINT, 0.0),
+            (WAYPOINT, 2.0),
             (CHANGE_SPEED, 8.0),
-            (WAYPOINT, 0.0),
+            (WAYPOINT, 2.0),
             (CHANGE_SPEED, 2.0),
-            (WAYPOINT, 0.0),
+            (WAYPOINT, 2.0),
         ]
 
     play(Body(firmware=firmware).fly(), main)

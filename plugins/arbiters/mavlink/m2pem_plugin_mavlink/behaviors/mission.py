@@ -94,14 +94,6 @@ STANDS_AT_END_S = 2.0
 """The message that the last item was reached comes once, and may be lost."""
 
 
-def waypoint(place: LatLon, altitude_m: float, frame: str) -> MissionItem:
-    """Return an item that goes to a place and continues from there."""
-    nan = float("nan")
-    return MissionItem(
-        dialect.MAV_CMD_NAV_WAYPOINT, FRAMES[frame], (0.0, 0.0, 0.0, nan), *place, altitude_m
-    )
-
-
 def circle_for_ever(last: MissionItem) -> MissionItem:
     """Return an item that circles the place of another item. At the end of its mission an ArduPlane
     would otherwise return home, or continue into a landing that is stored behind it."""
@@ -145,6 +137,17 @@ class MissionFlight(Behavior):
         Raises:
             BehaviorFailedError: there can be none; the reason says why.
         """
+
+    def waypoint(self, place: LatLon, altitude_m: float, frame: str) -> MissionItem:
+        """Return an item that goes to a place and continues from there.
+
+        Copters of PX4 turn where the item says, by themselves 10 m before (NAV_ACC_RAD). Planes
+        cannot come as near.
+        """
+        plane = self.vehicle.state.loiter_radius_m is not None
+        turns_m = 0.0 if plane else TOLERANCES_M.get(self.vehicle.domain, 2.5)
+        params = (0.0, turns_m, 0.0, math.nan)
+        return MissionItem(dialect.MAV_CMD_NAV_WAYPOINT, FRAMES[frame], params, *place, altitude_m)
 
     def named(self, index: int) -> str:
         """Return how messages name a waypoint."""
@@ -376,7 +379,7 @@ class Routing(MissionFlight):
         if route is None or not route.waypoints:
             raise BehaviorFailedError("parameter 'route': it has no waypoints")
         return [
-            waypoint(place[:2], *self.parameters.altitude_to_fly(place[2], frame))
+            self.waypoint(place[:2], *self.parameters.altitude_to_fly(place[2], frame))
             for place, frame in zip(route.waypoints, route.frames, strict=True)
         ]
 
@@ -431,7 +434,7 @@ class Survey(MissionFlight):
             tracks = tracks.approached_from(frame.to_local(here))
         self._width_m, self._passes = tracks.width_m, tracks.passes
         height = self.parameters.altitude_to_fly(area.rings[0][0][2], area.altitude_frame)
-        return [waypoint(frame.to_latlon(point), *height) for point in tracks.line.points]
+        return [self.waypoint(frame.to_latlon(point), *height) for point in tracks.line.points]
 
     def work(self, way: Sequence[MissionItem]) -> RemainingWork:
         """Return the account of the tracks; after a restart of those that are stored."""

@@ -16,7 +16,7 @@ from m2pem_plugin_mavlink.behaviors.behavior import (
     BehaviorFailedError,
     CheckpointState,
 )
-from m2pem_plugin_mavlink.behaviors.mission import MissionFlight, waypoint
+from m2pem_plugin_mavlink.behaviors.mission import MissionFlight
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode, TargetPosition
 
@@ -82,7 +82,7 @@ class Orbit(MissionFlight):
             angles.pop()  # the lap's end is its beginning
         height = (center.altitude_m or 0.0, center.altitude_frame)
         around = [(self._radius_m * math.cos(a), self._radius_m * math.sin(a)) for a in angles]
-        return [waypoint(frame.to_latlon(level), *height) for level in around]
+        return [self.waypoint(frame.to_latlon(level), *height) for level in around]
 
     def _sides(self) -> int:
         """Return the number of sides of the polygon: its edges are at most about a metre inside the

@@ -43,9 +43,11 @@ class Leg(Maneuver):
 
     @property
     def arrived(self) -> bool:
-        """It is within the radius of acceptance."""
-        autopilot = self.autopilot
-        radius_m = max(autopilot.tuning.acceptance_m, 0.5)
+        """It is within the radius of acceptance; copters of PX4 take that of the item."""
+        autopilot, radius_m = self.autopilot, self.autopilot.tuning.acceptance_m
+        if (autopilot.spec.firmware, autopilot.spec.kind) == ("px4", Kind.COPTER):
+            radius_m = self.item.param2 or radius_m
+        radius_m = max(radius_m, 0.5)
         near = autopilot.position.distance_m(self.place) <= radius_m
         return near and abs(self.place.up_m - autopilot.body.up_m) <= max(radius_m, 2.0)
 
