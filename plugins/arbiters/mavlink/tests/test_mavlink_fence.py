@@ -2,8 +2,9 @@ import math
 
 import pytest
 import shapely
+from m2pem_plugin_mavlink.vehicle.driver import FlightMode
 from mavlink_double import Body, at
-from mavlink_play import V, play
+from mavlink_play import V, after_a_restart, play
 
 from m2pem.api import Area, BehaviorState, Point, Route
 
@@ -144,3 +145,19 @@ def test_a_vehicle_that_stays_on_its_way_around_returns_all_the_same(caplog) -> 
 
     play(Body(east=85.0, north=85.0).fly(), main, fence=FIELD)
     assert "it does not move on" in caplog.text
+
+
+@pytest.mark.parametrize(("stopped", "state"), [(False, "RUNNING"), (True, "UNKNOWN")])
+def test_a_return_that_leads_around_goes_on_after_a_restart(stopped, state) -> None:
+    async def main(bench, reference) -> None:
+        report = await bench.arbiter.query("r1.b1", reference)
+        assert report.state == state
+        if not stopped:
+            assert (await bench.ended("r1.b1", 300)).state is BehaviorState.SUCCEEDED
+            assert bench.told == ["go_to", "return_home"]
+
+    def meanwhile(body: Body) -> None:
+        body.mode = FlightMode.HOLD if stopped else body.mode
+
+    body = Body(east=85.0, north=85.0).fly()
+    after_a_restart(body, "return_to_launch", main, meanwhile=meanwhile, fence=FIELD)

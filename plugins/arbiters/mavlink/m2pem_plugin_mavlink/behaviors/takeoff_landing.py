@@ -261,13 +261,15 @@ class ReturnToLaunch(Behavior):
         place."""
         self.modes = type(self).modes | ({FlightMode.GUIDED} if self._around else set())
         if self._around:
-            height = VehicleParameters(self.context).altitude()
             try:
-                await self.vehicle.driver.go_to(TargetPosition(*self._around[0], *height))
+                await self.vehicle.driver.go_to(self._next())
             except ExchangeError as error:
                 await self._straight(str(error))
         else:
             await self.vehicle.driver.return_home()
+
+    def _next(self) -> TargetPosition:
+        return TargetPosition(*self._around[0], *VehicleParameters(self.context).altitude())
 
     async def _straight(self, why: str) -> None:
         self.vehicle.warn(f"returns on a straight line, not around what the fence keeps out: {why}")
@@ -356,10 +358,14 @@ class ReturnToLaunch(Behavior):
         return self.vehicle.state.home is None and stopped_s >= DISARMS_WITHIN_S
 
     async def reattach(self) -> BehaviorState:
-        """Judge by the mode, or by being at home."""
+        """Judge by the mode, by being at home, or by moving to the next place on a way around."""
         if self._is_there_already() and self._home_m() <= self._near_m:
             return BehaviorState.SUCCEEDED
         returns = accepts_mode(self, self.vehicle.state.mode)
+        if not returns and (around := self._way_around()):
+            self.modes, self._around = self.modes | {FlightMode.GUIDED}, around
+            in_mode = accepts_mode(self, self.vehicle.state.mode)
+            returns = in_mode and await moves_towards(self.vehicle, self._next())
         return BehaviorState.RUNNING if returns else BehaviorState.UNKNOWN
 
 
