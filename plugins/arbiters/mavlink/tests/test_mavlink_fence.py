@@ -147,17 +147,25 @@ def test_a_vehicle_that_stays_on_its_way_around_returns_all_the_same(caplog) -> 
     assert "it does not move on" in caplog.text
 
 
-@pytest.mark.parametrize(("stopped", "state"), [(False, "RUNNING"), (True, "UNKNOWN")])
-def test_a_return_that_leads_around_goes_on_after_a_restart(stopped, state) -> None:
+def held(body: Body) -> None:
+    body.mode = FlightMode.HOLD
+
+
+@pytest.mark.parametrize(
+    ("meanwhile", "state", "told"),
+    [
+        (lambda body: None, "RUNNING", ["go_to", "return_home"]),
+        (lambda body: body.step(60.0), "RUNNING", ["go_to", "return_home"]),  # it hovers there
+        (held, "UNKNOWN", []),
+    ],
+)
+def test_a_return_that_leads_around_goes_on_after_a_restart(meanwhile, state, told) -> None:
     async def main(bench, reference) -> None:
         report = await bench.arbiter.query("r1.b1", reference)
         assert report.state == state
-        if not stopped:
+        if told:
             assert (await bench.ended("r1.b1", 300)).state is BehaviorState.SUCCEEDED
-            assert bench.told == ["go_to", "return_home"]
-
-    def meanwhile(body: Body) -> None:
-        body.mode = FlightMode.HOLD if stopped else body.mode
+        assert bench.told == told
 
     body = Body(east=85.0, north=85.0).fly()
     after_a_restart(body, "return_to_launch", main, meanwhile=meanwhile, fence=FIELD)

@@ -27,6 +27,7 @@ from m2pem_plugin_mavlink.behaviors.behavior import (
     Behavior,
     BehaviorContext,
     BehaviorFailedError,
+    CheckpointState,
     SetBehavior,
 )
 from m2pem_plugin_mavlink.behaviors.goto import TOLERANCES_M
@@ -254,6 +255,7 @@ class ReturnToLaunch(Behavior):
             self.modes = ANY_MODE
             return
         self._around = self._way_around()
+        self._warn_of_breach()
         await self._send()
 
     async def _send(self) -> None:
@@ -277,19 +279,21 @@ class ReturnToLaunch(Behavior):
         await self._send()
 
     def _way_around(self) -> list[LatLon]:
-        """Return the places to pass on the way home, and say what the return still crosses."""
+        """Return the places to pass on the way home."""
         fence, home, here = self.context.fence, self.vehicle.state.home, position_of(self.vehicle)
-        if fence is None or home is None or here is None:
+        if fence is None or home is None or here is None or cannot_stop(self.vehicle):
             return []
-        around: list[LatLon] = []
-        if not cannot_stop(self.vehicle):
-            ends = fence.frame.to_local(here), fence.frame.to_local(home.latlon)
-            way = fence.with_clearance(AROUND_M).way(*ends) or fence.way(*ends) or ()
-            around = [fence.frame.to_latlon(place) for place in way]
-        way_home = [*around, home.latlon]
-        if reason := fence.breach(way_home, here, lambda index: "its home"):
-            self.vehicle.warn(f"returns: {reason}")
-        return around
+        ends = fence.frame.to_local(here), fence.frame.to_local(home.latlon)
+        way = fence.with_clearance(AROUND_M).way(*ends) or fence.way(*ends) or ()
+        return [fence.frame.to_latlon(place) for place in way]
+
+    def _warn_of_breach(self) -> None:
+        """Say what the return still crosses."""
+        fence, home, here = self.context.fence, self.vehicle.state.home, position_of(self.vehicle)
+        if fence is not None and home is not None and here is not None:
+            reason = fence.breach([*self._around, home.latlon], here, lambda index: "its home")
+            if reason:
+                self.vehicle.warn(f"returns: {reason}")
 
     async def run_in_background(self) -> None:
         """Fly or drive around; then read the rally points, and disarm as `Land` does."""
@@ -358,15 +362,29 @@ class ReturnToLaunch(Behavior):
         return self.vehicle.state.home is None and stopped_s >= DISARMS_WITHIN_S
 
     async def reattach(self) -> BehaviorState:
-        """Judge by the mode, by being at home, or by moving to the next place on a way around."""
+        """Judge by the mode, by being at home, or at a place on its way around or moving there."""
+        places, self._around = self._around, []
         if self._is_there_already() and self._home_m() <= self._near_m:
             return BehaviorState.SUCCEEDED
-        returns = accepts_mode(self, self.vehicle.state.mode)
-        if not returns and (around := self._way_around()):
-            self.modes, self._around = self.modes | {FlightMode.GUIDED}, around
-            in_mode = accepts_mode(self, self.vehicle.state.mode)
-            returns = in_mode and await moves_towards(self.vehicle, self._next())
-        return BehaviorState.RUNNING if returns else BehaviorState.UNKNOWN
+        if accepts_mode(self, self.vehicle.state.mode):
+            return BehaviorState.RUNNING
+        self.modes = self.modes | {FlightMode.GUIDED}
+        if accepts_mode(self, self.vehicle.state.mode):
+            for index in range(len(places)):
+                self._around = places[index:]
+                near = distance_to_m(self.vehicle, places[index]) <= self._near_m
+                if near or await moves_towards(self.vehicle, self._next()):
+                    return BehaviorState.RUNNING
+        return BehaviorState.UNKNOWN
+
+    def checkpoint(self) -> CheckpointState:
+        """Return the way around, as it is before it begins."""
+        return {"around": [degrees for place in self._way_around() for degrees in place]}
+
+    def restore(self, checkpoint: CheckpointState) -> None:
+        around = checkpoint.get("around")
+        if isinstance(around, list):
+            self._around = [*zip(around[::2], around[1::2], strict=True)]
 
 
 class SetSpeed(SetBehavior):
