@@ -6,10 +6,11 @@ from itertools import pairwise
 from typing import TypeAlias
 
 from m2pem.fleet.parameters import accepted
-from m2pem.geo.fence import rings_of, valid
+from m2pem.geo.fence import Fence, rings_of, valid
 from m2pem.geo.lawn_mower import Ring, longest_edge_yaw
 from m2pem.geo.lazy_imports import shapely
 from m2pem.geo.polygon import middle_of, turned
+from m2pem.geo.polyline import Polyline
 from m2pem.geo.survey_tracks import SurveyTracks
 from m2pem.geo.work_shares import owners, reach_m, split
 from m2pem.mission.geometry import Area, Route, VehiclePosition
@@ -33,14 +34,12 @@ def lanes(tracks: SurveyTracks, shares: Sequence[float]) -> list[list[Place]]:
     return [list(points[first.get(each, 0) : last.get(each, 0)]) for each in range(len(shares))]
 
 
-def strips(
-    rings: Sequence[Ring], tracks: SurveyTracks, shares: Sequence[float]
-) -> list[list[list[Place]]]:
-    """Return each member's band of an area as rings, an empty list for a member without a pass; or
-    nothing where a band is in several pieces."""
-    level = [[turned(corner, tracks.yaw_rad) for corner in ring] for ring in rings]
-    west, east = (extreme(x for x, _ in level[0]) for extreme in (min, max))
-    low, high = (extreme(y for _, y in level[0]) for extreme in (min, max))
+def strips(ring: Ring, tracks: SurveyTracks, shares: Sequence[float]) -> list[list[list[Place]]]:
+    """Return each member's band of an area without holes as rings, an empty list for a member
+    without a pass; or nothing where a band is in several pieces."""
+    level = [turned(corner, tracks.yaw_rad) for corner in ring]
+    west, east = (extreme(x for x, _ in level) for extreme in (min, max))
+    low, high = (extreme(y for _, y in level) for extreme in (min, max))
     count = max(1, round((high - low) / tracks.width_m))
     lengths = [0.0] * count
     for index, *_ in tracks.passes:
@@ -48,7 +47,6 @@ def strips(
         strip = min(count - 1, int((y - low) / tracks.width_m))
         lengths[strip] += tracks.line.segments[index].length_m
     whose = owners(lengths, shares)
-    area = valid(*level)
     parts: list[list[list[Place]]] = []
     for member in range(len(shares)):
         mine = [strip for strip, owner in enumerate(whose) if owner == member]
@@ -56,7 +54,7 @@ def strips(
             parts.append([])
             continue
         bottom, top = low + mine[0] * tracks.width_m, low + (mine[-1] + 1) * tracks.width_m
-        band = rings_of(area.intersection(shapely.box(west - 1, bottom, east + 1, top)))
+        band = rings_of(valid(level).intersection(shapely.box(west - 1, bottom, east + 1, top)))
         if not band:
             return []
         parts.append([[turned(corner, -tracks.yaw_rad) for corner in ring] for ring in band])
@@ -93,12 +91,9 @@ def survey(context: PlanningContext) -> Plan:
     speed_m_s = context.parameters.speed_m_s
     lengths = [tracks.line.segments[index].length_m for index, *_ in tracks.passes]
     shares = context.split or _shares(context, rings[0], lengths, speed_m_s)
-    themselves, along = (
-        all(behavior in context.offered[member] for member in context.members)
-        for behavior in ("area_survey", "single_vehicle_routing")
-    )
-    holes = Fence.around(rings[1:]) if along and rings[1:] else None
-    bands = strips(rings, tracks, shares) if themselves and holes is None else []
+    themselves = all("area_survey" in context.offered[member] for member in context.members)
+    holes = Fence.around(rings[1:])
+    bands = strips(rings[0], tracks, shares) if themselves and not rings[1:] else []
     legs: list[Leg] = []
     for index, (member, ends) in enumerate(
         zip(context.members, lanes(tracks, shares), strict=True)
@@ -116,8 +111,7 @@ def survey(context: PlanningContext) -> Plan:
             here = context.poses[member].place
             if math.dist(here, ends[-1]) < math.dist(here, ends[0]):
                 ends.reverse()
-            way_there = holes.way(here[:2], ends[0]) if holes is not None else None
-            way = _cornered([*(way_there or ()), *ends])
+            way = _cornered([*(holes.way(here, ends[0]) or ()), *ends])
             places = tuple(context.coordinate(place, None) for place in way)
             parameters = {"route": Route(places), "speed": speed_m_s}
             legs.append(context.leg(member, "single_vehicle_routing", parameters))
@@ -131,13 +125,9 @@ def survey(context: PlanningContext) -> Plan:
 
 def _cornered(places: Sequence[Place]) -> list[Place]:
     """Return a way with further places beside its corners, at which vehicles then hardly cut it."""
-    found: list[Place] = [places[0]]
-    for a, b in pairwise(places):
-        if (length_m := math.dist(a, b)) > 2 * _CORNER_M:
-            step = (b[0] - a[0]) * _CORNER_M / length_m, (b[1] - a[1]) * _CORNER_M / length_m
-            found += [(a[0] + step[0], a[1] + step[1]), (b[0] - step[0], b[1] - step[1])]
-        found.append(b)
-    return found
+    line = Polyline(places)
+    marks = {mark_m + aside_m for mark_m in line.marks_m for aside_m in (-_CORNER_M, 0, _CORNER_M)}
+    return [line.at(mark_m) for mark_m in sorted(marks) if 0.0 <= mark_m <= line.length_m]
 
 
 def _shares(
