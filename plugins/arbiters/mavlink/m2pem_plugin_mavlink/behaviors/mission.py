@@ -139,11 +139,8 @@ class MissionFlight(Behavior):
         """
 
     def waypoint(self, place: LatLon, altitude_m: float, frame: str) -> MissionItem:
-        """Return an item that goes to a place and continues from there.
-
-        Copters of PX4 turn where the item says, by themselves 10 m before (NAV_ACC_RAD). Planes
-        cannot come as near.
-        """
+        """Return an item that goes to a place and continues from there. Copters of PX4 turn where
+        it says, by themselves 10 m before (NAV_ACC_RAD). Planes cannot come as near."""
         plane = self.vehicle.state.loiter_radius_m is not None
         turns_m = 0.0 if plane else TOLERANCES_M.get(self.vehicle.domain, 2.5)
         params = (0.0, turns_m, 0.0, math.nan)

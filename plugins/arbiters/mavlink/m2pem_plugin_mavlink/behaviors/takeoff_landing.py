@@ -369,12 +369,12 @@ class ReturnToLaunch(Behavior):
         if accepts_mode(self, self.vehicle.state.mode):
             return BehaviorState.RUNNING
         self.modes = self.modes | {FlightMode.GUIDED}
-        if accepts_mode(self, self.vehicle.state.mode):
-            for index in range(len(places)):
-                self._around = places[index:]
-                near = distance_to_m(self.vehicle, places[index]) <= self._near_m
-                if near or await moves_towards(self.vehicle, self._next()):
-                    return BehaviorState.RUNNING
+        while places and accepts_mode(self, self.vehicle.state.mode):
+            self._around = places
+            near = distance_to_m(self.vehicle, places[0]) <= self._near_m
+            if near or await moves_towards(self.vehicle, self._next()):
+                return BehaviorState.RUNNING
+            places = places[1:]
         return BehaviorState.UNKNOWN
 
     def checkpoint(self) -> CheckpointState:
