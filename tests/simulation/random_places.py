@@ -45,7 +45,8 @@ class Task:
 @dataclass(frozen=True)
 class Trial:
     """`fence`: as it was drawn; `free`: what is inside of it. `unclear`: polygons that bound no
-    area. `leader`: the vehicle that another one follows until it has done `tasks[0]`."""
+    area. `leader`: the vehicle that another one follows, by the last task, until it has done the
+    one before."""
 
     domain: str
     fence: Geojson
@@ -259,13 +260,14 @@ def trial(seed: int, *, teams: bool = True) -> Trial:
         main = [Task("crew", behavior, given)]
     elif kind == 1:
         homes = {"v0": home, "v1": ground.inside()}
-        tasks = [Task("v1", "single_vehicle_routing", {"route": ground.route()})]
-        tasks.append(Task("v0", "follow", {"target": "v1"}))
-        return Trial(domain, fence, free, unclear, homes, tasks, "v1")
+        main = [Task("v1", "single_vehicle_routing", {"route": ground.route()})]
+        main.append(Task("v0", "follow", {"target": "v1"}))
     else:
         homes = {"v0": home}
         main = [ground.task("v0") for _ in range(random.randint(1, 3))]
     up = [Task(each, "takeoff", {"altitude": "20 m"}) for each in homes if domain == "air"]
+    if main[-1].behavior == "follow":
+        return Trial(domain, fence, free, unclear, homes, [*up, *main], "v1")
     back = [Task(each, "return_to_launch") for each in homes]
     return Trial(domain, fence, free, unclear, homes, [*up, *main, *back])
 
@@ -275,6 +277,9 @@ def trial(seed: int, *, teams: bool = True) -> Trial:
 STEP_M = 0.1
 INSIDE_M = 0.2
 """As deep in what is kept out counts."""
+
+THIN_M = 0.1
+"""What is left out and nowhere as far from its edge does not count."""
 
 _SAID = re.compile(r"(?:by|is) (\d+(?:\.\d)?) m ")
 
@@ -297,6 +302,7 @@ def mistakes(
     tracks: Mapping[str, Track],
     said: Sequence[str],
     inside_m: float = INSIDE_M,
+    thin_m: float = THIN_M,
 ) -> Iterator[str]:
     """Yield what was entered and was not said, what was refused in vain, and what was left out."""
     dense = {vehicle: each_step(track) for vehicle, track in tracks.items()}
@@ -304,7 +310,7 @@ def mistakes(
         yield from _entered(trial, vehicle, rows, done, said, inside_m)
     for each in done:
         if each.task.behavior == "area_survey" and each.state == "SUCCEEDED":
-            yield from _left_out(each, dense, inside_m)
+            yield from _left_out(each, dense, inside_m, thin_m)
         if each.state == "REJECTED" and "fence" in each.reason:
             yield from _in_vain(trial, each, dense)
 
@@ -341,7 +347,8 @@ def _entered(
             continue
         words = [each for each in said if each.startswith(f"{vehicle} returns")]
         most_m = max((float(m) for each in words for m in _SAID.findall(each)), default=0.0)
-        if not (name.startswith("return") and depth_m <= 1.05 * most_m + inside_m):
+        stays = name.startswith("return") and part[-1] == indices[-1]  # its home is outside
+        if not (stays and depth_m <= 1.05 * most_m + inside_m):
             yield f"{where}; said: {words}"
 
 
@@ -350,7 +357,9 @@ def _stays(rows: Any, part: Sequence[int]) -> bool:
     return len(part) == len(rows)
 
 
-def _left_out(done: Done, dense: Mapping[str, Any], inside_m: float) -> Iterator[str]:
+def _left_out(
+    done: Done, dense: Mapping[str, Any], inside_m: float, thin_m: float
+) -> Iterator[str]:
     shape = bounded(done.task.given["area"])
     half_m = float(done.task.given["spacing"].split()[0]) / 2
     swaths = []
@@ -365,7 +374,7 @@ def _left_out(done: Done, dense: Mapping[str, Any], inside_m: float) -> Iterator
                 continue  # it begins there
             if inside.any() and (deep := float(-depths[inside].min())) > inside_m:
                 yield f"area_survey of {vehicle}: {deep:.2f} m inside a hole of its area"
-    left = shape.difference(shapely.union_all(swaths)).buffer(-0.05 - inside_m / 4)
+    left = shape.difference(shapely.union_all(swaths)).buffer(-thin_m)
     if left.area > 0:
         place = left.representative_point()
         yield f"area_survey of {done.vehicles}: {left.area:.2f} m2 left out at {place}"
