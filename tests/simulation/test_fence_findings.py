@@ -9,11 +9,12 @@ import shapely
 
 from m2pem.findings import Finding, Severity
 from m2pem.fleet.fleet_file import load_fleet
+from m2pem.geo.local_frame import LocalFrame
 from m2pem.scripting.sources import load_mission
 from m2pem.simulation.fencing import fence_findings
 from tests.simulation.conftest import place
 from tests.simulation.test_estimates import HEAD, TAIL, flows, task
-from tests.simulation.test_fencing import YARD, local_of
+from tests.simulation.test_fencing import YARD
 
 FLEET = """version: 1
 origin: {{lat: {0}, lon: {1}, alt: 0}}
@@ -115,7 +116,7 @@ def test_a_return_that_would_cross_a_hole_is_a_warning_before(tmp_path: Path) ->
     )
     assert (found_.severity, found_.rule) == (Severity.WARNING, "return-leaves-fence")
     assert "the way to its home leaves the fleet's fence by 16 m" in found_.message
-    inside = local_of(found_.place)
+    inside = LocalFrame(place(0, 0)[:2]).to_local(found_.place)
     assert shapely.Point(inside).distance(YARD) == pytest.approx(16, abs=0.5)
     assert f"at [{found_.place[0]:.6f}, {found_.place[1]:.6f}]" in found_.message
 
