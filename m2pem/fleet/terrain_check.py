@@ -6,7 +6,8 @@ from the ground at the fleet's origin.
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 from m2pem.findings import Severity
@@ -23,13 +24,15 @@ from m2pem.mission.geometry import Coordinate, Point, Route
 _SAME_M = 1e-4
 
 
-@dataclass(slots=True)
+@dataclass
 class GroundCheck:
     """The check of one mission. Elevation files are opened with the first altitude."""
 
     fleet: Fleet
-    _terrain: list[Terrain] = field(default_factory=list)
-    _unusable: str = ""
+
+    @cached_property
+    def _terrain(self) -> Terrain:
+        return Terrain(Path(self.fleet.terrain_folder))
 
     def check(
         self,
@@ -64,10 +67,10 @@ class GroundCheck:
                 )
             if low is None or low.above_ground_m is None:
                 continue
-            above_m = math.floor((low.above_ground_m + _SAME_M) * 10) / 10
-            if low.above_ground_m >= clearance_m - _SAME_M:
+            least_m = low.above_ground_m + _SAME_M
+            if least_m >= clearance_m:
                 continue
-            raised_m = math.ceil(clearance_m - low.above_ground_m - _SAME_M)
+            above_m, raise_m = math.floor(least_m * 10) / 10, math.ceil(clearance_m - least_m)
             where = f"[{low.place[0]:.5f}, {low.place[1]:.5f}], {low.along_m:.0f} m along its way"
             height = (
                 f"{-above_m:g} m below the ground" if above_m < 0 else f"{above_m:g} m above it"
@@ -76,26 +79,17 @@ class GroundCheck:
                 "low-over-ground",
                 f"parameter '{name}': {aircraft.id} would be {height} at {where}; the fleet's "
                 f"clearance is {clearance_m:g} m",
-                f"raise it by {raised_m} m, or let the route follow the terrain",
+                f"raise it by {raise_m} m, or let the route follow the terrain",
                 line=line,
                 severity=Severity.WARNING,
                 place=low.place,
             )
 
     def _profile(self, route: Route) -> list[ProfilePoint]:
-        if not self._terrain:
-            if self._unusable:
-                raise TerrainError(self._unusable)
-            try:
-                self._terrain.append(Terrain(Path(self.fleet.terrain_folder)))
-            except TerrainError as error:
-                self._unusable = str(error)
-                raise
-        [terrain] = self._terrain
         home_m = None
         if "relative" in route.frames and self.fleet.origin != NO_ORIGIN:
-            home_m = terrain.height_m(self.fleet.origin[:2])
-        return profile(route, terrain, LONGEST_M, home_m)
+            home_m = self._terrain.height_m(self.fleet.origin[:2])
+        return profile(route, self._terrain, LONGEST_M, home_m)
 
 
 def _ways(values: Mapping[str, ResolvedValue]) -> Iterator[tuple[str, Route]]:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 TERRAIN_FOLDER = "M2PEM_TERRAIN"
 """The variable of the environment with the folder of elevation files."""
 
-_TILE = re.compile(r"([NS])(\d{2})([EW])(\d{3})", re.IGNORECASE)
+_TILE = re.compile(r"[NS]\d{2}[EW]\d{3}\.hgt", re.I)
 _SIDES = {2 * side * side: side for side in (1201, 3601)}
 """Samples of a side of a tile, by its bytes: 3 and 1 seconds of arc apart."""
 
@@ -68,16 +68,9 @@ class TerrainError(M2pemError):
     exit_status = 2
 
 
-def corner_of(file: Path) -> tuple[int, int] | None:
-    """Return the latitude and longitude of a tile's south-west corner; None: it is no tile."""
-    found = _TILE.fullmatch(file.stem)
-    if found is None or file.suffix.lower() != ".hgt":
-        return None
-    north, latitude, east, longitude = found.groups()
-    return (
-        int(latitude) * (1 if north.upper() == "N" else -1),
-        int(longitude) * (1 if east.upper() == "E" else -1),
-    )
+def tile_name(south: int, west: int) -> str:
+    """Return the name of the tile with that corner, in degrees: N38W078.hgt."""
+    return f"{'NS'[south < 0]}{abs(south):02d}{'EW'[west < 0]}{abs(west):03d}.hgt"
 
 
 class ElevationFile:
@@ -267,21 +260,15 @@ class Terrain:
     def __init__(self, folder: Path) -> None:
         self._lock = Lock()
         self._tile, self._raster = cache(Tile), cache(Raster)
-        self._tiles: dict[tuple[int, int], Path] = {}
-        self._rasters: list[Path] = []
         try:
-            files = sorted(folder.iterdir())
+            files = [
+                each for each in sorted(folder.iterdir()) if not _BESIDE_HEIGHTS.match(each.name)
+            ]
         except OSError as error:
             remedy = unreadable_remedy(error)
             raise TerrainError(f"{folder}: cannot be read: {error.strerror}; {remedy}") from None
-        for file in files:
-            if _BESIDE_HEIGHTS.match(file.name):
-                continue
-            corner = corner_of(file)
-            if corner is not None:
-                self._tiles[corner] = file
-            elif file.suffix.lower() in _TIFF:
-                self._rasters.append(file)
+        self._tiles = {each.name.upper(): each for each in files if _TILE.fullmatch(each.name)}
+        self._rasters = [each for each in files if each.suffix.lower() in _TIFF]
         if not self._tiles and not self._rasters:
             raise TerrainError(
                 f"{folder}: has no elevation file; put SRTM tiles (N38W078.hgt) or GeoTIFF there"
@@ -333,8 +320,8 @@ class Terrain:
         north, east = np.floor(places.max(axis=1) + _EDGE_DEG).astype(int).tolist()
         for lowest, leftmost in product(range(south, north + 1), range(west, east + 1)):
             corner = lowest, (leftmost + 180) % 360 - 180
-            if corner in self._tiles:
-                yield self._tile(self._tiles[corner], corner)
+            if path := self._tiles.get(tile_name(*corner).upper()):
+                yield self._tile(path, corner)
 
 
 def _corners(places: Floats) -> Floats:

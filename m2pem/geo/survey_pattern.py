@@ -7,7 +7,7 @@ kept out. Several vehicles get passes in a row, by their speeds.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise, product
 from typing import TypeAlias
 
@@ -94,7 +94,8 @@ def survey_routes(pattern: SurveyPattern, surveyors: Sequence[Surveyor]) -> list
         if not 0 < each.speed_m_s < math.inf:
             raise GeometryError(f"{each.name or 'speed'}: {each.speed_m_s:g} m/s is not above 0")
     ground = _Ground.of(pattern)
-    yaw = _yaw(pattern, ground)
+    heading = pattern.heading_rad
+    yaw = _yaw(pattern, ground) if heading is None else math.pi / 2 - heading
     passes = _passes(pattern, ground, yaw)
     if pattern.cross_hatch:
         passes += _passes(pattern, ground, yaw + math.pi / 2)
@@ -102,11 +103,8 @@ def survey_routes(pattern: SurveyPattern, surveyors: Sequence[Surveyor]) -> list
         raise GeometryError(
             "nothing of the area is left to survey: check margin and keep-out areas"
         )
-    routes = []
-    for surveyor, own in zip(surveyors, _shared(passes, surveyors), strict=True):
-        if own:
-            routes.append(_route(pattern, ground, surveyor, own))
-    return routes
+    shares = zip(surveyors, _shared(passes, surveyors), strict=True)
+    return [_route(pattern, ground, surveyor, own) for surveyor, own in shares if own]
 
 
 def best_heading_rad(pattern: SurveyPattern) -> float:
@@ -116,8 +114,7 @@ def best_heading_rad(pattern: SurveyPattern) -> float:
     Raises:
         GeometryError: as `survey_routes`.
     """
-    free = replace(pattern, heading_rad=None)
-    heading = (math.pi / 2 - _yaw(free, _Ground.of(free))) % math.pi
+    heading = (math.pi / 2 - _yaw(pattern, _Ground.of(pattern))) % math.pi
     return 0.0 if math.pi - heading < _SAME_HEADING_RAD else heading
 
 
@@ -152,9 +149,7 @@ class _Ground:
 
 
 def _yaw(pattern: SurveyPattern, ground: _Ground) -> float:
-    """Return the direction of the passes, from east, counter-clockwise, in rad."""
-    if pattern.heading_rad is not None:
-        return math.pi / 2 - pattern.heading_rad
+    """Return the direction of the fewest passes, from east, counter-clockwise, in rad."""
     corners = [place for part in polygons(ground.region) for place in part.exterior.coords]
     hull = convex_hull((x, y) for x, y, *_ in corners)
     if len(hull) < 3:
@@ -213,11 +208,10 @@ def _overlap(a: Span, b: Span) -> bool:
 
 def _ordered(cells: Sequence[Row], corner: int) -> list[Pass]:
     """Return the passes of all cells, from the corner on: next is the cell that begins nearest."""
-    spans = [span for cell in cells for _, span in cell]
-    if not spans:
+    ends = [(x, y) for cell in cells for y, span in cell for x in span]
+    if not ends:
         return []
-    xs = [x for span in spans for x in span]
-    ys = [y for cell in cells for y, _ in cell]
+    xs, ys = zip(*ends, strict=True)
     right, top = corner in (1, 2), corner in (2, 3)
     at = (max(xs) if right else min(xs), max(ys) if top else min(ys))
     left = [_serpentines(cell) for cell in cells]

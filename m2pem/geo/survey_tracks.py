@@ -7,6 +7,7 @@ piece of one.
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import TypeAlias
 
 from m2pem.geo.fence import Fence, rings_of
@@ -160,20 +161,15 @@ class SurveyTracks:
 
 def _slabs(strips: Sequence[tuple[float, Sequence[Span]]], width_m: float) -> list[Slab]:
     """Return the strips, with what neighbours have in common along each seam between two."""
-    seam_m = _SEAM * width_m
     slabs: list[Slab] = []
-    for index, (middle, spans) in enumerate(strips):
-        low, high = middle - width_m / 2, middle + width_m / 2
-        below = strips[index - 1] if index else None
-        above = strips[index + 1] if index + 1 < len(strips) else None
-        if below is not None and middle - below[0] < 1.5 * width_m:
-            low = (below[0] + middle) / 2 + seam_m
-        if above is not None and above[0] - middle < 1.5 * width_m:
-            edge = (middle + above[0]) / 2
-            slabs.append((low, edge - seam_m, spans))
-            slabs.append((edge - seam_m, edge + seam_m, _common(spans, above[1])))
-        else:
-            slabs.append((low, high, spans))
+    bottoms, tops = dict[float, float](), dict[float, float]()
+    for (y, spans), (above, others) in pairwise(strips):
+        if above - y < 1.5 * width_m:
+            edge, seam_m = (y + above) / 2, _SEAM * width_m
+            tops[y], bottoms[above] = edge - seam_m, edge + seam_m
+            slabs.append((tops[y], bottoms[above], _common(spans, others)))
+    for y, spans in strips:
+        slabs.append((bottoms.get(y, y - width_m / 2), tops.get(y, y + width_m / 2), spans))
     return slabs
 
 

@@ -108,16 +108,11 @@ def profile(
     waypoint[: count + 1] = [*np.where(opens, parts.leg, -1), len(waypoints) - 1]
     order = np.lexsort((table[1], table[0]))
     table[5] += {"amsl": 0.0, "relative": home, "terrain": table[4]}[frame]
+    known = np.where(np.isnan(table), np.array(None), table)[1:, order].T.tolist()
     return [
-        ProfilePoint(
-            along_m,
-            (latitude_deg, math.remainder(longitude_deg, 360.0)),
-            None if math.isnan(ground_m) else ground_m,
-            None if math.isnan(altitude_m) else altitude_m,
-            None if number < 0 else number,
-        )
-        for number, (along_m, latitude_deg, longitude_deg, ground_m, altitude_m) in zip(
-            waypoint[order].tolist(), table[1:, order].T.tolist(), strict=True
+        ProfilePoint(along_m, (lat, math.remainder(lon, 360.0)), ground_m, altitude_m, number)
+        for number, (along_m, lat, lon, ground_m, altitude_m) in zip(
+            np.where(waypoint < 0, np.array(None), waypoint)[order].tolist(), known, strict=True
         )
     ]
 
@@ -196,9 +191,8 @@ def _nearest(
     low, high = np.array([0, 0, 0, 0, 1.0])[kind], np.array([1, 1, 1, 0, 1.0])[kind]
     rise = (counted[1] - counted[0])[line] * (high - low) * (last - first) - slope
     with np.errstate(divide="ignore", invalid="ignore"):
-        turn = np.where(bend < 0, rise / (2 * bend), 0.5).clip(-0.5, 0.5)
-    looks = np.stack([np.full(turn.shape, -0.5), np.full(turn.shape, 0.5), turn])
-    at = looks[np.argmin(rise * looks - bend * looks**2, axis=0), np.arange(turn.size)]
+        # Over a hollow, the height is least inside or at an end; over a hill, at an end.
+        at = np.where(bend < 0, rise / (2 * bend), np.where(rise < 0, 0.5, -0.5)).clip(-0.5, 0.5)
     at[np.isnan(bend)] = 0.0
     of_rim = (first + last) / 2 + (last - first) * at
     place = starts[:, which] + (stops - starts)[:, which] * of_rim

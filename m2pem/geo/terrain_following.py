@@ -10,11 +10,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from m2pem.geo.elevation_files import Floats, Terrain, TerrainError
+from m2pem.geo.elevation_files import Floats, Terrain, TerrainError, tile_name
 from m2pem.geo.geojson import GeometryError
 from m2pem.geo.local_frame import LatLon
 from m2pem.geo.terrain import LONGEST_M, Parts, each_of, pieces
-from m2pem.mission.geometry import Coordinate, Route
+from m2pem.mission.geometry import Route
 
 TOLERANCE_M = 2.0
 _CLOSE_M = 0.02
@@ -79,23 +79,19 @@ def follow_terrain(
             f"following the ground takes {len(kept)} waypoints, more than {MOST_WAYPOINTS}: "
             "allow a greater tolerance, or follow shorter routes"
         )
-    given = dict(zip(corners, route.waypoints, strict=True))
-    waypoints: list[Coordinate] = []
-    for each in kept:
-        place = given.get(each, (float(latitudes[each]), float(longitudes[each])))
-        waypoints.append((place[0], place[1], round(float(wanted[each]), 2)))
+    places = dict(enumerate(zip(latitudes.tolist(), longitudes.tolist(), strict=True)))
+    places |= zip(corners, (each[:2] for each in route.waypoints), strict=True)
+    waypoints = tuple((*places[each], round(float(wanted[each]), 2)) for each in kept)
     speeds = dict(zip(corners, route.speeds_m_s, strict=False))
-    return Route(tuple(waypoints), "amsl", tuple(map(speeds.get, kept)) if speeds else ())
+    return Route(waypoints, "amsl", tuple(map(speeds.get, kept)) if speeds else ())
 
 
 def not_covered(place: LatLon) -> str:
     """Return what is missing where no elevation file has a place, and which file would have it."""
     latitude_deg, longitude_deg = place
-    south, west = math.floor(latitude_deg), math.floor(longitude_deg)
-    row = f"{'N' if south >= 0 else 'S'}{abs(south):02d}"
-    column = f"{'E' if west >= 0 else 'W'}{abs(west):03d}"
+    tile = tile_name(math.floor(latitude_deg), math.floor(longitude_deg))
     return (
-        f"no elevation file has [{latitude_deg:.5f}, {longitude_deg:.5f}]: put {row}{column}.hgt, "
+        f"no elevation file has [{latitude_deg:.5f}, {longitude_deg:.5f}]: put {tile}, "
         "or a GeoTIFF with that place, into the folder of elevation files"
     )
 
@@ -108,9 +104,8 @@ def _kept(alongs: Floats, wanted: Floats, corners: Sequence[int], tolerance_m: f
         first, last = spans.pop()
         if alongs[last] == alongs[first]:
             continue  # it climbs there
-        part = (alongs[first : last + 1] - alongs[first]) / (alongs[last] - alongs[first])
-        straight = wanted[first] + (wanted[last] - wanted[first]) * part
-        off = np.abs(wanted[first : last + 1] - straight)
+        part, ends = slice(first, last + 1), [first, last]
+        off = np.abs(wanted[part] - np.interp(alongs[part], alongs[ends], wanted[ends]))
         farthest = first + int(np.argmax(off))
         if off.max() > tolerance_m and first < farthest < last:
             kept.add(farthest)
