@@ -7,8 +7,9 @@ drawn.
 
 import math
 from collections import Counter, defaultdict
-from collections.abc import Container, Iterator
+from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 from m2pem.fleet.allocation import asked_by
 from m2pem.fleet.behaviors import SHARED
@@ -49,6 +50,7 @@ def fleet_for(mission: Mission) -> Fleet:
     drives otherwise. A team has members of its own (`section_1`, ...). A role by need gets vehicles
     of its own for each task and parallel instance, with the domain, tags and payloads that its
     condition names. A name that the mission reads from its data while it runs cannot be known here.
+    Aircraft begin on the ground if the mission has a take-off, else in the air.
     """
     draft = _Draft(_origin(mission))
     tasks = list(asked_by(mission))
@@ -67,7 +69,8 @@ def fleet_for(mission: Mission) -> Fleet:
             draft.add_geometries(task, mission.geometries)
         elif task.service == DETECTOR_SERVICE and not task.roles:
             draft.add_any_detector()
-    return draft.fleet()
+    take_off = any(isinstance(each, Behavior) and each.name == "takeoff" for each in tasks)
+    return draft.fleet({} if take_off else {"altitude": "30 m"})
 
 
 def _origin(mission: Mission) -> Origin:
@@ -186,7 +189,8 @@ class _Draft:
         heading_rad = math.radians(40.0 * len(self.geometries))
         return distance_m * math.sin(heading_rad), distance_m * math.cos(heading_rad)
 
-    def fleet(self) -> Fleet:
+    def fleet(self, aircraft: Mapping[str, Any]) -> Fleet:
+        """Return the fleet. `aircraft`: settings of each aircraft, besides its place."""
         payloads = {
             ResourceId(name): Payload(
                 ResourceId(name),
@@ -200,12 +204,12 @@ class _Draft:
         vehicles: dict[ResourceId, Vehicle] = {}
         for number, (name, domain) in enumerate(self.domains.items()):
             latitude_deg, longitude_deg, _ = self._at(SPACING_M * number, 0.0)
-            vehicle = ResourceId(name)
+            vehicle, settings = ResourceId(name), aircraft if domain is Domain.AIR else {}
             vehicles[vehicle] = Vehicle(
                 vehicle,
                 domain,
                 SIMULATED,
-                {"home": [latitude_deg, longitude_deg]},
+                {"home": [latitude_deg, longitude_deg], **settings},
                 payloads=tuple(p.id for p in payloads.values() if p.vehicle == vehicle),
                 tags=tuple(self.tags.get(name, ())),
             )

@@ -10,6 +10,7 @@ from m2pem.api.remaining import (
     RemainingWork,
     raw_parameters,
 )
+from m2pem.fleet.behaviors import takeoff_first
 from m2pem.geo.lawn_mower import longest_edge_yaw
 from m2pem.geo.polygon import middle_of
 from m2pem.geo.polyline import Polyline
@@ -47,24 +48,10 @@ def yaw_of(heading_rad: float) -> float:
     return math.pi / 2 - heading_rad
 
 
-def under_way(craft: Craft, up_m: float | None) -> Course:
-    """A course that begins by stopping, and by taking off if need be, to `up_m` or as usual."""
-    course = Course(craft)
-    if craft.flies and not craft.aloft:
-        course.climb_to(
-            craft.home[2] + craft.kinematics.default_altitude_m if up_m is None else up_m
-        )
-    return course
-
-
 def flying_height(craft: Craft, parameters: LocalParameters) -> float:
-    """The height to move at: as requested, else the present one, else that of a take-off."""
+    """The height to move at: as requested, else the present one."""
     requested = parameters.up_m(craft)
-    if requested is not None:
-        return requested
-    if craft.flies and not craft.aloft:
-        return craft.home[2] + craft.kinematics.default_altitude_m
-    return craft.pose.place[2]
+    return craft.pose.place[2] if requested is None else requested
 
 
 def _route(craft: Craft, parameters: LocalParameters) -> Manoeuvre:
@@ -85,7 +72,7 @@ def _along(craft: Craft, parameters: LocalParameters, radius_m: float | None) ->
     speed = parameters.speed_m_s
     own = route.speeds_m_s and speed is None
     lap_speeds = [route.speed_from(index) for index in range(len(places))] if own else []
-    course = under_way(craft, places[0][2])
+    course = Course(craft)
     course.through(places, speed, radius_m, [None, *lap_speeds[:-1]] if own else ())
     if not parameters.loop:
         work = RemainingRoute(raw_parameters(parameters.given), route, parameters.frame)
@@ -103,7 +90,7 @@ def _along(craft: Craft, parameters: LocalParameters, radius_m: float | None) ->
 
 def _goto(craft: Craft, parameters: LocalParameters) -> Manoeuvre:
     target = parameters.target_place(craft, flying_height(craft, parameters))
-    course = under_way(craft, target[2]).through([target], parameters.speed_m_s)
+    course = Course(craft).through([target], parameters.speed_m_s)
     heading = parameters.heading_rad
     if heading is not None:
         course.turn_to(yaw_of(heading))
@@ -132,6 +119,8 @@ def _return(craft: Craft, parameters: LocalParameters) -> Manoeuvre:
     if not craft.flies:
         return Manoeuvre(course.through([(*each, ground) for each in way], None, radius_m).plan())
     if math.dist(course.place[:2], (east, north)) > 0.1:
+        if not craft.aloft:
+            raise RefusedError(takeoff_first(craft.name))
         course.climb_to(max(course.place[2], ground + craft.kinematics.default_altitude_m))
         course.through([(*each, course.place[2]) for each in way], None, radius_m)
     return Manoeuvre(course.climb_to(ground).plan())
@@ -161,7 +150,7 @@ def _survey(craft: Craft, parameters: LocalParameters) -> Manoeuvre:
         raise RefusedError(f"parameter {error}") from None
     up = flying_height(craft, parameters)
     places: list[Vector] = [(east, north, up) for east, north in tracks.line.points]
-    course = under_way(craft, up).through(places, parameters.speed_m_s, radius_m=0.0)
+    course = Course(craft).through(places, parameters.speed_m_s, radius_m=0.0)
     work = RemainingSurvey(
         raw_parameters(parameters.given),
         tracks,
@@ -187,7 +176,7 @@ def _orbit(craft: Craft, parameters: LocalParameters) -> Manoeuvre:
 
 def _onto_circle(craft: Craft, centre: Vector, radius_m: float, speed_m_s: float | None) -> Course:
     """A course to the nearest point of a circle."""
-    course = under_way(craft, centre[2])
+    course = Course(craft)
     angle_rad = math.atan2(course.place[1] - centre[1], course.place[0] - centre[0])
     east = centre[0] + radius_m * math.cos(angle_rad)
     north = centre[1] + radius_m * math.sin(angle_rad)
@@ -231,9 +220,7 @@ def _follow(craft: Craft, parameters: LocalParameters) -> Manoeuvre:
         up,
         craft.kinematics.max_speed_m_s,
     )
-    # What moves already is steered on from its speed; only a landed one must rise first.
-    landed = craft.flies and not craft.aloft
-    return Manoeuvre(under_way(craft, up).plan() if landed else None, pursuit)
+    return Manoeuvre(None, pursuit)
 
 
 def _teleop(craft: Craft, parameters: LocalParameters) -> Manoeuvre:

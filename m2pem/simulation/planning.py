@@ -12,7 +12,7 @@ from m2pem.api.arbiter import ArbiterContext, BehaviorRequest, Connection
 from m2pem.api.behavior_parameters import refusal
 from m2pem.api.remaining import RemainingWork
 from m2pem.api.telemetry import GeoPosition, VehicleState
-from m2pem.fleet.behaviors import SHARED
+from m2pem.fleet.behaviors import FLOWN, SHARED, takeoff_first
 from m2pem.geo.fence import Fence
 from m2pem.mission.behavior import BehaviorType
 from m2pem.mission.catalogue import BehaviorSpec, ResourceId
@@ -30,22 +30,9 @@ from m2pem.simulation.trajectory import Plan
 from m2pem.simulation.vehicles import SimVehicle, carrier_of
 from m2pem.suggestions import suggest
 
-_EVERYWHERE = frozenset(
-    {
-        "single_vehicle_routing",
-        "goto",
-        "hold",
-        "drive_stop",
-        "return_to_launch",
-        "area_survey",
-        "orbit",
-        "area_observe",
-        "follow",
-        "teleop",
-        "set_speed",
-        "deploy",
-    }
-)
+_EVERYWHERE = (FLOWN - {"change_altitude"}) | {
+    *("hold", "drive_stop", "return_to_launch", "teleop", "set_speed", "deploy"),
+}
 _BY_DOMAIN: Mapping[str, frozenset[str]] = {
     "ground": _EVERYWHERE | {"reverse"},
     "air": _EVERYWHERE | {"takeoff", "land", "change_altitude"},
@@ -170,6 +157,8 @@ class Planner:
         for craft, vehicle in zip(crafts, vehicles, strict=True):
             if vehicle.battery_at(now_us) <= 0:
                 raise RefusedError(f"the battery of {craft.name} is empty", "BATTERY_LOW")
+            if request.behavior in FLOWN and craft.flies and not craft.aloft:
+                raise RefusedError(takeoff_first(craft.name))
         manoeuvre: Callable[..., Manoeuvre] = MANOEUVRES[request.behavior]
         made = [manoeuvre(craft, parameters) for craft in crafts]
         for craft, each in zip(crafts, made, strict=True):

@@ -58,6 +58,13 @@ def test_what_takes_off_flies_and_the_rest_drives() -> None:
     assert flying == {"uav1", "uav2"}
 
 
+def test_aircraft_begin_on_the_ground_if_the_mission_has_a_take_off_else_in_the_air() -> None:
+    survey = behavior("area_survey", vehicle("uav1"), area="field", altitude="9 m")
+    assert check(fleet_for(mission(survey)), survey) == []
+    tasks = [behavior("takeoff", vehicle("uav2"), altitude="9 m"), survey]
+    assert [each.rule for each in check(fleet_for(mission(*tasks)), *tasks)] == ["no-takeoff"]
+
+
 def test_vehicles_start_apart_and_near_the_origin() -> None:
     fleet = fleet_for(mission(*TASKS))
     homes = [vehicle.settings["home"] for vehicle in fleet.vehicles.values()]

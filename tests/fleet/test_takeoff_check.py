@@ -9,12 +9,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from m2pem.findings import Finding, Severity
+from m2pem.fleet import default_fleet
 from m2pem.fleet.behaviors import SHARED
 from m2pem.fleet.check import check_mission
-from m2pem.fleet.default_fleet import fleet_for
 from m2pem.fleet.fleet import Domain, Fleet
 from m2pem.mission.behavior import BehaviorType
 from m2pem.mission.catalogue import BehaviorSpec, ResourceId
+from m2pem.mission.mission import Mission
 from tests.engine.notation import mission
 from tests.seeds import examples
 
@@ -38,17 +39,14 @@ def land(name: str, vehicle: str = "uav") -> str:
     return f'<scriptTask id="{name}">do land {vehicle}</scriptTask>'
 
 
-def fleet_of(text: str, **settings_: object) -> Fleet:
-    fleet = fleet_for(mission(text))
-    vehicles = {
-        name: replace(each, settings={**each.settings, **settings_})
-        for name, each in fleet.vehicles.items()
-    }
+def fleet_for(read: Mission, **settings_: object) -> Fleet:
+    fleet = default_fleet.fleet_for(read)
+    vehicles = {id_: replace(each, settings=settings_) for id_, each in fleet.vehicles.items()}
     return replace(fleet, vehicles=vehicles)
 
 
 def found(text: str, **settings_: object) -> list[Finding]:
-    all_ = check_mission(mission(text), fleet_of(text, **settings_), offers)
+    all_ = check_mission(mission(text), fleet_for(mission(text), **settings_), offers)
     assert not [each for each in all_ if each.severity is Severity.ERROR], all_
     return [each for each in all_ if each.rule == "no-takeoff"]
 
@@ -94,7 +92,7 @@ def test_what_begins_in_the_air_needs_no_take_off() -> None:
 
 def test_rovers_and_what_offers_no_takeoff_are_not_looked_at() -> None:
     text = START + go("A") + "\ns -> A -> e"
-    fleet = fleet_of(text)
+    fleet = fleet_for(mission(text))
     uav = fleet.vehicles[ResourceId("uav")]
     rover = replace(fleet, vehicles={uav.id: replace(uav, domain=Domain.GROUND)})
     assert check_mission(mission(text), rover, offers) == []

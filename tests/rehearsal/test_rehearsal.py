@@ -763,6 +763,16 @@ def test_a_wind_against_an_aircraft_lengthens_its_way_and_one_too_strong_stops_i
     assert [record.code for _, record in of(storm, BehaviorEnded)] == ["WIND"]
 
 
+def test_a_mission_without_a_take_off_ends_as_over_mavlink(play: Rehearse) -> None:
+    fly = sequence(behavior("Fly", "goto", resource="uav1", target=FAR))
+    uav = Vehicle(ResourceId("uav1"), Domain.AIR, "sim", {})
+    fleet = Fleet("test", "test.yaml", {uav.id: uav}, {}, origin=(38.1, -77.3, 0.0))
+    played = play(fly, on=fleet)
+    assert played.summary.status is RunStatus.FAILED
+    assert [record.code for _, record in of(played, BehaviorEnded)] == ["REJECTED"]
+    assert "take off first" in played.summary.detail
+
+
 @pytest.mark.parametrize(
     ("answers", "message"),
     [

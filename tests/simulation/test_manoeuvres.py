@@ -4,7 +4,7 @@ import pytest
 from shapely import LineString, Polygon, union_all
 
 from m2pem.api.telemetry import VehicleState
-from m2pem.fleet.behaviors import SHARED
+from m2pem.fleet.behaviors import FLOWN, SHARED
 from m2pem.mission.behavior import BehaviorType
 from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.mission.geometry import Area, Point, Route, VehiclePosition
@@ -73,14 +73,48 @@ def test_every_shared_vehicle_behavior_is_a_manoeuvre() -> None:
     assert set(MANOEUVRES) == shared
 
 
-def test_a_landed_aircraft_takes_off_to_the_height_of_its_route(simulate: Simulate) -> None:
-    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
-        up = Route(route((50, 0, 40), (90, 0, 50)).waypoints)
-        await do(bench, "r1.b1", "single_vehicle_routing", "uav", route=up)
-        assert at(bench, "uav") == pytest.approx((90, 0, 50), abs=0.01)
-        assert all(height >= 39.9 for east, _, height in tracks(bench, "uav") if east > 1)
+FLOWN_PARAMETERS: dict[str, dict[str, object]] = {
+    "single_vehicle_routing": {"route": route((50, 0, 40), (90, 0, 50))},
+    "goto": {"target": Point(place(50, 0, 40))},
+    "change_altitude": {"altitude": 20.0},
+    "area_survey": {"area": SQUARE, "altitude": 30.0},
+    "orbit": {"target": Point(place(50, 0)), "altitude": 30.0},
+    "area_observe": {"area": SQUARE, "duration": 5.0, "altitude": 30.0},
+    "follow": {"target": VehiclePosition("lead"), "altitude": 30.0},
+}
 
-    simulate(UAV, main, telemetry_hz=2.0)
+
+@pytest.mark.parametrize("behavior", sorted(FLOWN))
+def test_an_aircraft_on_the_ground_refuses_what_must_fly(simulate: Simulate, behavior: str) -> None:
+    wishes = FLOWN_PARAMETERS[behavior]
+
+    async def main(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
+        await bench.start("r1.b1", behavior, "uav", **wishes)  # type: ignore[arg-type]
+        end = await bench.ended("r1.b1", 10)
+        assert end.state is BehaviorState.REJECTED
+        assert end.reason == "uav is on the ground: take off first (takeoff)"
+        await do(bench, "r1.b2", "takeoff", "uav", altitude=20.0)
+        await bench.start("r1.b3", behavior, "uav", **wishes)  # type: ignore[arg-type]
+        assert await bench.until(lambda: "RUNNING" in bench.states_of("r1.b3"), 10)
+        await arbiter.cancel("r1.b3", 1)
+        await bench.ended("r1.b3", 10)
+        await do(bench, "r1.b4", "land", "uav")
+        await bench.start("r1.b5", behavior, "uav", **wishes)  # type: ignore[arg-type]
+        assert (await bench.ended("r1.b5", 10)).state is BehaviorState.REJECTED
+
+    simulate(UAV, main)
+
+
+def test_an_aircraft_away_from_home_on_the_ground_does_not_return(simulate: Simulate) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
+        await do(bench, "r1.b0", "return_to_launch", "uav")
+        await do(bench, "r1.b1", "takeoff", "uav", altitude=20.0)
+        await do(bench, "r1.b2", "goto", "uav", target=Point(place(50, 0)))
+        await do(bench, "r1.b3", "land", "uav")
+        await bench.start("r1.b4", "return_to_launch", "uav")
+        assert "take off first" in (await bench.ended("r1.b4", 10)).reason
+
+    simulate(UAV, main)
 
 
 def test_an_aircraft_may_begin_in_the_air(simulate: Simulate) -> None:

@@ -154,6 +154,8 @@ def test_mavsdk_flies_a_copter_of_another_arbiter(tmp_path: Path) -> None:
         action, telemetry = sdk.plugin(ActionAsync, UAV1), sdk.plugin(TelemetryAsync, UAV1)
         with pytest.raises(ActionError):
             await action.arm()
+        await action.takeoff()
+        await first(telemetry.subscribe_position(), lambda each: each.relative_altitude_m > 1)
         await action.goto_location(38.1082, -77.3190, 90.0, math.nan)
         await first(telemetry.subscribe_armed(), bool)
         await first(telemetry.subscribe_position(), at((38.1082, -77.3190), 2.0))

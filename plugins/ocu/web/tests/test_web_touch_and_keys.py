@@ -133,14 +133,20 @@ async def test_a_survey_is_drawn_run_and_replayed_by_keys_alone(desk: Desk) -> N
 
 
 async def draw_by_keys(page: Page) -> None:
-    """A survey of an area whose corners are entered, behind the start."""
+    """A take-off and the survey of an area whose corners are entered, behind the start."""
     canvas = page.locator("svg[data-element-id]").first
     await canvas.focus()
     await page.keyboard.press("Tab")
     await expect(page.locator(".selected[data-element-id=Start]")).to_have_count(1)
     blocks = page.get_by_role("region", name="Blocks")
-    await blocks.get_by_role("button", name="Area survey", exact=True).first.press("Enter")
     who = page.get_by_label(re.compile(r"^Who\b")).first
+    await blocks.get_by_role("button", name="Takeoff", exact=True).first.press("Enter")
+    await expect(who).to_have_value("uav1")  # the only aircraft
+    altitude = page.locator("#m2-parameter-altitude")
+    await altitude.fill("5 m")
+    await altitude.press("Tab")
+    await blocks.get_by_role("button", name="Area survey", exact=True).first.press("Enter")
+    await expect(who).to_have_value("")
     await who.press_sequentially("uav1")
     await expect(who).to_have_value("uav1")
     await page.get_by_role("button", name="Pick on the map").first.press("Enter")

@@ -6,6 +6,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+HOME = "[38.1075, -77.3192]"
 FAR = "[38.3, -77.3]"
 """More than 20 km away: who drives there is on the way all day."""
 
@@ -73,6 +74,7 @@ def _vehicle(name: str, place: int) -> Mapping[str, Any]:
         "connection": connection,
     }
     if air:
+        connection["altitude"] = "30 m"
         made["failsafe"] = "return_to_launch"
     if name == "uav01":
         found = {"type": "person", "position": PERSON}
@@ -125,7 +127,7 @@ def _sweep() -> str:
     rest = (
         _behavior("Hold", "Hold at the person", "hold", "uav01")
         + _behavior("Relay", "Relay the radio", "orbit", LOST, target=FAR, altitude="40 m")
-        + _behavior("Home", "Fly home", "return_to_launch", "uav01")
+        + _behavior("Home", "Fly home", "goto", "uav01", target=HOME)
         + '<parallelGateway id="F"/>'
         + "".join(f'<endEvent id="E{number}"/>' for number in (1, 2, 3))
     )

@@ -52,6 +52,7 @@ REHEARSAL_KEYS = frozenset(
         "climb_rate",
         "endurance",
         "default_altitude",
+        "altitude",
         "kind",
         "detections",
         "faults",
