@@ -309,10 +309,11 @@ class TeamBehavior:
             lost = self._led_around.pop(name)
             if member.lost:
                 continue
-            if pose is not None:
-                self._shares.renew(name, controller.lead_around(name, pose.place))
-            stuck = name if pose is None else controller.stuck()
-            if stuck is not None and not self._led_around:
+            places = [] if pose is None else controller.lead_around(name, pose)
+            if places:
+                self._shares.renew(name, places)
+            stuck = controller.stuck() if places else name
+            if stuck is not None and not (places and self._led_around):
                 reason = f"{stuck} cannot go around {lost}, which is lost"
                 self._end_all(BehaviorState.FAILED, "FAILED", reason)
 

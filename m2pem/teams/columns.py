@@ -5,16 +5,22 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import combinations
 
+import numpy as np
+
 from m2pem.fleet.parameters import read_offsets
+from m2pem.geo.local_frame import LatLon
 from m2pem.geo.polyline import EastNorthUp, Polyline, Segment
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.geometry import Route
-from m2pem.teams.clearance import NEAREST_SHARE, Clearance, Nearest, Way, nearest
+from m2pem.teams.clearance import NEAREST_SHARE, Clearance
 from m2pem.teams.paths import SHAPES, SPACING_M, MemberPath, beside, lane, slot
 from m2pem.teams.plan import (
+    MOTIONS,
+    NO_MEETING,
     Leg,
     March,
     Marcher,
+    Meeting,
     MemberPose,
     Plan,
     PlanningContext,
@@ -28,6 +34,10 @@ HEADROOM_SHARE = 0.4
 """Share of the spacing that the stopping distance may take, to avoid frequent braking."""
 
 _SAME_PLACE_M = 0.01
+_LOOKS = 10_000
+
+_LEAST_SHARE = 0.8
+"""Share of the spacing: the minimum distance of members in the plane."""
 
 _FARTHER_BACK_SHARE = 2.0
 """Share of the spacing: so much farther back than in the formation may a member end."""
@@ -35,34 +45,22 @@ _FARTHER_BACK_SHARE = 2.0
 
 def march(context: PlanningContext, default_shape: str) -> Plan:
     """Move together in a shape; without a route, form up on the lead."""
-    shape, spacing = _shape(context, default_shape)
+    shape, spacing, places = _formation(context, default_shape)
     route = context.parameters.route
-    places = _places(context, shape, spacing)
-    if context.parameters.text("offsets"):
-        shape, spacing = "", min(math.dist(a, b) for a, b in combinations(places, 2))
     if route is None:
         return Plan(_forming_up(context, places, chained=False))
     ways = _ways(context, route, places, spacing)
-    marchers = tuple(
-        Marcher(
-            way.member,
-            way.path(context.begin(way.member)),
-            way.back_m,
-            way.left_m,
-            context.motion(way.member),
-        )
-        for way in ways
-    )
+    marchers = tuple(way.marcher(context) for way in ways)
     speed = _march_speed(context, marchers, spacing)
     legs = tuple(way.leg(context, speed, None) for way in ways)
-    return Plan(legs, March(marchers, spacing, speed, closes=shape == "column"))
+    closes = shape == "column"
+    return Plan(legs, March(marchers, spacing, speed, closes, context.frame, context.fence))
 
 
 def one_by_one(context: PlanningContext) -> Plan:
     """Let each member set off when the member before it has arrived, and stop behind it."""
-    shape, spacing = _shape(context, "column")
+    _, spacing, places = _formation(context, "column")
     route = context.parameters.route
-    places = _places(context, shape, spacing)
     if route is None:
         return Plan(_forming_up(context, places, chained=True))
     ways = _ways(context, route, places, spacing)
@@ -79,17 +77,19 @@ _REMEDY = (
 )
 
 
-def turns(context: PlanningContext, behavior: str) -> tuple[str, str]:
-    """Say where a route brings members too near to each other, and what would be right; "" if not.
+def turns(context: PlanningContext, behavior: str, least_m: float) -> Meeting:
+    """Say where a route brings members too near to each other, and what would be right.
 
-    The members come from their places behind the beginning of the route.
+    The members come from their places behind the beginning of the route. `least_m`: the fleet's
+    separation.
     """
-    route, (shape, spacing) = context.parameters.route, _shape(context, SHAPES[behavior])
+    route, (_, spacing, places) = context.parameters.route, _formation(context, SHAPES[behavior])
     if route is None or len(context.members) < 2:
-        return "", ""
-    places = _places(context, shape, spacing)
-    if context.parameters.text("offsets"):
-        spacing = min(math.dist(a, b) for a, b in combinations(places, 2))
+        return NO_MEETING
+    if (apart_m := _LEAST_SHARE * spacing) < least_m:
+        name = "offsets" if context.parameters.text("offsets") else "spacing"
+        said = f"parameter '{name}': members come within {apart_m:g} m of each other, below the "
+        return f"{said}fleet's separation of {least_m:g} m", "set a larger spacing", None
     start, then = (context.level(each) for each in _apart(context, route)[:2])
     yaw_rad, first_m = Segment.between(start, then).yaw_rad, min(back for back, _ in places)
     poses = {
@@ -100,17 +100,15 @@ def turns(context: PlanningContext, behavior: str) -> tuple[str, str]:
     try:
         _ways(context, route, places, spacing)
     except TeamRefusedError as error:
-        return str(error), ""
-    near = nearest(
-        [Way(way.path(), way.back_m, way.left_m) for way in _drawn(context, route, places)]
-    )
-    if near.distance_m >= GAP_SHARE * spacing or behavior == "bridge_crossing":
-        return "", ""
-    said = f"parameter 'route': {_turn(context, near)} if they kept their spacing along it"
-    return said, f"the members pass it one after the other, or else {_REMEDY}"
+        return str(error), "", error.place
+    distance_m, place, text = _meeting(context, _drawn(context, route, places))
+    if distance_m >= GAP_SHARE * spacing or behavior == "bridge_crossing":
+        return NO_MEETING
+    remedy = f"the members pass it one after the other, or else {_REMEDY}"
+    return f"{text} if they kept their spacing along it", remedy, place
 
 
-def lane_mates(a: "Marcher | _Way", b: "Marcher | _Way", spacing_m: float) -> bool:
+def lane_mates(a: Marcher, b: Marcher, spacing_m: float) -> bool:
     """Whether two members are in one lane."""
     return abs(a.left_m - b.left_m) < spacing_m / 2
 
@@ -122,24 +120,26 @@ class _Way:
         self, member: ResourceId, route: Sequence[EastNorthUp], place: tuple[float, float]
     ) -> None:
         self.member = member
-        self.back_m, self.left_m = place
+        self._back_m, self._left_m = place
         self._route = route
         self._route_marks_m = Polyline(each[:2] for each in route).marks_m
-        self._end_at(self._route_marks_m[-1] - self.back_m)
+        self._end_at(self._route_marks_m[-1] - self._back_m)
 
     def _end_at(self, mark_m: float) -> None:
-        self.places = lane(self._route, self._route_marks_m[-1] - mark_m, self.left_m)
-        self._marks = [*self._route_marks_m[: len(self.places) - 1], mark_m]
+        self._places = lane(self._route, self._route_marks_m[-1] - mark_m, self._left_m)
+        self._marks = [*self._route_marks_m[: len(self._places) - 1], mark_m]
 
-    def path(self, begin: tuple[float, float] | None = None) -> MemberPath:
-        """Its path, without the way from `begin` to the route if there is none."""
-        kept, marks = self.places, self._marks
+    def marcher(self, context: PlanningContext | None = None) -> Marcher:
+        """The member on its path; without a context, without the way from where it is."""
+        kept, marks = self._places, self._marks
+        begin = context.begin(self.member) if context is not None else None
+        motion = context.motion(self.member) if context is not None else MOTIONS["ground"]
         if begin is not None:
             first = math.dist(begin, kept[0][:2])
             kept, marks = [(*begin, 0.0), *kept], [marks[0] - first, *marks]
         elif len(kept) == 1:
             kept, marks = [*kept, *kept], [*marks, *marks]
-        return MemberPath(kept, marks)
+        return Marcher(self.member, MemberPath(kept, marks), self._back_m, self._left_m, motion)
 
     def shorten(self, by_m: float) -> None:
         """Let it end so much earlier, or a little more."""
@@ -149,48 +149,38 @@ class _Way:
         self, context: PlanningContext, speed_m_s: float | None, after: ResourceId | None
     ) -> Leg:
         route = context.parameters.route
-        if len(self.places) < 2 or route is None:
-            return context.to_place(self.member, self.places[0], after=after)
+        if len(self._places) < 2 or route is None:
+            return context.to_place(self.member, self._places[0], after=after)
         ups = [waypoint[2] for waypoint in _apart(context, route)]
         waypoints = tuple(
             context.coordinate(place, None if up is None else place[2])
-            for place, up in zip(self.places, ups, strict=False)
+            for place, up in zip(self._places, ups, strict=False)
         )
         parameters = {"route": Route(waypoints, route.altitude_frame), "speed": speed_m_s}
         return context.leg(self.member, "single_vehicle_routing", parameters, after)
 
 
-def _shape(context: PlanningContext, default: str) -> tuple[str, float]:
-    return context.parameters.text("shape") or default, context.parameters.spacing_m or SPACING_M
-
-
-def _places(context: PlanningContext, shape: str, spacing_m: float) -> list[tuple[float, float]]:
-    """Return each member's place, in metres behind the lead and to its left."""
-    text = context.parameters.text("offsets")
+def _formation(
+    context: PlanningContext, default: str
+) -> tuple[str, float, list[tuple[float, float]]]:
+    """Return the shape, the spacing, and each member's place: metres behind the lead, and left."""
+    parameters, count = context.parameters, len(context.members)
+    text = parameters.text("offsets")
     if not text:
-        slots = (slot(shape, index) for index in range(len(context.members)))
-        return [(back * spacing_m, left * spacing_m) for back, left in slots]
-    doubled = [name for name in ("shape", "spacing") if name in context.parameters]
+        shape, spacing_m = parameters.text("shape") or default, parameters.spacing_m or SPACING_M
+        slots = (slot(shape, index) for index in range(count))
+        return shape, spacing_m, [(back * spacing_m, left * spacing_m) for back, left in slots]
+    doubled = [name for name in ("shape", "spacing") if name in parameters]
     if doubled:
         raise TeamRefusedError(f"parameter 'offsets': it says what '{doubled[0]}' says, too")
     places = [(0.0, 0.0), *read_offsets(text)]
-    if len(places) < len(context.members) or len(places) < 2:
+    if len(places) < max(2, count):
         raise TeamRefusedError(
-            f"parameter 'offsets': there are {len(places) - 1} for {len(context.members) - 1} "
-            "members after the lead"
+            f"parameter 'offsets': there are {len(places) - 1} for {count - 1} members after the "
+            "lead"
         )
-    return places[: max(2, len(context.members))]
-
-
-def _refuse_wrong_order(marchers: "Sequence[_Way]", spacing_m: float) -> None:
-    """Raise unless, in each lane, members ahead come first: each keeps clear of those before it."""
-    for index, marcher in enumerate(marchers):
-        for other in marchers[:index]:
-            if lane_mates(marcher, other, spacing_m) and marcher.back_m < other.back_m:
-                raise TeamRefusedError(
-                    f"parameter 'offsets': {marcher.member} would be ahead of {other.member} in "
-                    "its lane; name first in the team who is ahead"
-                )
+    places = places[: max(2, count)]
+    return "", min(math.dist(a, b) for a, b in combinations(places, 2)), places
 
 
 def _ways(
@@ -200,7 +190,6 @@ def _ways(
     spacing_m: float,
 ) -> list[_Way]:
     ways = _drawn(context, route, offsets)
-    _refuse_wrong_order(ways, spacing_m)
     _keep_ends_apart(context, ways, spacing_m)
     return ways
 
@@ -226,39 +215,50 @@ def _keep_ends_apart(context: PlanningContext, ways: Sequence[_Way], spacing_m: 
     Raises:
         TeamRefusedError: one of them would not get to the end of the route, or near it.
     """
-    nearest_m = NEAREST_SHARE * spacing_m
     short_m = max(context.motion(way.member).short_m(context.speed()) for way in ways)
-    formation = [Way(way.path(), way.back_m, way.left_m) for way in ways]
     farther_m = [0.0 for _ in ways]
-    while True:
-        paths = [Way(way.path(context.begin(way.member)), way.back_m, way.left_m) for way in ways]
-        clearance = Clearance(paths, nearest_m)
-        ends_m = [path.line.length_m for path in paths]
+    shorter = True
+    while shorter:
+        marchers = [way.marcher(context) for way in ways]
+        clearance = Clearance(marchers, NEAREST_SHARE * spacing_m)
+        ends_m = [each.path.line.length_m for each in marchers]
         shorter = False
         for index, at_m in enumerate(clearance.reached_m([0.0] * len(ways), ends_m, short_m)):
             way, by_m = ways[index], ends_m[index] - at_m
             farther_m[index] += by_m
             too_far = farther_m[index] > _FARTHER_BACK_SHARE * spacing_m
             if not context.begun and too_far:
-                raise TeamRefusedError(
-                    f"parameter 'route': {_turn(context, nearest(formation))}, and {way.member} "
-                    f"cannot wait until it is free: {_REMEDY}"
-                )
+                _, place, text = _meeting(context, ways)
+                text = f"{text}, and {way.member} cannot wait until it is free: {_REMEDY}"
+                raise TeamRefusedError(text, place)
             if by_m and not too_far:
                 way.shorten(by_m)
                 shorter = True
-        if not shorter:
-            break
 
 
-def _turn(context: PlanningContext, near: Nearest) -> str:
-    """Say where a formation brings two members nearest to each other."""
-    latitude_deg, longitude_deg, _ = context.coordinate(near.place, None)
-    first, second = (context.members[each] for each in near.members)
-    return (
-        f"at [{latitude_deg:.6f}, {longitude_deg:.6f}] it turns by {near.turn_deg:.0f} degrees, "
-        f"where {first} and {second} would come within {near.distance_m:.1f} m of each other"
-    )
+def _meeting(context: PlanningContext, ways: Sequence[_Way]) -> tuple[float, LatLon, str]:
+    """Return how near a formation brings two of its members, the corner there, and a text."""
+    marchers = sorted((way.marcher() for way in ways), key=lambda each: each.back_m)
+    ends_m = [each.back_m + mark_m for each in marchers for mark_m in each.path.marks_m]
+    lead_m = np.linspace(min(ends_m), max(ends_m), _LOOKS)
+    tracks = [
+        np.interp(lead_m - each.back_m, each.path.marks_m, axis, math.nan, math.nan)
+        for each in marchers
+        for axis in np.transpose(each.path.places)[:2]
+    ]
+    found = []
+    for first, other in combinations(range(len(marchers)), 2):
+        east, north = (tracks[2 * first + axis] - tracks[2 * other + axis] for axis in (0, 1))
+        apart_m = np.nan_to_num(np.hypot(east, north), nan=math.inf)
+        found.append((float(apart_m.min()), int(apart_m.argmin()), first, other))
+    distance_m, at, *pair = min(found)
+    east, north = (sum(tracks[2 * each + axis][at] for each in pair) / 2 for axis in (0, 1))
+    path = marchers[pair[0]].path.places
+    corner = min(path[1:-1] or path, key=lambda each: math.dist(each[:2], (east, north)))
+    place = context.frame.to_latlon(corner[:2])
+    names = " and ".join(marchers[each].member for each in pair)
+    text = f"[{place[0]:.6f}, {place[1]:.6f}] {names} would come within {distance_m:.1f} m"
+    return distance_m, place, f"parameter 'route': at {text} of each other"
 
 
 def _apart(context: PlanningContext, route: Route) -> list[tuple[float, float, float | None]]:
@@ -282,7 +282,7 @@ def _march_speed(context: PlanningContext, marchers: Sequence[Marcher], spacing_
     for index, marcher in enumerate(marchers):
         for other in marchers[:index]:
             if lane_mates(marcher, other, spacing_m):
-                gap_m = marcher.back_m - other.back_m
+                gap_m = abs(marcher.back_m - other.back_m)
                 headroom_m = gap_m - (1 - HEADROOM_SHARE) * spacing_m
                 speed = min(speed, marcher.motion.safe_m_s(headroom_m))
     return speed

@@ -9,14 +9,15 @@ Pure: the caller passes the poses; the controller uses no clock.
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 from m2pem.api.telemetry import TeamMemberState
-from m2pem.geo.local_frame import EastNorth
+from m2pem.geo.fence import Fence
 from m2pem.geo.polyline import EastNorthUp
 from m2pem.mission.catalogue import ResourceId
-from m2pem.teams.clearance import NEAREST_SHARE, Clearance, Way
+from m2pem.mission.geometry import Area
+from m2pem.teams.clearance import NEAREST_SHARE, Clearance
 from m2pem.teams.columns import GAP_SHARE, lane_mates
-from m2pem.teams.detours import around, comes_near
 from m2pem.teams.plan import (
     REACTION_S,
     REACTION_SHARE,
@@ -26,6 +27,9 @@ from m2pem.teams.plan import (
     MemberPose,
 )
 
+if TYPE_CHECKING:
+    from shapely.geometry.base import BaseGeometry
+
 PERIOD_S = 0.25
 """Period of the formation controller."""
 
@@ -33,10 +37,12 @@ _SLACK_S = 1.5
 _SILENT_S = 1.0
 """A member of which nothing new is received for so long is not waited for: it may go on."""
 
+_SOON_S = REACTION_S * REACTION_SHARE
 _HARD_BRAKING = 2.0
 """Vehicles brake at most so many times as hard as they do at least."""
 
 _LOOK_AHEAD_M = 50.0
+
 _CRAWL_SHARE = 0.1
 """Share of the march's speed: a member stops below it, and starts again at `START_SHARE`."""
 
@@ -49,14 +55,16 @@ than needed."""
 class _Track:
     """A member's progress in metres: `along_m` on its own path, `mark_m` on the team's route.
 
-    `stops_m`: the least distance along its path at which it may come to a stop; `room_m`: how far
-    it may go on without coming too near to another one, as far as all is well.
+    `stops_m`: the least distance along its path at which it may come to a stop. How far it may go
+    on without coming too near to another one: `room_m` if that one brakes as vehicles do; `free_m`
+    if it stops at once, at a distance that is less.
     """
 
     marcher: Marcher
     back_m: float
     stops_m: float = 0.0
     room_m: float = math.inf
+    free_m: float = math.inf
     pose: MemberPose | None = None
     unseen_s: float = 0.0
     along_m: float | None = None
@@ -65,10 +73,20 @@ class _Track:
     stands: bool = False
     arrived: bool = False
 
-    def rest(self) -> list[EastNorthUp]:
-        """The places ahead of it."""
-        path, along_m = self.marcher.path, self.along_m or 0.0
-        return path.rest(path.line.at(along_m), along_m)
+    def find(self, pose: MemberPose) -> float:
+        """Return how far along its path the member is."""
+        moved_m = math.dist(pose.place, self.pose.place) if self.pose is not None else 0.0
+        if pose.course_rad is None:
+            return self.marcher.path.find(pose.place, self.along_m, 2 * moved_m + 1, pose.yaw_rad)
+        return self.marcher.path.find(pose.place, self.along_m, _LOOK_AHEAD_M, pose.course_rad)
+
+    def ahead(self, way_m: float = math.inf) -> "BaseGeometry":
+        """Return its path from where it is, as far as that."""
+        from shapely import LineString  # noqa: PLC0415  # slow to load
+        from shapely.ops import substring  # noqa: PLC0415
+
+        from_m = self.along_m or 0.0
+        return substring(LineString(self.marcher.path.line.points), from_m, from_m + way_m)
 
 
 class FormationController:
@@ -84,7 +102,7 @@ class FormationController:
             marcher.member: _Track(marcher, marcher.back_m) for marcher in march.marchers
         }
         self._nearest_m = NEAREST_SHARE * march.spacing_m
-        self._lost: list[list[EastNorth]] = []
+        self._lost: list[BaseGeometry] = []
         self._clearance = self._clear()
         self._slack_m = max(march.spacing_m / 2, _SLACK_S * march.speed_m_s)
 
@@ -110,35 +128,51 @@ class FormationController:
         its loss was noticed, and needs its way to stop.
         """
         lost = self._tracks.pop(member, None)
-        self._clearance = self._clear()
-        if lost is not None and lost.along_m is not None:
-            line, from_m = lost.marcher.path.line, lost.along_m
-            speed_m_s = lost.pose.speed_m_s if lost.pose is not None else 0.0
-            goes_m = speed_m_s * lost.unseen_s + lost.marcher.motion.stopping_m(speed_m_s)
-            corners = [
-                point
-                for point, mark_m in zip(line.points, line.marks_m, strict=True)
-                if from_m < mark_m < from_m + goes_m
-            ]
-            self._lost.append([line.at(from_m), *corners, line.at(from_m + goes_m)])
         if self._march.closes:
             for rank, track in enumerate(self._tracks.values()):
                 track.back_m = rank * self._march.spacing_m
+        self._clearance = self._clear()
         if lost is None or lost.along_m is None:
             return []
+        speed_m_s = lost.pose.speed_m_s if lost.pose is not None else 0.0
+        if lost.unseen_s and not lost.stands:
+            speed_m_s = max(speed_m_s, self._march.speed_m_s)
+        goes_m = speed_m_s * lost.unseen_s + lost.marcher.motion.stopping_m(speed_m_s)
+        where = lost.ahead(goes_m)
+        self._lost.append(where)
         return [
             name
             for name, track in self._tracks.items()
-            if not track.arrived and comes_near(track.rest(), self._lost[-1], self._nearest_m)
+            if not track.arrived and track.ahead().distance(where) < self._nearest_m
         ]
 
-    def lead_around(self, member: ResourceId, place: EastNorth) -> Sequence[EastNorthUp]:
-        """Return the places to which a member goes that is at `place`, around all lost ones."""
-        track = self._tracks[member]
-        path = track.marcher.path
-        places = path.rest(place, path.find(place, track.along_m, _LOOK_AHEAD_M))
-        for lost in self._lost:
-            places = around(places, lost, self._march.spacing_m)
+    def lead_around(self, member: ResourceId, pose: MemberPose) -> Sequence[EastNorthUp]:
+        """Return the places to which a member goes that is at `pose`, around all lost ones and
+        those behind it, and within the fence; none: there is no way.
+
+        A way that would end too near to a lost one ends beside it.
+        """
+        from shapely import Point  # noqa: PLC0415  # slow to load
+
+        track, frame = self._tracks[member], self._march.frame
+        path, tracks = track.marcher.path, list(self._tracks.values())
+        behind = [each.pose.place for each in tracks[tracks.index(track) + 1 :] if each.pose]
+        kept_out = (each.buffer(self.spacing_m) for each in (*self._lost, *map(Point, behind)))
+        rings = [[frame.to_latlon((x, y)) for x, y in each.exterior.coords] for each in kept_out]
+        areas = [Area((tuple((*corner, None) for corner in ring),)) for ring in rings]
+        fence = Fence(self._march.fence, areas, frame=frame)
+        here, *rest = path.rest(pose.place, track.find(pose))
+        places = [here]
+        for there in rest:
+            free = fence.is_free(there[:2], there[:2])
+            if not free and there is not rest[-1]:
+                continue
+            between = fence.way(places[-1][:2], there[:2])
+            if between is None:
+                return []
+            places += [(*each, there[2]) for each in between]
+            if free:
+                places.append(there)
         path = path.onward(places)
         track.marcher, track.along_m, track.stops_m = replace(track.marcher, path=path), 0.0, 0.0
         self._clearance = self._clear()
@@ -160,7 +194,7 @@ class FormationController:
         for track in known:
             self._measure_room(track)
         wanted: dict[ResourceId, float] = {}
-        for index, track in enumerate(known):
+        for track in known:
             if not track.arrived:
                 others = [
                     each
@@ -168,7 +202,7 @@ class FormationController:
                     if each is not track and not each.arrived and each.unseen_s < _SILENT_S
                 ]
                 waits_m = max((self._delay_m(other, track) for other in others), default=0.0)
-                speed = self._speed(track, known[:index], waits_m)
+                speed = self._speed(track, known[0], waits_m)
                 track.stands = speed == 0.0
                 wanted[track.marcher.member] = speed
         return wanted
@@ -182,13 +216,17 @@ class FormationController:
             if track not in known:
                 states.append(TeamMemberState(member))
                 continue
-            gap_m = self._free_m(track, known[: known.index(track)]) + self.floor_m
+            gaps_m = (
+                other.mark_m - track.mark_m
+                for other in known[: known.index(track)]
+                if lane_mates(other.marcher, track.marcher, self.spacing_m)
+            )
             states.append(
                 TeamMemberState(
                     member,
                     -_lag_m(track, known[0]),
                     track.off_m,
-                    gap_m if math.isfinite(gap_m) else None,
+                    min(gaps_m, default=None),
                 )
             )
         return tuple(states)
@@ -204,10 +242,7 @@ class FormationController:
         return next((track.marcher.member for track in stuck), None)
 
     def _clear(self) -> Clearance:
-        marchers = [track.marcher for track in self._tracks.values()]
-        return Clearance(
-            [Way(each.path, each.back_m, each.left_m) for each in marchers], self._nearest_m
-        )
+        return Clearance([track.marcher for track in self._tracks.values()], self._nearest_m)
 
     def _look(self, track: _Track, stand: MemberPose | None, arrived: bool) -> None:
         path = track.marcher.path
@@ -217,64 +252,62 @@ class FormationController:
         elif stand is None or (stand.speed_m_s > 0 and stand == track.pose):
             track.unseen_s += PERIOD_S
         else:
+            found_m = track.find(stand)
             track.pose, track.unseen_s = stand, 0.0
-            found_m = path.find(
-                stand.place, track.along_m, _LOOK_AHEAD_M, stand.yaw_rad, stand.course_rad
-            )
             track.along_m, track.mark_m = found_m, path.mark_m(found_m)
             track.off_m = path.off_m(stand.place, found_m)
             braking_m_s2 = _HARD_BRAKING * track.marcher.motion.braking_m_s2
             track.stops_m = found_m + stand.speed_m_s**2 / (2 * braking_m_s2)
 
     def _measure_room(self, track: _Track) -> None:
-        others = list(self._tracks.values())
-        limit_m = self._clearance.limit_m(others.index(track), lambda index: others[index].stops_m)
-        ends = limit_m >= track.marcher.path.line.length_m
-        track.room_m = math.inf if ends else limit_m - (track.along_m or 0.0)
+        """Measure the room if the others brake, and if they stop where they are now."""
+        others, along_m = list(self._tracks.values()), track.along_m or 0.0
+        limits_m = (
+            self._clearance.limit_m(others.index(track), at.__getitem__)
+            for at in ([each.stops_m for each in others], [each.along_m or 0.0 for each in others])
+        )
+        then_m, now_m = (
+            math.inf if limit_m >= track.marcher.path.line.length_m else limit_m - along_m
+            for limit_m in limits_m
+        )
+        soon_m = track.marcher.motion.stopping_m(max(0.0, now_m) / _SOON_S, _SOON_S)
+        track.room_m = min(then_m, soon_m)
+        track.free_m = now_m + self._nearest_m - self.floor_m
 
     def _delay_m(self, track: _Track, other: _Track) -> float:
         """How far a member that can go on has fallen behind another one."""
-        needed_m = track.marcher.motion.short_m(self._march.speed_m_s)
+        motion, march_m_s = track.marcher.motion, self._march.speed_m_s
+        goes = track.room_m > motion.short_m(march_m_s)
         if track.marcher.member in self._steady:
-            needed_m = self._all_well_m(track) + _RESTART_SHARE * self._march.spacing_m
-        return min(_lag_m(track, other), 0.0 if track.room_m <= needed_m else math.inf)
+            needed_m = motion.stopping_m(march_m_s) + _RESTART_SHARE * self.spacing_m
+            goes = self._steady_free_m(track) >= needed_m
+        return min(_lag_m(track, other), math.inf if goes else 0.0)
 
-    def _all_well_m(self, track: _Track) -> float:
-        """The room that a member without variable speed needs to go on."""
-        stopping_m = track.marcher.motion.stopping_m(
-            self._march.speed_m_s, REACTION_S * REACTION_SHARE
-        )
-        return stopping_m / _HARD_BRAKING
+    def _steady_free_m(self, track: _Track) -> float:
+        """How far a member without variable speed may go on, to stop from the march's speed."""
+        motion, march_m_s = track.marcher.motion, self._march.speed_m_s
+        braked_m = motion.stopping_m(march_m_s, _SOON_S) / _HARD_BRAKING
+        return min(track.free_m, track.room_m - braked_m + motion.stopping_m(march_m_s))
 
-    def _speed(self, track: _Track, before: list[_Track], waits_m: float) -> float:
+    def _speed(self, track: _Track, lead: _Track, waits_m: float) -> float:
         """`waits_m`: how far the slowest other member has fallen back behind this one."""
         march_m_s, slack = self._march.speed_m_s, self._slack_m
-        lag_m = _lag_m(track, before[0]) if before else 0.0
+        lag_m = _lag_m(track, lead)
         if lag_m < 0:  # it does not wait for one that cannot go on
-            lag_m = -self._delay_m(before[0], track)
-        free_m = self._free_m(track, before)
+            lag_m = -self._delay_m(lead, track)
         motion = track.marcher.motion
         if track.marcher.member not in self._steady:
             speed = min(march_m_s * (1 + lag_m / slack), march_m_s * (2 - waits_m / slack))
-            room_m_s = motion.safe_m_s(track.room_m, REACTION_S * REACTION_SHARE)
-            return self._graded(track, min(speed, motion.safe_m_s(free_m), room_m_s))
+            room_m_s = motion.safe_m_s(track.room_m, _SOON_S)
+            return self._graded(track, min(speed, motion.safe_m_s(track.free_m), room_m_s))
         needed_m = motion.stopping_m(march_m_s)
-        free_m = min(free_m, track.room_m - self._all_well_m(track) + needed_m)
+        free_m = self._steady_free_m(track)
         if track.stands:
             wide = free_m >= needed_m + _RESTART_SHARE * self._march.spacing_m
             goes = wide and lag_m >= -slack / 2 and waits_m <= slack
         else:
             goes = free_m > needed_m and lag_m > -slack and waits_m <= 2 * slack
         return march_m_s if goes else 0.0
-
-    def _free_m(self, track: _Track, before: list[_Track]) -> float:
-        """The distance to go until it is too near to a member ahead in its lane that stops now."""
-        gaps = [
-            other.mark_m - track.mark_m
-            for other in before
-            if lane_mates(other.marcher, track.marcher, self._march.spacing_m)
-        ]
-        return min(gaps, default=math.inf) - self.floor_m
 
     def _graded(self, track: _Track, speed_m_s: float) -> float:
         share = START_SHARE if track.stands else _CRAWL_SHARE

@@ -2,7 +2,8 @@
 
 import math
 from bisect import bisect_left
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import accumulate, chain, pairwise
 
 from m2pem.geo.local_frame import EastNorth
 from m2pem.geo.polyline import EastNorthUp, Polyline, Segment, shifted, trimmed
@@ -68,18 +69,36 @@ _WRONG_WAY_M = 10.0
 """What a path in the opposite direction seems farther away, to one who looks along it."""
 
 
+_BEND_RADIUS_M, _FARTHEST_MISS_M = 10.0, 3.5
+_SMALLEST_RADIUS_M, _SHARPEST_BEND_RAD = 0.5, math.radians(150)
+"""Vehicles round corners, at most so far from the corner; in sharper ones they turn on the spot."""
+
+_BEND_PARTS = 4
+
+
 class MemberPath:
     """A member's places in a row. `marks_m`: how far each is along the team's route.
-    `line`: the `places`, without their heights.
+
+    `line`: its path, which rounds corners as vehicles do; `corners_m`: how far along it the places
+    are. `rows`: metres along it, and where a vehicle is then that rounds no corners, or does.
 
     On a bend the outer of two paths is longer, but both have the same marks at its ends: members
     that are abreast have the same mark.
     """
 
     def __init__(self, places: Sequence[EastNorthUp], marks: Sequence[float]) -> None:
-        self.places = tuple(places)
-        self.line = Polyline((east, north) for east, north, _ in places)
-        self.marks_m = tuple(marks)
+        self.places, self.marks_m = tuple(places), tuple(marks)
+        level = [each[:2] for each in places]
+        legs = pairwise(Polyline(level).segments)
+        arcs = [level[:1], *(_arc(before, after) for before, after in legs), level[1:][-1:]]
+        self.line = Polyline(chain(*arcs))
+        self.corners_m, self.rows = [], []
+        begins = accumulate(map(len, arcs), initial=0)
+        for begin, arc, corner in zip(begins, arcs, level, strict=False):
+            half, last = len(arc) // 2, len(arc) - 1
+            for index, place in ((0, arc[0]), (half, corner), (last, arc[last])):
+                self.rows.append((self.line.marks_m[begin + index], *place, *arc[index]))
+            self.corners_m.append(self.line.marks_m[begin + half])
 
     @property
     def end_mark_m(self) -> float:
@@ -88,66 +107,76 @@ class MemberPath:
 
     def rest(self, place: EastNorth, along_m: float) -> list[EastNorthUp]:
         """Return the places ahead of a member that is at `place`, which is the first."""
-        index = self.line.segment_at(along_m)
-        return [(*place, self.places[index][2]), *self.places[index + 1 :]]
+        index = bisect_left(self.corners_m, along_m, 1, len(self.corners_m) - 1)
+        return [(*place, self.places[index - 1][2]), *self.places[index:]]
 
     def onward(self, places: Sequence[EastNorthUp]) -> "MemberPath":
         """Return another path to the end of this one, or to a place before it."""
         line = Polyline((east, north) for east, north, _ in places)
-        end_m = self.mark_m(min(self.find(line.points[-1], None, 0.0), self.line.length_m))
+        end_m = self.mark_m(min(self.find(line.points[-1]), self.line.length_m))
         return MemberPath(places, [end_m - line.length_m + mark_m for mark_m in line.marks_m])
 
     def find(
         self,
         place: EastNorth,
-        near_m: float | None,
-        ahead_m: float,
+        near_m: float | None = None,
+        ahead_m: float = 0.0,
         yaw_rad: float | None = None,
-        course_rad: float | None = None,
     ) -> float:
         """How far along this path a place is, in metres of the path.
 
         `near_m`: where it was before, and it is at most `ahead_m` farther now, so that a path that
-        crosses itself is not cut short. None, or one who has strayed: anywhere. `course_rad`, where
-        it moves (from east, counter-clockwise), distinguishes the way there from the way back;
-        anywhere, `yaw_rad` does.
+        crosses itself is not cut short. None, or one who has strayed: anywhere. `yaw_rad`, where it
+        moves (from east, counter-clockwise), distinguishes the way there from the way back.
         """
         if near_m is not None:
             feet = self.line.feet(place, near_m - _BEHIND_M, near_m + ahead_m)
-            _, off_m, found_m = min(
-                (
-                    (off_m + _wrong_way_m(leg, course_rad), off_m, along_m)
-                    for along_m, off_m, leg in feet
-                ),
-                default=(math.inf, math.inf, 0.0),
-            )
+            _, off_m, along_m = min(_seen(feet, yaw_rad), default=(0.0, math.inf, 0.0))
             if off_m <= _STRAY_M:
-                return found_m
-        feet = self.line.feet(place)
-        seems = ((off_m + _wrong_way_m(leg, yaw_rad), along_m) for along_m, off_m, leg in feet)
-        return min(seems, default=(0.0, 0.0))[1]
+                return along_m
+        return min(_seen(self.line.feet(place), yaw_rad), default=(0.0, 0.0, 0.0))[2]
 
     def mark_m(self, along_m: float) -> float:
         """How far along the team's route that is."""
-        index = self.line.segment_at(along_m)
-        begin_m, length_m = self.line.marks_m[index], self.line.segments[index].length_m
-        part = (along_m - begin_m) / length_m if length_m else 1.0
-        a, b = self.marks_m[index], self.marks_m[index + 1]
-        return a + (b - a) * min(1.0, max(0.0, part))
+        return _interpolated(along_m, self.corners_m, self.marks_m)
 
     def along_m(self, mark_m: float) -> float:
         """How far along this path the place with that mark is."""
-        index = bisect_left(self.marks_m, mark_m, 1, len(self.marks_m) - 1)
-        a, b = self.marks_m[index - 1 : index + 1]
-        part = (mark_m - a) / (b - a) if b > a else 1.0
-        begin_m, end_m = self.line.marks_m[index - 1 : index + 1]
-        return begin_m + (end_m - begin_m) * min(1.0, max(0.0, part))
+        return _interpolated(mark_m, self.marks_m, self.corners_m)
 
     def off_m(self, place: EastNorth, along_m: float) -> float:
         """How far a place is from that one of the path."""
         return math.dist(place, self.line.at(along_m))
 
 
-def _wrong_way_m(leg: Segment, yaw_rad: float | None) -> float:
-    opposite = yaw_rad is not None and math.cos(yaw_rad - leg.yaw_rad) < 0
-    return _WRONG_WAY_M if opposite else 0.0
+def _seen(
+    feet: Iterable[tuple[float, float, Segment]], yaw_rad: float | None
+) -> Iterator[tuple[float, float, float]]:
+    """Yield how far away each foot seems to one who moves so, how far it is, and where it is."""
+    for along_m, off_m, leg in feet:
+        turned = 0.0 if yaw_rad is None else (1 - math.cos(yaw_rad - leg.yaw_rad)) / 2
+        yield off_m + _WRONG_WAY_M * turned, off_m, along_m
+
+
+def _interpolated(at: float, from_m: Sequence[float], to_m: Sequence[float]) -> float:
+    index = bisect_left(from_m, at, 1, len(from_m) - 1)
+    a, b = from_m[index - 1 : index + 1]
+    part = min(1.0, max(0.0, (at - a) / (b - a))) if b > a else 1.0
+    return to_m[index - 1] + (to_m[index] - to_m[index - 1]) * part
+
+
+def _arc(before: Segment, after: Segment) -> list[EastNorth]:
+    """Return the places of the bend between two segments; of none, the corner."""
+    turn = math.remainder(after.yaw_rad - before.yaw_rad, math.tau)
+    half = max(1e-6, abs(turn) / 2)
+    radius_m = min(_BEND_RADIUS_M, _FARTHEST_MISS_M / (1 / math.cos(half) - 1))
+    cut_m = min(radius_m * math.tan(half), before.length_m / 2, after.length_m / 2)
+    radius_m = cut_m / math.tan(half)
+    if half > _SHARPEST_BEND_RAD / 2 or radius_m < _SMALLEST_RADIUS_M:
+        return [after.start]
+    begin = before.at(before.length_m - cut_m)
+    sweeps = [turn * part / _BEND_PARTS for part in range(_BEND_PARTS + 1)]
+    return [
+        Segment(begin, before.yaw_rad + sweep / 2, 0.0).at(2 * radius_m * math.sin(abs(sweep) / 2))
+        for sweep in sweeps
+    ]

@@ -3,14 +3,15 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import TypeAlias
 
 from m2pem.api.arbiter import ResolvedValue
 from m2pem.api.behavior_parameters import BehaviorParameters
 from m2pem.fleet.parameters import accepted
-from m2pem.geo.local_frame import EastNorth, LocalFrame
+from m2pem.geo.local_frame import EastNorth, LatLon, LocalFrame
 from m2pem.geo.polyline import EastNorthUp
 from m2pem.mission.catalogue import BehaviorSpec, ResourceId
-from m2pem.mission.geometry import Coordinate, Point, Route, VehiclePosition
+from m2pem.mission.geometry import Area, Coordinate, Point, Route, VehiclePosition
 from m2pem.teams.paths import MemberPath
 
 REACTION_S = 1.0
@@ -63,8 +64,21 @@ MAX_RANGE_M = 100_000.0
 _FLYING_OR_DIVING = ("air", "subsurface")
 
 
+Meeting: TypeAlias = tuple[str, str, LatLon | None]
+"""Where members would come too near to each other: a text, what to do, and the place."""
+
+NO_MEETING: Meeting = "", "", None
+
+
 class TeamRefusedError(Exception):
-    """The team cannot carry the behavior out; the text names the member or the parameter."""
+    """The team cannot carry the behavior out; the text names the member or the parameter.
+
+    `place`: where, if the text says that.
+    """
+
+    def __init__(self, text: str, place: LatLon | None = None) -> None:
+        super().__init__(text)
+        self.place = place
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,13 +106,16 @@ class Marcher:
 class March:
     """Members that move along one route and keep their places to each other, the lead first.
 
-    `closes`: the members behind a lost one move up.
+    `closes`: the members behind a lost one move up. `frame`: of the places; `fence`: the area that
+    no vehicle may leave.
     """
 
     marchers: tuple[Marcher, ...]
     spacing_m: float
     speed_m_s: float
-    closes: bool = False
+    closes: bool
+    frame: LocalFrame
+    fence: Area | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,7 +157,8 @@ class PlanningContext:
     `poses`: the members' poses. `target`: the pose of the vehicle that the parameter `target`
     names. `begun`: the members are on the route already (after a restart), with the shares of
     `split`. `cruises_m_s`: the members' cruise speeds that the fleet states. `lasts_s`: the time
-    that members can still move, where the fleet states their endurance.
+    that members can still move, where the fleet states their endurance. `fence`: the area that no
+    vehicle may leave.
     """
 
     members: tuple[ResourceId, ...]
@@ -154,6 +172,7 @@ class PlanningContext:
     cruises_m_s: Mapping[ResourceId, float] = field(default_factory=dict)
     lasts_s: Mapping[ResourceId, float] = field(default_factory=dict)
     split: tuple[float, ...] = ()
+    fence: Area | None = None
 
     def target_place(self) -> tuple[float, float]:
         """Return the present place of `target`, east and north in metres.

@@ -14,6 +14,7 @@ from m2pem.fleet.endurance import lasts_s
 from m2pem.fleet.fleet import Fleet
 from m2pem.geo.local_frame import LocalFrame
 from m2pem.mission.catalogue import ResourceId
+from m2pem.mission.geometry import Area
 from m2pem.teams.areas import escort, observe, survey
 from m2pem.teams.capabilities import Capabilities
 from m2pem.teams.columns import march, one_by_one
@@ -102,6 +103,7 @@ class TeamSituation:
         if parameters.target_vehicle is not None:
             seen = self.look(ResourceId(parameters.target_vehicle), frame)
         vehicles = {each: self._fleet.vehicles[each] for each in request.resources}
+        fence = self._fleet.geometries.get(self._fleet.fence)
         context = PlanningContext(
             request.resources,
             {each: vehicle.domain.value for each, vehicle in vehicles.items()},
@@ -118,6 +120,7 @@ class TeamSituation:
                 if vehicle.endurance_s
             },
             split,
+            fence if isinstance(fence, Area) else None,
         )
         return TeamPlan(PLANS[request.behavior](context), frame)
 

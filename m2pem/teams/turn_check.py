@@ -14,28 +14,30 @@ from m2pem.mission.behavior import Behavior, BehaviorType
 from m2pem.mission.elements import ScriptTask, SendTask, ServiceTask
 from m2pem.mission.geometry import Route
 from m2pem.mission.mission import Mission
-from m2pem.teams.columns import turns
-from m2pem.teams.paths import SHAPES, SPACING_M
-from m2pem.teams.plan import PlanningContext, TeamRefusedError
+from m2pem.teams.paths import SHAPES
+from m2pem.teams.plan import NO_MEETING, Meeting, PlanningContext, TeamRefusedError
 
 
 def check_turns(mission: Mission, fleet: Fleet) -> Iterator[Finding]:
     """Yield a warning for each route that brings members of a team too near to each other."""
     for task in mission.activities():
-        if not isinstance(task, ScriptTask | ServiceTask | SendTask) or task.behavior is None:
-            continue
-        behavior = task.behavior
-        if behavior.type is BehaviorType.TEAM and behavior.name in SHAPES:
-            findings = TaskFindings(mission.file_of(task), task)
-            said, remedy = _turns(behavior, mission, fleet)
+        behavior = task.behavior if isinstance(task, ScriptTask | ServiceTask | SendTask) else None
+        if behavior is not None and behavior.type is BehaviorType.TEAM and behavior.name in SHAPES:
+            said, remedy, place = _turns(behavior, mission, fleet)
             if said:
-                findings.add(
-                    "members-meet", said, remedy, line=behavior.line, severity=Severity.WARNING
+                yield TaskFindings(mission.file_of(task), task).add(
+                    "members-meet",
+                    said,
+                    remedy,
+                    line=behavior.line,
+                    severity=Severity.WARNING,
+                    place=place,
                 )
-            yield from findings.found
 
 
-def _turns(behavior: Behavior, mission: Mission, fleet: Fleet) -> tuple[str, str]:
+def _turns(behavior: Behavior, mission: Mission, fleet: Fleet) -> Meeting:
+    from m2pem.teams.columns import turns  # noqa: PLC0415  # loads NumPy
+
     given = {each.name: each.value for each in behavior.parameters}
     spec = SHARED[behavior.name, BehaviorType.TEAM]
     geometry = {**fleet.geometries, **mission.geometries}.get
@@ -43,31 +45,20 @@ def _turns(behavior: Behavior, mission: Mission, fleet: Fleet) -> tuple[str, str
     route = values.get("route")
     shaping = ("shape", "spacing", "offsets")
     known = all(isinstance(given.get(name, ""), str) for name in shaping)
+    roles = [role for role in behavior.roles if role.resource]
+    members = [fleet.vehicles.get(each) for role in roles for each in resources_of(role, fleet)]
+    vehicles = [each for each in members if each is not None]
     if problems or not known or not isinstance(route, Route):
-        return "", ""
-    members = tuple(
-        each
-        for role in behavior.roles
-        if role.resource
-        for each in resources_of(role, fleet)
-        if each in fleet.vehicles
-    )
+        return NO_MEETING
     context = PlanningContext(
-        members,
-        {each: fleet.vehicles[each].domain.value for each in members},
-        {each: {} for each in members},
+        tuple(each.id for each in vehicles),
+        {each.id: each.domain.value for each in vehicles},
+        {each.id: {} for each in vehicles},
         BehaviorParameters(values),
         LocalFrame(route.waypoints[0][:2]),
     )
-    apart_m = max(
-        (fleet.surface_separation_m.get(fleet.vehicles[m].domain, 0.0) for m in members),
-        default=0.0,
-    )
-    spacing_m = context.parameters.spacing_m or SPACING_M
-    if "offsets" not in given and len(members) > 1 and 0.8 * spacing_m < apart_m:
-        said = f"parameter 'spacing': members come within {0.8 * spacing_m:g} m of each other"
-        return f"{said}, below the fleet's separation of {apart_m:g} m", "set a larger spacing"
+    least_m = (fleet.surface_separation_m.get(each.domain, 0.0) for each in vehicles)
     try:
-        return turns(context, behavior.name)
+        return turns(context, behavior.name, max(least_m, default=0.0))
     except (TeamRefusedError, KeyError):  # it is refused for another reason
-        return "", ""
+        return NO_MEETING

@@ -250,7 +250,6 @@ def test_a_formation_takes_the_offsets_of_its_author() -> None:
     ("wished", "why"),
     [
         ({"offsets": "[[10, 5]]"}, "there are 1 for 2 members after the lead"),
-        ({"offsets": "[[10, 0], [-10, 0]]"}, "c would be ahead of a in its lane"),
         ({"offsets": "[[10, 0], [10, 5]]", "shape": "line"}, "it says what 'shape' says, too"),
     ],
 )
