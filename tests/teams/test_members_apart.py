@@ -7,6 +7,7 @@ from itertools import combinations
 from random import Random
 
 import pytest
+import shapely
 
 from m2pem.api.clock import SystemClock
 from m2pem.bpmn import parse_mission
@@ -16,13 +17,14 @@ from m2pem.executive.loading import findings_for
 from m2pem.findings import Finding, Severity
 from m2pem.fleet.fleet import Domain, Fleet, LostMemberPolicy
 from m2pem.mission.catalogue import BehaviorState
+from m2pem.mission.geometry import Area
 from m2pem.plugins import PluginManager
 from m2pem.simulation.faults import Fault
 from m2pem.testing.contracts.arbiter_harness import context
 from tests.seeds import named
 
 from .carts import FRAME
-from .conftest import one_task, route
+from .conftest import area, one_task, route
 from .rehearsed import Rehearsed, rehearsed, sim_fleet
 
 NAMES = "abcde"
@@ -114,6 +116,7 @@ class Judged:
     when_s: dict[tuple[str, str], float]
     seconds: float
     least_m: float
+    tracks: dict[str, list[tuple[float, float]]] = field(repr=False)
 
 
 def places_of(world: Rehearsed) -> dict[str, tuple[float, float]]:
@@ -133,18 +136,20 @@ def judged(fleet: Fleet, mission: bytes, *faults: tuple[str, Fault]) -> Judged:
             for (a, one), (b, other) in combinations(places_of(world).items(), 2)
         }
         nearest, when = dict(begun), dict.fromkeys(begun, 0.0)
+        tracks: dict[str, list[tuple[float, float]]] = {name: [] for name in places_of(world)}
         await world.executive.control.start(mission)
         for _ in range(10 * 7200):
             places = places_of(world)
+            for name, place in places.items():
+                tracks[name].append(place)
             for (a, b), least_m in nearest.items():
                 if (apart_m := math.dist(places[a], places[b])) < least_m:
                     nearest[a, b] = apart_m
                     when[a, b] = (world.clock.now_us() - start_us) / 1e6
             if world.ended():
                 seconds = (world.clock.now_us() - start_us) / 1e6
-                return Judged(
-                    world.ended()[0], nearest, begun, when, seconds, min(nearest.values())
-                )
+                least_m = min(nearest.values())
+                return Judged(world.ended()[0], nearest, begun, when, seconds, least_m, tracks)
             await world.clock.sleep(0.1)
         raise AssertionError(f"it had not ended in two hours; {places_of(world)}")
 
@@ -167,18 +172,17 @@ def check(seed: int) -> None:
         found = judged(case.fleet(), case.mission)
         if not refused(found):
             assert found.ended.state is BehaviorState.SUCCEEDED, (case, found)
-            least = 0.8 if case.shape == "column" else 0.75  # beside each other, in short legs
-            assert found.least_m >= least * case.spacing_m, (case, found)
+            assert found.least_m >= 0.8 * case.spacing_m, (case, found)
 
 
-@pytest.mark.parametrize("seed", [0, 2, 12, 18, 23, 27, 51, 99, 107, 112, 210, 268])
+@pytest.mark.parametrize("seed", [0, 2, 12, 16, 18, 27, 34, 46, 51, 82, 107, 137, 210, 215, 268])
 def test_members_keep_apart_on_any_route_or_say_before_that_they_cannot(seed: int) -> None:
     check(seed)
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("first", range(0, 300, 25))
-def test_members_keep_apart_on_three_hundred_routes(first: int) -> None:
+@pytest.mark.parametrize("first", range(0, 600, 25))
+def test_members_keep_apart_on_six_hundred_routes(first: int) -> None:
     for seed in range(first, first + 25):
         check(seed)
 
@@ -192,19 +196,19 @@ def check_lost(seed: int) -> None:
         found = judged(case.fleet(LostMemberPolicy.CONTINUE), case.mission, (victim, fault))
         if refused(found):
             return
-        assert found.least_m >= 0.75 * case.spacing_m, (case, victim, found)
+        assert found.least_m >= 0.8 * case.spacing_m, (case, victim, found)
         if found.ended.state is BehaviorState.FAILED:
             assert "cannot" in found.ended.reason or len(case.names) == 1, found.ended
 
 
-@pytest.mark.parametrize("seed", [3, 25, 51, 60, 62, 92])
+@pytest.mark.parametrize("seed", [3, 16, 25, 34, 51, 60, 62, 82, 92])
 def test_nobody_drives_over_a_lost_member(seed: int) -> None:
     check_lost(seed)
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("first", range(0, 100, 25))
-def test_nobody_drives_over_a_lost_member_on_a_hundred_routes(first: int) -> None:
+@pytest.mark.parametrize("first", range(0, 200, 25))
+def test_nobody_drives_over_a_lost_member_on_two_hundred_routes(first: int) -> None:
     for seed in range(first, first + 25):
         check_lost(seed)
 
@@ -226,18 +230,19 @@ def test_a_column_that_would_meet_itself_is_refused_with_the_corner(
     case = column(places)
     found = judged(case.fleet(), case.mission)
     assert refused(found)
-    assert "it turns by 180 degrees" in found.ended.reason
     latitude, longitude = map(float, found.ended.reason.split("[")[1].split("]")[0].split(", "))
     corner = FRAME.to_local((latitude, longitude))
     assert min(math.dist(corner, place) for place in places[1:-1]) < 0.2
     (finding,) = checked(case)
     assert (finding.rule, finding.severity) == ("members-meet", Severity.WARNING)
     assert found.ended.reason in finding.message
+    assert finding.place is not None
+    assert math.dist(FRAME.to_local(finding.place), corner) < 0.2
 
 
-@pytest.mark.parametrize(("places", "turn_deg"), [(SHARP, 150), (SPUR, 180)])
+@pytest.mark.parametrize(("places", "within_m"), [(SHARP, 5.1), (SPUR, 0.0)])
 def test_a_column_passes_a_sharp_turn_one_after_the_other_and_check_says_so(
-    places: list[tuple[float, float]], turn_deg: int
+    places: list[tuple[float, float]], within_m: float
 ) -> None:
     case = column(places)
     found = judged(case.fleet(), case.mission)
@@ -245,8 +250,38 @@ def test_a_column_passes_a_sharp_turn_one_after_the_other_and_check_says_so(
     assert found.least_m >= 16
     (finding,) = checked(case)
     assert finding.rule == "members-meet"
-    assert f"it turns by {turn_deg} degrees" in finding.message
+    assert f"would come within {within_m} m" in finding.message
     assert "one after the other" in finding.remedy
+    assert finding.place is not None
+    assert min(math.dist(FRAME.to_local(finding.place), each) for each in places[1:-1]) < 0.2
+
+
+@pytest.mark.parametrize(
+    ("offsets", "starts_m"),
+    [("[[20, 0], [40, 0]]", (-10, -30, -50)), ("[[20, 0], [-20, 0]]", (-30, -50, -10))],
+)
+def test_offsets_keep_apart_at_a_sharp_turn_and_check_says_so(
+    offsets: str, starts_m: tuple[float, ...]
+) -> None:
+    starts = {name: (east_m, 0.0) for name, east_m in zip("abc", starts_m, strict=True)}
+    fleet = sim_fleet(starts, {"way": route(*SHARP)})
+    mission = one_task("formation", route="way", offsets=offsets)
+    found = judged(fleet, mission)
+    assert found.ended.state is BehaviorState.SUCCEEDED, found
+    assert found.least_m >= 16, found
+    (finding,) = checked_in(fleet, mission)
+    assert finding.rule == "members-meet"
+    assert finding.place is not None
+    assert math.dist(FRAME.to_local(finding.place), SHARP[1]) < 0.2
+
+
+@pytest.mark.parametrize("given", [{"spacing": "20 m"}, {"offsets": "[[20, 0], [40, 5]]"}])
+def test_check_finds_a_spacing_below_the_separation_of_the_fleet(given: dict[str, str]) -> None:
+    fleet = column([(0.0, 0.0), (200.0, 0.0)], 3).fleet()
+    mission = one_task("formation", route="way", **given)
+    assert checked_in(fleet, mission) == []
+    (finding,) = checked_in(replace(fleet, surface_separation_m={Domain.GROUND: 18.0}), mission)
+    assert f"parameter '{next(iter(given))}': members come within 16" in finding.message
 
 
 def test_check_finds_nothing_where_members_keep_apart() -> None:
@@ -262,6 +297,44 @@ def test_a_column_goes_around_the_member_that_it_has_lost() -> None:
     assert found.least_m >= 16
 
 
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize("hole", [False, True])
+def test_a_way_around_a_lost_member_keeps_to_the_fence(side: int, hole: bool) -> None:
+    """The fence is near on one side; on the other one, it is wide, or has a hole."""
+    outer = [
+        (-90.0, -12.0 * side),
+        (290.0, -12.0 * side),
+        (290.0, 90.0 * side),
+        (-90.0, 90.0 * side),
+    ]
+    inner = [(x, y * side) for x, y in ((100.0, 15.0), (180.0, 15.0), (180.0, 50.0), (100.0, 50.0))]
+    found = fenced(shapely.Polygon(outer).difference(shapely.Polygon(inner if hole else [])))
+    assert found.ended.state is BehaviorState.SUCCEEDED, found
+    assert found.ended.reason.startswith("without b (LINK_LOST")
+    assert found.least_m >= 16, found
+    assert max(abs(north) for _, north in found.tracks["c"]) > 15, "it went around"
+
+
+def test_a_team_fails_where_no_way_within_the_fence_leads_around_a_lost_member() -> None:
+    found = fenced(shapely.box(-90.0, -12.0, 290.0, 12.0))
+    assert found.ended.state is BehaviorState.FAILED, found
+    assert found.ended.reason == "c cannot go around b, which is lost"
+    assert found.least_m >= 16, found
+
+
+def fenced(fence: shapely.Polygon) -> Judged:
+    """A column within a fence loses its second member; no vehicle leaves the fence."""
+    fleet = column([(0.0, 0.0), (250.0, 0.0)], 3).fleet(LostMemberPolicy.CONTINUE)
+    rings = [[(x, y) for x, y in each.coords[:-1]] for each in (fence.exterior, *fence.interiors)]
+    yard = Area(tuple(area(*ring).rings[0] for ring in rings))
+    fleet = replace(fleet, fence="yard", geometries={**fleet.geometries, "yard": yard})
+    case = column([(0.0, 0.0), (250.0, 0.0)], 3)
+    found = judged(fleet, case.mission, ("b", Fault("lose_link", after_s=30.0)))
+    for track in found.tracks.values():
+        assert shapely.LineString(track).difference(fence.buffer(0.1)).length < 0.1
+    return found
+
+
 def test_nobody_crosses_a_bridge_on_which_a_member_was_lost() -> None:
     case = replace(column([(0.0, 0.0), (200.0, 0.0)], 3), behavior="bridge_crossing")
     lost = "a", Fault("lose_link", after_s=10.0)
@@ -273,6 +346,10 @@ def test_nobody_crosses_a_bridge_on_which_a_member_was_lost() -> None:
 
 def checked(case: Case) -> list[Finding]:
     """What `m2pem check` finds."""
-    fleet, plugins = case.fleet(), PluginManager(block=("all",))
+    return checked_in(case.fleet(), case.mission)
+
+
+def checked_in(fleet: Fleet, mission: bytes) -> list[Finding]:
+    plugins = PluginManager(block=("all",))
     connected = FleetArbiters(fleet, plugins, context(SystemClock()))
-    return findings_for(parse_mission(case.mission, "m.bpmn"), connected, plugins)
+    return findings_for(parse_mission(mission, "m.bpmn"), connected, plugins)
