@@ -209,6 +209,12 @@ def _drawn(
     ]
 
 
+_NO_WAY = (
+    "cannot come to its place in the formation: it and others are in each other's ways; let the"
+    " members begin in the formation's order (a goto for each before), or name them in another one"
+)
+
+
 def _keep_ends_apart(context: PlanningContext, ways: Sequence[_Way], spacing_m: float) -> None:
     """Let members end earlier that would come too near to those at their ends.
 
@@ -230,6 +236,12 @@ def _keep_ends_apart(context: PlanningContext, ways: Sequence[_Way], spacing_m: 
             if not context.begun and too_far:
                 _, place, text = _meeting(context, ways)
                 text = f"{text}, and {way.member} cannot wait until it is free: {_REMEDY}"
+                alone = [each.marcher() for each in ways]  # without their ways to the route
+                ends_m = [each.path.line.length_m for each in alone]
+                begins_m = [0.0] * len(ways)
+                clearance = Clearance(alone, NEAREST_SHARE * spacing_m)
+                if [*clearance.reached_m(begins_m, ends_m, short_m)] == ends_m:
+                    text = f"{way.member} {_NO_WAY}"
                 raise TeamRefusedError(text, place)
             if by_m and not too_far:
                 way.shorten(by_m)

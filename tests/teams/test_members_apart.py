@@ -161,7 +161,8 @@ def refused(found: Judged) -> bool:
     """Whether the team has said that it cannot, before anybody moved."""
     if found.ended.code != "REJECTED":
         return False
-    assert "would come within" in found.ended.reason, found.ended
+    said = ("would come within", "in each other's ways")
+    assert any(each in found.ended.reason for each in said), found.ended
     assert found.nearest_m == found.begun_m
     return True
 
@@ -353,3 +354,13 @@ def checked_in(fleet: Fleet, mission: bytes) -> list[Finding]:
     plugins = PluginManager(block=("all",))
     connected = FleetArbiters(fleet, plugins, context(SystemClock()))
     return findings_for(parse_mission(mission, "m.bpmn"), connected, plugins)
+
+
+def test_members_in_each_others_ways_to_the_route_are_refused_with_what_to_do() -> None:
+    places = [(0.0, 0.0), (200.0, 0.0), (200.0, 200.0)]
+    case = column(places, 3)
+    starts = {"a": (40.0, 0.0), "b": (20.0, 0.0), "c": (0.0, 5.0)}
+    found = judged(sim_fleet(starts, {"way": route(*places)}), case.mission)
+    assert found.ended.code == "REJECTED"
+    assert "are in each other's ways" in found.ended.reason
+    assert found.nearest_m == found.begun_m
