@@ -8,7 +8,8 @@ from itertools import combinations
 import numpy as np
 
 from m2pem.fleet.parameters import read_offsets
-from m2pem.geo.local_frame import LatLon
+from m2pem.geo.fence import Fence
+from m2pem.geo.local_frame import EastNorth, LatLon
 from m2pem.geo.polyline import EastNorthUp, Polyline, Segment
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.geometry import Route
@@ -101,7 +102,7 @@ def turns(context: PlanningContext, behavior: str, least_m: float) -> Meeting:
         _ways(context, route, places, spacing)
     except TeamRefusedError as error:
         return str(error), "", error.place
-    distance_m, place, text = _meeting(context, _drawn(context, route, places))
+    distance_m, place, text = _meeting(context, _drawn(context, route, places, spacing))
     if distance_m >= GAP_SHARE * spacing or behavior == "bridge_crossing":
         return NO_MEETING
     remedy = f"the members pass it one after the other, or else {_REMEDY}"
@@ -117,9 +118,13 @@ class _Way:
     """A member's route: the team's, shifted sideways and shortened by its distance behind."""
 
     def __init__(
-        self, member: ResourceId, route: Sequence[EastNorthUp], place: tuple[float, float]
+        self,
+        member: ResourceId,
+        route: Sequence[EastNorthUp],
+        place: tuple[float, float],
+        spacing_m: float,
     ) -> None:
-        self.member = member
+        self.member, self._spacing_m = member, spacing_m
         self._back_m, self._left_m = place
         self._route = route
         self._route_marks_m = Polyline(each[:2] for each in route).marks_m
@@ -135,11 +140,38 @@ class _Way:
         begin = context.begin(self.member) if context is not None else None
         motion = context.motion(self.member) if context is not None else MOTIONS["ground"]
         if begin is not None:
-            first = math.dist(begin, kept[0][:2])
-            kept, marks = [(*begin, 0.0), *kept], [marks[0] - first, *marks]
+            way = [(*begin, 0.0), *((*each, 0.0) for each in self._via(context)), kept[0]]
+            line = Polyline(each[:2] for each in way)
+            first_m = marks[0] - line.length_m
+            kept = [*way, *kept[1:]]
+            marks = [*(first_m + each for each in line.marks_m), *marks[1:]]
         elif len(kept) == 1:
             kept, marks = [*kept, *kept], [*marks, *marks]
         return Marcher(self.member, MemberPath(kept, marks), self._back_m, self._left_m, motion)
+
+    def _via(self, context: PlanningContext | None) -> Sequence[EastNorth]:
+        """The places to pass on the way to the route, around where those behind it begin."""
+        begin = None if context is None else context.begin(self.member)
+        if context is None or begin is None:
+            return ()
+        apart_m = NEAREST_SHARE * self._spacing_m
+        behind = context.members[context.members.index(self.member) + 1 :]
+        others = [context.begin(each) for each in behind]
+        ends = begin, self._places[0][:2]
+        discs = [
+            [*ring, ring[0]]
+            for each in others
+            if each is not None and min(math.dist(each, end) for end in ends) > apart_m
+            for ring in [
+                [beside(each, math.tau * k / 16, apart_m * 1.03, 0.0)[:2] for k in range(16)]
+            ]
+        ]
+        via = (Fence.around(discs).way(*ends) or ()) if discs else ()
+        track = [begin, *via, ends[1]]
+        fenced = via and context.fence is not None
+        if fenced and Fence(context.fence, frame=context.frame).leaves(track):
+            return ()
+        return via
 
     def shorten(self, by_m: float) -> None:
         """Let it end so much earlier, or a little more."""
@@ -152,9 +184,10 @@ class _Way:
         if len(self._places) < 2 or route is None:
             return context.to_place(self.member, self._places[0], after=after)
         ups = [waypoint[2] for waypoint in _apart(context, route)]
+        via = [(*each, self._places[0][2]) for each in self._via(context)]
         waypoints = tuple(
             context.coordinate(place, None if up is None else place[2])
-            for place, up in zip(self._places, ups, strict=False)
+            for place, up in zip([*via, *self._places], [*ups[:1] * len(via), *ups], strict=False)
         )
         parameters = {"route": Route(waypoints, route.altitude_frame), "speed": speed_m_s}
         return context.leg(self.member, "single_vehicle_routing", parameters, after)
@@ -189,13 +222,16 @@ def _ways(
     offsets: Sequence[tuple[float, float]],
     spacing_m: float,
 ) -> list[_Way]:
-    ways = _drawn(context, route, offsets)
+    ways = _drawn(context, route, offsets, spacing_m)
     _keep_ends_apart(context, ways, spacing_m)
     return ways
 
 
 def _drawn(
-    context: PlanningContext, route: Route, offsets: Sequence[tuple[float, float]]
+    context: PlanningContext,
+    route: Route,
+    offsets: Sequence[tuple[float, float]],
+    spacing_m: float,
 ) -> list[_Way]:
     if route.altitude_frames and context.parameters.altitude_m is None:
         raise TeamRefusedError(
@@ -204,7 +240,7 @@ def _drawn(
         )
     places = [(*context.level(each), each[2] or 0.0) for each in _apart(context, route)]
     return [
-        _Way(member, places, offset)
+        _Way(member, places, offset, spacing_m)
         for member, offset in zip(context.members, offsets, strict=False)
     ]
 

@@ -42,6 +42,7 @@ _HARD_BRAKING = 2.0
 """Vehicles brake at most so many times as hard as they do at least."""
 
 _LOOK_AHEAD_M = 50.0
+_HERE_M = 1.0
 
 _CRAWL_SHARE = 0.1
 """Share of the march's speed: a member stops below it, and starts again at `START_SHARE`."""
@@ -74,11 +75,14 @@ class _Track:
     arrived: bool = False
 
     def find(self, pose: MemberPose) -> float:
-        """Return how far along its path the member is."""
+        """Return how far along its path the member is: at the beginning, if it begins there."""
+        near_m, first = self.along_m, self.marcher.path.places[0]
+        if near_m is None and math.dist(pose.place, first[:2]) < _HERE_M:
+            near_m = 0.0
         moved_m = math.dist(pose.place, self.pose.place) if self.pose is not None else 0.0
         if pose.course_rad is None:
-            return self.marcher.path.find(pose.place, self.along_m, 2 * moved_m + 1, pose.yaw_rad)
-        return self.marcher.path.find(pose.place, self.along_m, _LOOK_AHEAD_M, pose.course_rad)
+            return self.marcher.path.find(pose.place, near_m, 2 * moved_m + 1, pose.yaw_rad)
+        return self.marcher.path.find(pose.place, near_m, _LOOK_AHEAD_M, pose.course_rad)
 
     def ahead(self, way_m: float = math.inf) -> "BaseGeometry":
         """Return its path from where it is, as far as that."""

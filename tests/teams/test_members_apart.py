@@ -364,3 +364,42 @@ def test_members_in_each_others_ways_to_the_route_are_refused_with_what_to_do() 
     assert found.ended.code == "REJECTED"
     assert "are in each other's ways" in found.ended.reason
     assert found.nearest_m == found.begun_m
+
+
+def scattered(case: Case, seed: int) -> Fleet:
+    """The members at random places around the route, in any order."""
+    random, starts = Random(seed), dict[str, tuple[float, float]]()
+    bounds = [(min(axis) - 60, max(axis) + 60) for axis in zip(*case.places, strict=True)]
+    for name in case.names:
+        while name not in starts:
+            place = random.uniform(*bounds[0]), random.uniform(*bounds[1])
+            if all(math.dist(place, each) >= 1.2 * case.spacing_m for each in starts.values()):
+                starts[name] = place
+    aloft = {"altitude": "30 m"} if case.domain is Domain.AIR else {}
+    return sim_fleet(
+        starts,
+        {"way": route(*case.places)},
+        domains=dict.fromkeys(case.names, case.domain),
+        settings={
+            name: {"max_speed": f"{speed} m/s"} | aloft
+            for name, speed in zip(case.names, case.speeds_m_s, strict=True)
+        },
+    )
+
+
+@pytest.mark.parametrize("seed", [1, 3, 4, 11, 16, 20, 34, 36])
+def test_members_that_begin_anywhere_keep_apart_on_their_ways_to_the_route(seed: int) -> None:
+    case = Case.of(seed)
+    with named(seed):
+        found = judged(scattered(case, seed + 1000), case.mission)
+        if not refused(found):
+            assert found.least_m >= 0.8 * case.spacing_m, (case, found)
+
+
+def test_a_lead_that_begins_at_the_end_of_the_route_comes_back_and_leads() -> None:
+    places = [(-621.5, -249.5), (-355.8, -414.2), (-120.2, -294.5), (-10.0, -59.8), (0.0, 0.0)]
+    starts = {"a": places[-1], "b": (-680.0, -280.0), "c": (-700.0, -290.0)}
+    case = Case("abc", "column", 20.0, places, Domain.GROUND)
+    found = judged(sim_fleet(starts, {"way": route(*places)}), case.mission)
+    assert found.ended.state is BehaviorState.SUCCEEDED, found
+    assert found.least_m >= 16
