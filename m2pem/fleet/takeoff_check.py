@@ -5,8 +5,7 @@ since. What may happen at the same time may have happened before. So a finding i
 an aircraft that is in the air when the run begins: it is a warning.
 """
 
-from collections.abc import Collection, Iterator, Mapping
-from itertools import chain
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import TypeAlias
 
 from m2pem.findings import Finding, Severity
@@ -41,8 +40,9 @@ def check_takeoffs(
             takeoffs, landings = _between(name, commanded)
             key = (*takeoffs, None, *landings)  # much the same for most of a large fleet
             if key not in led_to:
-                begun = ((*flow.left(each), *flow.aside(each)) for each in takeoffs)
-                led_to[key] = flow.led_to(chain.from_iterable(begun), landings)
+                led_to[key] = set[FlowNode]().union(
+                    *(_led(flow, each, landings) for each in takeoffs)
+                )
             aloft[name] = led_to[key]
     for task, (behavior, resources) in commanded.items():
         team = behavior.type is BehaviorType.TEAM
@@ -57,6 +57,14 @@ def check_takeoffs(
                 line=behavior.line,
                 severity=Severity.WARNING,
             )
+
+
+def _led(flow: TokenFlow, takeoff: FlowNode, landings: Sequence[FlowNode]) -> set[FlowNode]:
+    """Return the nodes that tokens may enter after a take-off, and before a landing after it: one
+    beside it, on a parallel branch, may come before."""
+    left, aside = [*flow.left(takeoff)], [*flow.aside(takeoff)]
+    beside = flow.led_to(aside, ()) - flow.led_to(left, ())
+    return flow.led_to([*left, *aside], [each for each in landings if each not in beside])
 
 
 def _between(aircraft: ResourceId, commanded: Commanded) -> tuple[list[FlowNode], list[FlowNode]]:

@@ -5,7 +5,7 @@ from itertools import count
 from typing import TypeAlias, Union
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from m2pem.findings import Finding, Severity
@@ -116,6 +116,16 @@ def test_a_branch_beside_may_have_taken_it_off_before() -> None:
     assert at(FORK + go("A") + up("T") + go("B", "b") + "\nf -> A -> T -> j\nf -> B -> j") == [
         "A",
         "B",
+    ]
+
+
+def test_a_landing_beside_a_take_off_may_have_come_before_it() -> None:
+    beside = FORK + up("T") + land("L") + go("A") + "\nf -> T -> j\nf -> L -> A -> j"
+    assert at(beside) == []
+    after = FORK + up("T") + go("B", "b") + land("L") + go("A")
+    assert at(after.replace("j -> e", "j -> L -> A -> e") + "\nf -> T -> j\nf -> B -> j") == [
+        "B",
+        "A",
     ]
 
 
@@ -249,6 +259,7 @@ def goes(tree: Tree) -> set[str]:
 
 @settings(max_examples=examples(60, 600), deadline=None)
 @given(TREES)
+@example(("par", "up", ("seq", "land", "go")))
 def test_what_is_found_is_on_the_ground_in_every_order(drawn_tree: Tree) -> None:
     tree = numbered(drawn_tree, count(1))
     lines: list[str] = [START]
