@@ -3,6 +3,7 @@
 import json
 import os
 from decimal import Decimal
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from m2pem.mission.expression import parse
 from m2pem.mission.expression import temporal as t
 from m2pem.mission.expression.operators import MAX_WORK
 
+PAIRS = list(pairwise("abcdefghijklmnopqrstuvw"))
 CORPORA = os.environ.get("M2PEM_CORPORA", "")
 DATA: dict[str, Any] = {
     t.NOW: "2026-11-30T12:00:00Z",
@@ -36,6 +38,8 @@ def value(text: str) -> Any:
     [
         ("0.1 + 0.2", 0.3),
         ("1 / 3 * 3", 1.0),
+        ("12345678901234567890 - 12345678901234567889", 1),
+        ("-0.1234567890123456789 * 10 ** 19", -1234567890123456789),
         ("2 ** 3 ** 2", 64),
         ("-3 ** 2", 9),
         ("1 + /* two */ 2 // three", 3),
@@ -143,6 +147,10 @@ def test_the_names_of_an_expression_are_those_that_it_reads_of_data() -> None:
         "{f: function(g) g(g)}.f({f: function(g) g(g)}.f)",
         "some a in 1..1000000 satisfies a < 0",
         "sort(for a in 1..60000 return -a)",
+        "{a: [1, 1], " + ", ".join(f"{b}: {{x: {a}, y: {a}}}" for a, b in PAIRS) + "}",
+        "duplicate values(for a in 1..50000 return modulo(a, 1400))",
+        "list replace(for a in 1..40000 return a, 1, for a in 1..80000 return a)",
+        'replace(string join(for a in 1..40000 return "a"), "a", "%s")' % ("$0" * 50),
     ],
 )
 def test_an_expression_that_looks_at_too_much_is_an_error(text: str) -> None:

@@ -224,17 +224,13 @@ def _items(value: Computed) -> list[Computed] | None:
     if not days and not (feel.is_number(low) and feel.is_number(high)):
         feel.without_value(f"a range of {feel.describe(low)} has no items")
         return None
+    if low > high and not value.descends:
+        feel.without_value("a range from a higher value to a lower one has no items")
+        return None
     step: Any = timedelta(days=1) if days else 1
-    if low > high:
-        if not value.descends:
-            feel.without_value("a range from a higher value to a lower one has no items")
-            return None
-        step = -step
-    found = list[Computed]()
-    while (low <= high) if step > 0 * step else (low >= high):
-        look_at(1)
-        found.append(low)
-        low += step
+    count = int(abs(high - low) // step) + 1
+    look_at(count)
+    found = [low + (each if low <= high else -each) * step for each in range(count)]
     return [each for each in found if value.descends or feel.in_range(each, value)]
 
 
@@ -306,14 +302,15 @@ def _context(node: ContextOf, read: ReadValue, rules: Rules) -> Computed:
 
     for key, value in node.entries:
         found[key] = evaluate(value, around, rules)
-    return found
+    return bounded_list([found])[0]
 
 
 def _range(node: RangeOf, read: ReadValue, rules: Rules) -> Computed:
     low, high = (
         None if each is None else evaluate(each, read, rules) for each in (node.low, node.high)
     )
-    if low is not None and high is not None and feel.kind(low) != feel.kind(high):
+    ends = [each for each in (low, high) if each is not None]
+    if len({feel.kind(each) for each in ends}) > 1 or not all(map(feel.is_ordered, ends)):
         feel.without_value(f"a range from {feel.describe(low)} to {feel.describe(high)}")
         return None
     included, unbounded = (

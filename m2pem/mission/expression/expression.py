@@ -63,6 +63,8 @@ class Expression:
             return rules.result(value) if rules.result else value
         except ExpressionError as error:
             self._explain(error)
+        except RecursionError:
+            self._explain(ExpressionError("functions and values are nested too deep"))
 
     def holds(self, read: ReadValue) -> bool:
         """Its truth: null is false; JUEL and XPath coerce other values.
@@ -79,6 +81,8 @@ class Expression:
             return value if value is True or value is False else rules.truth(value, "a condition")
         except ExpressionError as error:
             self._explain(error)
+        except RecursionError:
+            self._explain(ExpressionError("functions and values are nested too deep"))
 
     def _feel_holds(self, read: ReadValue) -> bool:
         feel_values.begin()

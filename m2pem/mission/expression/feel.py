@@ -76,6 +76,7 @@ _COMPARISONS = {
     "=": Comparison.EQUAL,
     **{each.value: each for each in Comparison if each is not Comparison.EQUAL},
 }
+_EXACT_DIGITS = 15
 _AND, _COMPARISON = 2, 3
 _STRENGTHS = {
     **{"or": 1, "and": _AND, "between": _COMPARISON, "in": _COMPARISON, "**": 6},
@@ -388,10 +389,9 @@ class FeelParser:
         match token.kind:
             case "number":
                 self._next()
-                try:
-                    return Literal(read_number(token.text))
-                except ValueError as error:
-                    self._fail(str(error), token.start)
+                if len(token.text) > _EXACT_DIGITS:  # a double has not all of them
+                    return Call("FEEL number", (Literal(token.text),))
+                return Literal(read_number(token.text))
             case "text":
                 self._next()
                 return Literal(_unescaped(token.text[1:-1]))

@@ -166,7 +166,7 @@ ARITHMETIC: Mapping[Operation, Callable[[Any, Any], FeelValue]] = {
 def negate(value: FeelValue) -> FeelValue:
     """`-value`."""
     if is_number(value):
-        return -number(value)
+        return number(value).copy_negate()
     if isinstance(value, timedelta):
         return -value
     if isinstance(value, Months):

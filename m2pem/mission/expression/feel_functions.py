@@ -26,7 +26,7 @@ from m2pem.mission.expression import feel_values as v
 from m2pem.mission.expression.feel_arithmetic import negate
 from m2pem.mission.expression.feel_library import NoValueError
 from m2pem.mission.expression.feel_values import DIGITS, FeelValue, number
-from m2pem.mission.expression.operators import bounded_list, look_at
+from m2pem.mission.expression.operators import bounded_list, bounded_text, look_at
 from m2pem.mission.expression.temporal import (
     DATE,
     DAYS,
@@ -107,9 +107,9 @@ class FeelFunction:
             taken.append(found)
         try:
             if not self.decimals:
-                return self.compute(*taken)
+                return _bounded(self.compute(*taken), self.name)
             with localcontext(DIGITS):
-                return self.compute(*taken)
+                return _bounded(self.compute(*taken), self.name)
         except NoValueError as error:
             v.without_value(f"{self.name}(): {error}")
         except (ArithmeticError, InvalidOperation, ValueError):
@@ -119,6 +119,13 @@ class FeelFunction:
 
 
 _WRONG = object()
+
+
+def _bounded(value: FeelValue, name: str) -> FeelValue:
+    """The value that a function made, when it is not too large."""
+    if isinstance(value, list | dict):
+        return bounded_list([value])[0]
+    return bounded_text(value, f"{name}()") if isinstance(value, str) else value
 
 
 def _as_kind(value: FeelValue, kinds: tuple[str, ...]) -> FeelValue:
@@ -222,7 +229,7 @@ FEEL_FUNCTIONS: dict[str, FeelFunction] = {
         _f("all", "list", [LIST], lib.truths(False), BOOLEAN, rest=True),
         _f("any", "list", [LIST], lib.truths(True), BOOLEAN, rest=True),
         _f("sublist", "list,start position,length?", [LIST, NUMBER, NUMBER], lib.sublist, LIST),
-        _f("append", "list,item", [LIST, ANY], lambda a, *b: bounded_list([*a, *b]), LIST,
+        _f("append", "list,item", [LIST, ANY], lambda a, *b: [*a, *b], LIST,
            more=True),
         _f("concatenate", "list", [ANY], lib.concatenated, LIST, more=True),
         _f("insert before", "list,position,newItem", [LIST, NUMBER, ANY], lib.inserted, LIST),

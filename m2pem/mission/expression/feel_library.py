@@ -5,6 +5,8 @@ Each raises NoValueError, ValueError or ArithmeticError where there is no value.
 
 import operator
 import re
+from calendar import monthrange
+from collections import Counter
 from collections.abc import Callable
 from datetime import date, datetime, time, timedelta
 from decimal import ROUND_FLOOR, Decimal, localcontext
@@ -13,7 +15,7 @@ from typing import Any
 
 from m2pem.mission.expression import feel_values as v
 from m2pem.mission.expression.feel_values import DIGITS, Closure, FeelValue, Range, number
-from m2pem.mission.expression.operators import bounded_list, bounded_text, look_at
+from m2pem.mission.expression.operators import MAX_SIZE, MAX_VALUE_DEPTH, look_at
 from m2pem.mission.expression.temporal import (
     Months,
     iso,
@@ -105,7 +107,7 @@ def as_number(text: FeelValue, grouping: FeelValue = None, point: FeelValue = No
         written = written.replace(point, ".")
     if not re.fullmatch(r"-?(?:[0-9]+(?:\.[0-9]+)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?", written):
         raise NoValueError(f"{v.describe(text)} is no number")
-    return Decimal(written)
+    return DIGITS.create_decimal(written)
 
 
 def as_text(value: FeelValue) -> str | None:
@@ -248,7 +250,13 @@ def replaced_text(text: str, pattern: str, replacement: str, flags: str | None =
 
         return re.sub(r"\\.|\$([0-9]+)", group, replacement)
 
-    return bounded_text(found.sub(replaced, text), "replace()")
+    parts, last, size = list[str](), 0, 0
+    for match in found.finditer(text):
+        parts += [text[last : match.start()], replaced(match)]
+        last, size = match.end(), size + len(parts[-1])
+        if size > MAX_SIZE:
+            raise NoValueError(f"the result is longer than {MAX_SIZE} characters")
+    return "".join([*parts, text[last:]])
 
 
 def split_text(text: str, delimiter: str) -> list[FeelValue]:
@@ -257,7 +265,7 @@ def split_text(text: str, delimiter: str) -> list[FeelValue]:
         if match.end() > match.start():
             found.append(text[last : match.start()])
             last = match.end()
-    return bounded_list([*found, text[last:]])
+    return [*found, text[last:]]
 
 
 def joined(
@@ -268,7 +276,7 @@ def joined(
     if not all(isinstance(each, str) for each in texts):
         raise NoValueError("not all items are texts")
     whole = (prefix or "") + (delimiter or "").join(texts) + (suffix or "")
-    return bounded_text(whole, "string join()")
+    return whole
 
 
 # --- numbers --------------------------------------------------------------------------------------
@@ -364,10 +372,9 @@ def deviation(values: list[Decimal]) -> Decimal:
 
 
 def mode(values: list[FeelValue]) -> list[FeelValue]:
-    found = _numbers(values)
-    most = max(map(found.count, found), default=0)
-    look_at(len(found) ** 2 // 10)
-    return sorted({each for each in found if found.count(each) == most})
+    counts = Counter(_numbers(values))
+    most = max(counts.values(), default=0)
+    return sorted(each for each, count in counts.items() if count == most)
 
 
 def truths(decisive: bool) -> Callable[[list[FeelValue]], bool | None]:
@@ -400,7 +407,7 @@ def sublist(values: list[FeelValue], start: FeelValue, length: FeelValue = None)
 
 def inserted(values: list[FeelValue], position: FeelValue, item: FeelValue) -> list[FeelValue]:
     place = _place(values, position, len(values) + 1)
-    return bounded_list([*values[:place], item, *values[place:]])
+    return [*values[:place], item, *values[place:]]
 
 
 def removed(values: list[FeelValue], position: FeelValue) -> list[FeelValue]:
@@ -421,6 +428,7 @@ def replaced(values: list[FeelValue], position: FeelValue, item: FeelValue) -> l
 
 
 def indices(values: list[FeelValue], wanted: FeelValue) -> list[FeelValue]:
+    look_at(len(values) // 10)
     return [Decimal(n) for n, each in enumerate(values, 1) if v.equal(each, wanted)]
 
 
@@ -439,7 +447,7 @@ def doubled(values: list[FeelValue]) -> list[FeelValue]:
 
 def concatenated(*lists: FeelValue) -> list[FeelValue]:
     parts = (each if isinstance(each, list) else [each] for each in lists)
-    return bounded_list([item for part in parts for item in part])
+    return [item for part in parts for item in part]
 
 
 def flat(values: list[FeelValue]) -> list[FeelValue]:
@@ -500,8 +508,8 @@ def context_of(entries: list[FeelValue]) -> dict[str, FeelValue]:
 
 def put(context: dict[str, FeelValue], key: FeelValue, value: FeelValue) -> dict[str, FeelValue]:
     keys = key if isinstance(key, list) else [key]
-    if not keys or not all(isinstance(each, str) for each in keys):
-        raise NoValueError("keys are texts")
+    if not 0 < len(keys) <= MAX_VALUE_DEPTH or not all(isinstance(each, str) for each in keys):
+        raise NoValueError(f"keys are texts, {MAX_VALUE_DEPTH} at most")
     head, *rest = keys
     inner = context.get(head)
     if rest and inner is not None and not isinstance(inner, dict):
@@ -531,8 +539,7 @@ def is_same(one: FeelValue, other: FeelValue = None) -> bool:
 
 
 def last_day(value: date) -> date:
-    following = date(value.year + value.month // 12, value.month % 12 + 1, 1)
-    return following - timedelta(days=1)
+    return value.replace(day=monthrange(value.year, value.month)[1])
 
 
 def _as_span(value: FeelValue) -> Range:

@@ -301,6 +301,11 @@ COMPARISONS: Mapping[Comparison, Callable[[Any, Any], bool | None]] = {
 }
 
 
+def is_ordered(value: FeelValue) -> bool:
+    """Whether values of its kind have an order, so that it may be the end of a range."""
+    return kind(value) in _ORDERED or isinstance(value, bool)
+
+
 def in_range(value: FeelValue, within: Range) -> bool | None:
     """Whether a value is in a range; null: it cannot be compared with its ends."""
     if within.negated:
