@@ -13,6 +13,7 @@ from m2pem.errors import ExpressionError, ExpressionSyntaxError
 from m2pem.mission.expression import parse
 from m2pem.mission.expression import temporal as t
 from m2pem.mission.expression.operators import MAX_WORK
+from m2pem.mission.expression.partial import possible_truth
 
 PAIRS = list(pairwise("abcdefghijklmnopqrstuvw"))
 CORPORA = os.environ.get("M2PEM_CORPORA", "")
@@ -131,6 +132,25 @@ def test_null_that_comes_of_a_wrong_operation_is_an_error_with_the_first_cause(
 def test_a_condition_of_null_is_false() -> None:
     assert not parse("= not(nothing)").holds(DATA.get)
     assert parse("= nothing or armed").holds(DATA.get)
+
+
+@pytest.mark.parametrize(
+    ("text", "truth"),
+    [
+        ("not(nothing)", False),
+        ("not(nothing) or unknown", None),
+        ("not(nothing) and unknown", False),
+        ("not(lap = 3) or unknown", None),
+        ("lap = 3 or unknown", True),
+        ("not(unknown)", None),
+        ("if unknown then nothing else lap = 4", False),
+    ],
+)
+def test_a_condition_of_which_a_part_is_known_is_no_more_than_that(
+    text: str, truth: bool | None
+) -> None:
+    known = ("lap", "nothing").__contains__
+    assert possible_truth(parse(f"= {text}"), known, DATA.get) is truth
 
 
 def test_the_names_of_an_expression_are_those_that_it_reads_of_data() -> None:

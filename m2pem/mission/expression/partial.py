@@ -37,12 +37,13 @@ def first_false(expression: Expression, known: IsKnown, read: ReadValue) -> froz
 
 
 def _truth(node: Node, known: IsKnown, read: ReadValue, rules: Rules) -> bool | None:
+    if all(map(known, names(node))):
+        return rules.truth(evaluate(node, read, rules), "a condition")
     match node:
-        case And(operands=operands):
-            return _all(operands, known, read, rules)
-        case Or(operands=operands):
-            negated = _all(tuple(Not(each) for each in operands), known, read, rules)
-            return None if negated is None else not negated
+        case And(operands=operands) | Or(operands=operands):
+            decisive = isinstance(node, Or)
+            found = [_truth(each, known, read, rules) for each in operands]
+            return decisive if decisive in found else None if None in found else not decisive
         case Not(operand=operand):
             inner = _truth(operand, known, read, rules)
             return None if inner is None else not inner
@@ -52,13 +53,4 @@ def _truth(node: Node, known: IsKnown, read: ReadValue, rules: Rules) -> bool | 
                 return _truth(node.then if chosen else node.otherwise, known, read, rules)
             first = _truth(node.then, known, read, rules)
             return first if first is _truth(node.otherwise, known, read, rules) else None
-    if all(map(known, names(node))):
-        return rules.truth(evaluate(node, read, rules), "a condition")
     return None
-
-
-def _all(operands: tuple[Node, ...], known: IsKnown, read: ReadValue, rules: Rules) -> bool | None:
-    found = [_truth(each, known, read, rules) for each in operands]
-    if False in found:
-        return False
-    return None if None in found else True
