@@ -71,6 +71,8 @@ def value(text: str) -> Any:
         ("substring(string: kind, start position: -2)", "pr"),
         ('date("2024-02-29") + duration("P1Y")', "2025-02-28"),
         ('time("23:30:00") + duration("PT1H")', "00:30:00"),
+        ('@"2026-07-01T10:00:00@Europe/Berlin"', "2026-07-01T10:00:00+02:00"),
+        ('string(@"2026-07-01T10:00:00@Europe/Berlin")', "2026-07-01T10:00:00@Europe/Berlin"),
         ('@"2026-10-25T02:30:00@Europe/Berlin".time offset', "PT2H"),
         ('@"2026-03-01" - @"2026-02-01" = duration("P28D")', True),
         ('years and months duration(@"2024-05-31", @"2026-05-30")', "P1Y11M"),

@@ -8,7 +8,7 @@ import operator
 from collections.abc import Callable, Mapping
 from contextvars import ContextVar
 from dataclasses import dataclass
-from datetime import UTC, date, datetime, time, timedelta
+from datetime import UTC, date, datetime, time, timedelta, timezone
 from decimal import Context, Decimal
 from typing import Any, TypeAlias
 
@@ -130,6 +130,8 @@ def to_data(value: FeelValue) -> Any:
         return [to_data(each) for each in value]
     if isinstance(value, dict):
         return {key: to_data(each) for key, each in value.items()}
+    if isinstance(value, datetime) and (offset := value.utcoffset()) is not None:
+        return iso(value.replace(tzinfo=timezone(offset)))  # ISO 8601 has no names of zones
     if isinstance(value, date | time | timedelta | Months):
         return iso(value)
     return text(value) if isinstance(value, Range | Closure) else value
