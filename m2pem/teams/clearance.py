@@ -20,6 +20,10 @@ from m2pem.teams.plan import Marcher
 NEAREST_SHARE = 0.84
 """Share of the spacing that is aimed at, to keep a minimum distance of 0.8 in the plane."""
 
+_PAST_SHARE = 0.6
+"""Of the minimum distance: so near do members pass those that stand in their starting places, where
+they could not set off else."""
+
 _STEPS = 24
 """Places of a path that are looked at within the minimum distance."""
 
@@ -30,9 +34,10 @@ _Floats: TypeAlias = NDArray[np.float64]
 
 
 class Clearance:
-    """How far each member may go, by where the others are. `apart_m`: the minimum distance."""
+    """How far each member may go, by where the others are. `apart_m`: the minimum distance; `past`
+    others that stand in their starting places, members ahead of them go as near as a share."""
 
-    def __init__(self, marchers: Sequence[Marcher], apart_m: float) -> None:
+    def __init__(self, marchers: Sequence[Marcher], apart_m: float, past: bool = False) -> None:
         order = sorted(range(len(marchers)), key=lambda index: marchers[index].back_m)
         self._yields: dict[int, list[tuple[int, _Floats, _Floats]]] = {each: [] for each in order}
         for first, second in combinations(order, 2):
@@ -42,8 +47,13 @@ class Clearance:
             ahead = np.isin(zone, zone[early])
             self._add(second, first, own_m[ahead], to_m[ahead])
             # Nor does the one ahead pass the other, on the route, before that has set off.
-            begins = ahead & (own_m == 0.0) & (from_m > marchers[first].path.along_m(0.0))
-            enters = from_m[begins & ~np.isin(from_m, pair.ends_m)]
+            at_m, stands = from_m, ahead & (own_m == 0.0)
+            if past:
+                near = _Pair(marchers[first], marchers[second], _PAST_SHARE * apart_m)
+                _, waits_m, at_m, _ = near.rows()
+                stands = waits_m == 0.0
+            begins = stands & (at_m > marchers[first].path.along_m(0.0))
+            enters = at_m[begins & ~np.isin(at_m, pair.ends_m)]
             self._add(first, second, enters, 0 * enters)
             if not ahead.all():
                 zone_too, own_m, _, to_m = pair.rows(swapped=True)

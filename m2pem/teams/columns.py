@@ -50,12 +50,12 @@ def march(context: PlanningContext, default_shape: str) -> Plan:
     route = context.parameters.route
     if route is None:
         return Plan(_forming_up(context, places, chained=False))
-    ways = _ways(context, route, places, spacing)
+    ways, past = _ways(context, route, places, spacing)
     marchers = tuple(way.marcher(context) for way in ways)
     speed = _march_speed(context, marchers, spacing)
     legs = tuple(way.leg(context, speed, None) for way in ways)
     closes = shape == "column"
-    return Plan(legs, March(marchers, spacing, speed, closes, context.frame, context.fence))
+    return Plan(legs, March(marchers, spacing, speed, closes, context.frame, context.fence, past))
 
 
 def one_by_one(context: PlanningContext) -> Plan:
@@ -64,7 +64,7 @@ def one_by_one(context: PlanningContext) -> Plan:
     route = context.parameters.route
     if route is None:
         return Plan(_forming_up(context, places, chained=True))
-    ways = _ways(context, route, places, spacing)
+    ways, _ = _ways(context, route, places, spacing)
     befores: list[ResourceId | None] = [None, *(way.member for way in ways)]
     speed_m_s = context.parameters.speed_m_s
     return Plan(
@@ -221,10 +221,16 @@ def _ways(
     route: Route,
     offsets: Sequence[tuple[float, float]],
     spacing_m: float,
-) -> list[_Way]:
+) -> tuple[list[_Way], bool]:
+    """Return the members' ways, and whether some lead past where others wait to set off."""
     ways = _drawn(context, route, offsets, spacing_m)
-    _keep_ends_apart(context, ways, spacing_m)
-    return ways
+    try:
+        _keep_ends_apart(context, ways, spacing_m, past=False)
+    except _InTheWayError:
+        ways = _drawn(context, route, offsets, spacing_m)
+        _keep_ends_apart(context, ways, spacing_m, past=True)
+        return ways, True
+    return ways, False
 
 
 def _drawn(
@@ -251,7 +257,13 @@ _NO_WAY = (
 )
 
 
-def _keep_ends_apart(context: PlanningContext, ways: Sequence[_Way], spacing_m: float) -> None:
+class _InTheWayError(TeamRefusedError):
+    """Members are in each other's ways to the route."""
+
+
+def _keep_ends_apart(
+    context: PlanningContext, ways: Sequence[_Way], spacing_m: float, *, past: bool
+) -> None:
     """Let members end earlier that would come too near to those at their ends.
 
     Raises:
@@ -262,7 +274,7 @@ def _keep_ends_apart(context: PlanningContext, ways: Sequence[_Way], spacing_m: 
     shorter = True
     while shorter:
         marchers = [way.marcher(context) for way in ways]
-        clearance = Clearance(marchers, NEAREST_SHARE * spacing_m)
+        clearance = Clearance(marchers, NEAREST_SHARE * spacing_m, past)
         ends_m = [each.path.line.length_m for each in marchers]
         shorter = False
         for index, at_m in enumerate(clearance.reached_m([0.0] * len(ways), ends_m, short_m)):
@@ -277,7 +289,7 @@ def _keep_ends_apart(context: PlanningContext, ways: Sequence[_Way], spacing_m: 
                 begins_m = [0.0] * len(ways)
                 clearance = Clearance(alone, NEAREST_SHARE * spacing_m)
                 if [*clearance.reached_m(begins_m, ends_m, short_m)] == ends_m:
-                    text = f"{way.member} {_NO_WAY}"
+                    raise _InTheWayError(f"{way.member} {_NO_WAY}", place)
                 raise TeamRefusedError(text, place)
             if by_m and not too_far:
                 way.shorten(by_m)

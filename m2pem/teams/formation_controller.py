@@ -246,7 +246,8 @@ class FormationController:
         return next((track.marcher.member for track in stuck), None)
 
     def _clear(self) -> Clearance:
-        return Clearance([track.marcher for track in self._tracks.values()], self._nearest_m)
+        marchers = [track.marcher for track in self._tracks.values()]
+        return Clearance(marchers, self._nearest_m, self._march.past)
 
     def _look(self, track: _Track, stand: MemberPose | None, arrived: bool) -> None:
         path = track.marcher.path
