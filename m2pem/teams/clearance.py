@@ -14,6 +14,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from m2pem.geo.lazy_imports import rustworkx, shapely
 from m2pem.teams.paths import MemberPath
 from m2pem.teams.plan import Marcher
 
@@ -102,9 +103,6 @@ class _Pair:
     """The parts of the coordination space of two members: of each two legs that come near."""
 
     def __init__(self, first: Marcher, second: Marcher, apart_m: float) -> None:
-        import rustworkx  # noqa: PLC0415  # slow to load
-        import shapely  # noqa: PLC0415
-
         self._apart_m = apart_m
         self._paths = a, b = _driven(first.path), _driven(second.path)
         self.ends_m = a[:, 0]

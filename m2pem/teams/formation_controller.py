@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from m2pem.api.telemetry import TeamMemberState
 from m2pem.geo.fence import Fence
+from m2pem.geo.lazy_imports import shapely
 from m2pem.geo.polyline import EastNorthUp
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.geometry import Area
@@ -86,11 +87,10 @@ class _Track:
 
     def ahead(self, way_m: float = math.inf) -> "BaseGeometry":
         """Return its path from where it is, as far as that."""
-        from shapely import LineString  # noqa: PLC0415  # slow to load
-        from shapely.ops import substring  # noqa: PLC0415
+        from shapely.ops import substring  # noqa: PLC0415  # slow to load
 
         from_m = self.along_m or 0.0
-        return substring(LineString(self.marcher.path.line.points), from_m, from_m + way_m)
+        return substring(shapely.LineString(self.marcher.path.line.points), from_m, from_m + way_m)
 
 
 class FormationController:
@@ -156,12 +156,12 @@ class FormationController:
 
         A way that would end too near to a lost one ends beside it.
         """
-        from shapely import Point  # noqa: PLC0415  # slow to load
-
         track, frame = self._tracks[member], self._march.frame
         path, tracks = track.marcher.path, list(self._tracks.values())
         behind = [each.pose.place for each in tracks[tracks.index(track) + 1 :] if each.pose]
-        kept_out = (each.buffer(self.spacing_m) for each in (*self._lost, *map(Point, behind)))
+        kept_out = (
+            each.buffer(self.spacing_m) for each in (*self._lost, *map(shapely.Point, behind))
+        )
         rings = [[frame.to_latlon((x, y)) for x, y in each.exterior.coords] for each in kept_out]
         areas = [Area((tuple((*corner, None) for corner in ring),)) for ring in rings]
         fence = Fence(self._march.fence, areas, frame=frame)

@@ -329,10 +329,6 @@ def _numbers(values: list[FeelValue]) -> list[Decimal]:
     return [number(each) for each in values]
 
 
-def _some_numbers(values: list[FeelValue]) -> list[Decimal] | None:
-    return _numbers(values) or None
-
-
 def extreme(sign: int) -> Callable[[list[FeelValue]], FeelValue]:
     def compute(values: list[FeelValue]) -> FeelValue:
         if not values:
