@@ -22,8 +22,8 @@ NEAREST_SHARE = 0.84
 """Share of the spacing that is aimed at, to keep a minimum distance of 0.8 in the plane."""
 
 _PAST_SHARE = 0.6
-"""Of the minimum distance: so near do members pass those that stand in their starting places, where
-they could not set off else."""
+"""Of the minimum distance: so near do members on the route pass those that stand in their starting
+places, where they could not set off else; nearer where one stands at the route's beginning."""
 
 _STEPS = 24
 """Places of a path that are looked at within the minimum distance."""

@@ -414,4 +414,5 @@ def test_a_lead_passes_others_that_wait_beside_the_route_and_that_is_said(
     found = judged(sim_fleet(starts, {"way": route(*places)}), case.mission)
     assert found.ended.state is BehaviorState.SUCCEEDED, found
     assert "members pass others that wait to set off, within the spacing" in caplog.text
-    assert 9 <= found.least_m < 16  # half of the spacing
+    assert 9 <= found.nearest_m["a", "b"] < 16  # half of the spacing
+    assert found.nearest_m["a", "c"] < 16  # it waits where the route begins
