@@ -1,12 +1,13 @@
 """JUEL coerces values as Jakarta Expression Language says."""
 
+import csv
 import json
 import os
 from pathlib import Path
 
 import pytest
 
-from m2pem.errors import ExpressionError
+from m2pem.errors import ExpressionError, ExpressionSyntaxError
 from m2pem.mission.expression import parse
 from m2pem.mission.expression.partial import possible_truth
 
@@ -50,6 +51,11 @@ READ = {"Boolean": lambda text: text == "true", "Long": int, "Double": float, "S
         ("!a and !blank and empty blank", True),
         ("mod(7, 4) + 7 mod 4", 6),
         ("list == list", True),
+        ("a < t", True),
+        ("a < not t", False),
+        ("a >= not t", True),
+        ("'x' < t", False),
+        ("t > blank", True),
     ],
 )
 def test_values_are_coerced(text: str, value: object) -> None:
@@ -89,6 +95,33 @@ def test_a_condition_is_coerced_also_where_only_a_part_is_known() -> None:
     assert possible_truth(condition, lambda name: name == "yes", DATA.get) is True
     condition = parse("${three > 4 and other}")
     assert possible_truth(condition, lambda name: name == "three", DATA.get) is False
+
+
+NESTED = Path(__file__).with_name("el_nested.csv")
+NESTED_DATA = {
+    **{"n3": 3, "n0": 0, "nneg": -7, "d2": 2.5, "d3": 3.0, "big": 9007199254740993},
+    **{"bt": True, "bf": False, "s3": "3", "s25": "2.5", "strue": "true", "sa": "a", "sb": "b"},
+    **{"se": "", "d": "2026-01-31", "dt": "2026-01-31T12:00:00Z", "l0": [], "l1": [1, 2, 3]},
+    **{"ls": ["a", "b"], "m": {"k": 1, "t": "x"}, "m.k": 1, "m.t": "x"},
+}
+
+
+def test_nested_operators_have_the_values_of_tomcat() -> None:
+    """Answers of Apache Tomcat 10.1.60; a refusal or an error is never another value."""
+    same = errors = 0
+    for text, answer in [*csv.reader(NESTED.read_text(encoding="utf-8").splitlines())][1:]:
+        kind, _, written = answer.partition(" ")
+        try:
+            value = parse(text).evaluate(NESTED_DATA.get)
+        except (ExpressionError, ExpressionSyntaxError):
+            errors += answer != "error" and answer not in INFINITE
+            continue
+        assert answer != "error", (text, value)
+        expected = None if kind == "null" else READ[kind](written)
+        assert repr(value) == repr(expected), (text, answer)
+        same += 1
+    assert same > 300
+    assert errors < 0.1 * same
 
 
 @pytest.mark.skipif(not CORPORA, reason="M2PEM_CORPORA names no folder of Tomcat's answers")

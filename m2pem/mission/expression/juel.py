@@ -123,6 +123,8 @@ ARITHMETIC: dict[Operation, Binary] = {
 
 
 def _text(value: Computed) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
     if not isinstance(value, str):
         raise ExpressionError(f"{describe(value)} is not compared with a text")
     return value
@@ -138,9 +140,10 @@ def _pair(left: Computed, right: Computed, *, ordered: bool) -> tuple[Any, Any]:
         return _ordered_double(left), _ordered_double(right)
     if numbers:
         return _long(left), _long(right)
-    if any(isinstance(each, bool) for each in values):
+    texts = any(isinstance(each, str) for each in values)
+    if any(isinstance(each, bool) for each in values) and not (ordered and texts):
         return truth(left, "a comparison"), truth(right, "a comparison")
-    if any(isinstance(each, str) for each in values):
+    if texts:
         return _text(left), _text(right)
     if ordered:
         raise ExpressionError(f"{describe(left)} and {describe(right)} have no order")
@@ -164,13 +167,18 @@ def _equal(left: Computed, right: Computed) -> bool:
     return equal(one, other) if isinstance(one, list | dict) else bool(one == other)
 
 
-def _ordering(compare: Callable[[Any, Any], bool], *, of_null: bool) -> Test:
+def _ordering(compare: Callable[[Any, Any], bool], *, or_equal: bool = False) -> Test:
+    """An order. A boolean beside a text is ordered as a text, but where `==` holds it is equal."""
+
     def test(left: Computed, right: Computed) -> bool:
         if left is None or right is None:
-            return of_null and left is right
+            return or_equal and left is right
         if type(left) is type(right) and type(left) in _DIRECT:
             return compare(left, right)
-        return compare(*_pair(left, right, ordered=True))
+        one, other = _pair(left, right, ordered=True)
+        if isinstance(one, str) and _equal(left, right):
+            return or_equal
+        return compare(one, other)
 
     return test
 
@@ -178,8 +186,8 @@ def _ordering(compare: Callable[[Any, Any], bool], *, of_null: bool) -> Test:
 COMPARISONS: dict[Comparison, Test] = {
     Comparison.EQUAL: _equal,
     Comparison.NOT_EQUAL: lambda left, right: not _equal(left, right),
-    Comparison.LESS: _ordering(operator.lt, of_null=False),
-    Comparison.LESS_EQUAL: _ordering(operator.le, of_null=True),
-    Comparison.GREATER: _ordering(operator.gt, of_null=False),
-    Comparison.GREATER_EQUAL: _ordering(operator.ge, of_null=True),
+    Comparison.LESS: _ordering(operator.lt),
+    Comparison.LESS_EQUAL: _ordering(operator.le, or_equal=True),
+    Comparison.GREATER: _ordering(operator.gt),
+    Comparison.GREATER_EQUAL: _ordering(operator.ge, or_equal=True),
 }
