@@ -119,7 +119,13 @@ class FailsError(Exception):
     """The reference says that the expression fails."""
 
 
+def confused(a, b):
+    return (is_number(a) and isinstance(b, str)) or (isinstance(a, str) and is_number(b))
+
+
 def same(a, b):
+    if confused(a, b):
+        raise FailsError
     number = (int, float)
     if isinstance(a, bool) or isinstance(b, bool):
         return a is b
@@ -145,6 +151,8 @@ def truth(x):
 def order(operator, a, b):
     if is_number(a) and is_number(b):
         a, b = Fraction(a), Fraction(b)
+    elif confused(a, b):
+        raise FailsError
     elif a is None or type(a) is not type(b):
         return False
     elif not isinstance(a, str):
@@ -198,7 +206,7 @@ def reference(node, store):
                 return False
             if not isinstance(b, list):
                 raise FailsError
-            return any(same(a, each) for each in b)
+            return any(not confused(a, each) and same(a, each) for each in b)
         case If(condition, then, otherwise):
             return reference(then if truth(reference(condition, store)) else otherwise, store)
         case Index(container, key):

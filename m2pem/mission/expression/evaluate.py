@@ -1,25 +1,18 @@
-"""Evaluates a syntax tree over the data store: the tree is walked, nothing is compiled.
+"""Makes what evaluates a syntax tree over the data store: a function for each node, once.
 
-Most expressions of a mission are evaluated once or never, so that preparing them costs more than it
-saves.
+What the rules of a language decide is decided then, not at each evaluation.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+import operator
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextvars import ContextVar
 from datetime import date, timedelta
-from typing import Any
+from typing import Any, TypeAlias
 
 from m2pem.errors import ExpressionError
 from m2pem.mission.expression import feel_values as feel
 from m2pem.mission.expression.functions import LISTED
-from m2pem.mission.expression.operators import (
-    COMPARISONS,
-    bounded_list,
-    contains,
-    index,
-    join,
-    look_at,
-)
+from m2pem.mission.expression.operators import bounded_list, contains, index, join, look_at
 from m2pem.mission.expression.rules import Rules
 from m2pem.mission.expression.temporal import Computed
 from m2pem.mission.expression.tree import (
@@ -55,11 +48,27 @@ from m2pem.mission.expression.tree import (
 )
 from m2pem.mission.values import ReadValue, Value
 
+Evaluate: TypeAlias = Callable[[ReadValue], Computed]
+"""Gives a node's value over the data store; raises ExpressionError."""
+
 MAX_CALLS = 50
 """How deep functions may call each other."""
 
 _calls = ContextVar("_calls", default=0)
 _TYPES = {"string": "text"}
+
+_SAME: Mapping[Comparison, Callable[[Any, Any], bool]] = {
+    Comparison.EQUAL: operator.eq,
+    Comparison.NOT_EQUAL: operator.ne,
+}
+_ORDER: Mapping[Comparison, Callable[[Any, Any], bool]] = {
+    Comparison.LESS: operator.lt,
+    Comparison.LESS_EQUAL: operator.le,
+    Comparison.GREATER: operator.gt,
+    Comparison.GREATER_EQUAL: operator.ge,
+}
+_EXACT = 2**53
+"""Whole numbers below are doubles, too, so that all languages compare others with them alike."""
 
 
 def bind(variable: str, item: Value, read: ReadValue) -> ReadValue:
@@ -80,137 +89,177 @@ def _part(value: Value, path: str) -> Value:
 
 def evaluate(node: Node, read: ReadValue, rules: Rules) -> Computed:
     """The tree's value by the rules of its language; it raises ExpressionError."""
-    return _EVALUATE[type(node)](node, read, rules)
+    return evaluator(node, rules)(read)
 
 
-def _holds(node: Node, read: ReadValue, rules: Rules, what: str) -> bool:
-    value = _EVALUATE[type(node)](node, read, rules)
-    return value if value is True or value is False else rules.truth(value, what)
+def evaluator(node: Node, rules: Rules) -> Evaluate:
+    """Return what evaluates a tree by the rules of its language."""
+    return _MAKE[type(node)](node, rules)
 
 
-def _literal(node: Literal, read: ReadValue, rules: Rules) -> Computed:
-    return node.value
+def _all(nodes: Iterable[Node], rules: Rules) -> list[Evaluate]:
+    return [evaluator(each, rules) for each in nodes]
 
 
-def _name(node: Name, read: ReadValue, rules: Rules) -> Computed:
-    value = read(node.name)
-    if value is None and rules.ternary and "." in node.name:
-        head, _, rest = node.name.rpartition(".")
-        return feel.path(_name(Name(head), read, rules), rest)
-    return value
+def _size(node: Node) -> int:
+    return sum(1 for _ in walk(node))
 
 
-def _truth(node: Node, read: ReadValue, rules: Rules) -> bool | None:
+def _literal(node: Literal, rules: Rules) -> Evaluate:
+    value = node.value
+    return lambda read: value
+
+
+def _name(node: Name, rules: Rules) -> Evaluate:
+    name = node.name
+    if not rules.ternary or "." not in name:
+        return lambda read: read(name)
+    head, _, rest = name.rpartition(".")
+    container = _name(Name(head), rules)
+
+    def path(read: ReadValue) -> Computed:
+        value = read(name)
+        return feel.path(container(read), rest) if value is None else value
+
+    return path
+
+
+def _truth(run: Evaluate) -> Callable[[ReadValue], bool | None]:
     """The truth of a node in FEEL; null: it has none."""
-    value = _EVALUATE[type(node)](node, read, rules)
-    return value if value is True or value is False else feel.truth(value)
+
+    def truth(read: ReadValue) -> bool | None:
+        value = run(read)
+        return value if value is True or value is False else feel.truth(value)
+
+    return truth
 
 
-def _not(node: Not, read: ReadValue, rules: Rules) -> Computed:
-    if rules.ternary:
-        found = _truth(node.operand, read, rules)
-        return None if found is None else not found
-    return not _holds(node.operand, read, rules, "'not'")
+def _not(node: Not, rules: Rules) -> Evaluate:
+    run = evaluator(node.operand, rules)
 
-
-def _and(node: And, read: ReadValue, rules: Rules) -> Computed:
-    if rules.ternary:
-        return _decided(False, node.operands, read, rules)
-    for operand in node.operands:  # noqa: SIM110  # a generator costs more than all of it
-        if not _holds(operand, read, rules, "'and'"):
-            return False
-    return True
-
-
-def _or(node: Or, read: ReadValue, rules: Rules) -> Computed:
-    if rules.ternary:
-        return _decided(True, node.operands, read, rules)
-    for operand in node.operands:  # noqa: SIM110  # a generator costs more than all of it
-        if _holds(operand, read, rules, "'or'"):
-            return True
-    return False
-
-
-def _decided(by: bool, nodes: Iterable[Node], read: ReadValue, rules: Rules) -> bool | None:
-    """`by` if one of them is; else null if one of them is; else the other one."""
-    found: bool | None = not by
-    for each in nodes:
-        value = _EVALUATE[type(each)](each, read, rules)
-        if value is by:
-            return by is True
+    def negated(read: ReadValue) -> Computed:
+        value = run(read)
         if value is not True and value is not False:
-            feel.truth(value)
-            found = None
-    return found
+            value = feel.truth(value) if rules.ternary else rules.truth(value, "'not'")
+        return None if value is None else not value
+
+    return negated
 
 
-def _compare(node: Compare, read: ReadValue, rules: Rules) -> Computed:
-    operator, right = node.operator, node.right
-    value = _EVALUATE[type(node.left)](node.left, read, rules)
-    if type(right) is Literal:
-        other = right.value
-        # What conditions mostly are; Python's `==` is the same.
-        if rules.compare is COMPARISONS and (other is None or type(other) is type(value) is str):
-            if operator is Comparison.EQUAL:
-                return value == other
-            if operator is Comparison.NOT_EQUAL:
-                return value != other
-        return rules.compare[operator](value, other)
-    return rules.compare[operator](value, _EVALUATE[type(right)](right, read, rules))
+def _and(node: And, rules: Rules) -> Evaluate:
+    return _decided(False, "'and'", node.operands, rules)
 
 
-def _in(node: In, read: ReadValue, rules: Rules) -> Computed:
-    container = evaluate(node.container, read, rules)
-    item = evaluate(node.item, read, rules)
-    return feel.contains(container, item) if rules.ternary else contains(container, item)
+def _or(node: Or, rules: Rules) -> Evaluate:
+    return _decided(True, "'or'", node.operands, rules)
 
 
-def _negate(node: Negate, read: ReadValue, rules: Rules) -> Computed:
-    return rules.negate(evaluate(node.operand, read, rules))
+def _decided(by: bool, what: str, nodes: Iterable[Node], rules: Rules) -> Evaluate:
+    """`by` if one of them is, the rest is not evaluated; in FEEL null if one has no truth."""
+    runs, truth = _all(nodes, rules), rules.truth
+
+    def ternary(read: ReadValue) -> Computed:
+        found: bool | None = not by
+        for run in runs:
+            value = run(read)
+            if value is by:
+                return by
+            if value is not True and value is not False:
+                feel.truth(value)
+                found = None
+        return found
+
+    def binary(read: ReadValue) -> Computed:
+        for run in runs:
+            value = run(read)
+            if value is not True and value is not False:
+                value = truth(value, what)
+            if value is by:
+                return by
+        return not by
+
+    return ternary if rules.ternary else binary
 
 
-def _arithmetic(node: Arithmetic, read: ReadValue, rules: Rules) -> Computed:
-    left = _EVALUATE[type(node.left)](node.left, read, rules)
-    return rules.arithmetic[node.operator](
-        left, _EVALUATE[type(node.right)](node.right, read, rules)
-    )
+def _compare(node: Compare, rules: Rules) -> Evaluate:
+    left, test, sign = evaluator(node.left, rules), rules.compare[node.operator], node.operator
+    if not isinstance(node.right, Literal):
+        right = evaluator(node.right, rules)
+        return lambda read: test(left(read), right(read))
+    other = node.right.value
+    # What conditions mostly are: all languages compare them alike, and so does Python.
+    whole = type(other) is int and abs(other) < _EXACT
+    if not (whole or (type(other) is str and sign in _SAME)):
+        return lambda read: test(left(read), other)
+    kind, direct = type(other), {**_ORDER, **_SAME}[sign]
+
+    def compared(read: ReadValue) -> Computed:
+        value = left(read)
+        return direct(value, other) if type(value) is kind else test(value, other)
+
+    return compared
 
 
-def _index(node: Index, read: ReadValue, rules: Rules) -> Computed:
-    container = evaluate(node.container, read, rules)
-    return index(container, evaluate(node.key, read, rules))
+def _in(node: In, rules: Rules) -> Evaluate:
+    container, item = _all((node.container, node.item), rules)
+    held = feel.contains if rules.ternary else contains
+    return lambda read: held(container(read), item(read))
 
 
-def _if(node: If, read: ReadValue, rules: Rules) -> Computed:
-    if rules.ternary:
-        holds = _truth(node.condition, read, rules) is True
-    else:
-        holds = _holds(node.condition, read, rules, "a condition")
-    return evaluate(node.then if holds else node.otherwise, read, rules)
+def _negate(node: Negate, rules: Rules) -> Evaluate:
+    run, negate = evaluator(node.operand, rules), rules.negate
+    return lambda read: negate(run(read))
 
 
-def _some(node: Some, read: ReadValue, rules: Rules) -> Computed:
-    return _quantified(node, True, read, rules)
+def _arithmetic(node: Arithmetic, rules: Rules) -> Evaluate:
+    left, right = _all((node.left, node.right), rules)
+    compute = rules.arithmetic[node.operator]
+    return lambda read: compute(left(read), right(read))
 
 
-def _every(node: Every, read: ReadValue, rules: Rules) -> Computed:
-    return _quantified(node, False, read, rules)
+def _index(node: Index, rules: Rules) -> Evaluate:
+    container, key = _all((node.container, node.key), rules)
+    return lambda read: index(container(read), key(read))
 
 
-def _quantified(node: Some | Every, by: bool, read: ReadValue, rules: Rules) -> Computed:
-    items = _items(evaluate(node.collection, read, rules))
-    if items is None:
-        return None
-    size = sum(1 for _ in walk(node.condition))
+def _if(node: If, rules: Rules) -> Evaluate:
+    run, then, otherwise = _all((node.condition, node.then, node.otherwise), rules)
 
-    found: bool | None = not by
-    for item in items:
-        look_at(size)
-        truth = _truth(node.condition, bind(node.variable, item, read), rules)
-        if truth is by:
-            return by
-        found = None if truth is None else found
-    return found
+    def chosen(read: ReadValue) -> Computed:
+        holds = run(read)
+        if holds is not True and holds is not False:
+            holds = feel.truth(holds) if rules.ternary else rules.truth(holds, "a condition")
+        return then(read) if holds else otherwise(read)
+
+    return chosen
+
+
+def _some(node: Some, rules: Rules) -> Evaluate:
+    return _quantified(node, True, rules)
+
+
+def _every(node: Every, rules: Rules) -> Evaluate:
+    return _quantified(node, False, rules)
+
+
+def _quantified(node: Some | Every, by: bool, rules: Rules) -> Evaluate:
+    collection, condition = _all((node.collection, node.condition), rules)
+    holds, variable, size = _truth(condition), node.variable, _size(node.condition)
+
+    def quantified(read: ReadValue) -> Computed:
+        items = _items(collection(read))
+        if items is None:
+            return None
+        found: bool | None = not by
+        for item in items:
+            look_at(size)
+            truth = holds(bind(variable, item, read))
+            if truth is by:
+                return by
+            found = None if truth is None else found
+        return found
+
+    return quantified
 
 
 def _items(value: Computed) -> list[Computed] | None:
@@ -234,44 +283,54 @@ def _items(value: Computed) -> list[Computed] | None:
     return [each for each in found if value.descends or feel.in_range(each, value)]
 
 
-def _for(node: For, read: ReadValue, rules: Rules) -> Computed:
-    found: list[Computed] = []
-    size = sum(1 for _ in walk(node.result))
+def _for(node: For, rules: Rules) -> Evaluate:
+    iterators = [(name, evaluator(each, rules)) for name, each in node.iterators]
+    result, size = evaluator(node.result, rules), _size(node.result)
 
-    def through(iterators: Sequence[tuple[str, Node]], read: ReadValue) -> bool:
+    def through(
+        iterators: Sequence[tuple[str, Evaluate]], read: ReadValue, found: list[Computed]
+    ) -> bool:
         if not iterators:
             look_at(size)
-            found.append(evaluate(node.result, bind("partial", found, read), rules))
+            found.append(result(bind("partial", found, read)))
             return True
         (variable, collection), *rest = iterators
-        items = _items(evaluate(collection, read, rules))
+        items = _items(collection(read))
         if items is None:
             return False
-        return all(through(rest, bind(variable, each, read)) for each in items)
+        return all(through(rest, bind(variable, each, read), found) for each in items)
 
-    return bounded_list([*found]) if through(node.iterators, read) else None
+    def iterated(read: ReadValue) -> Computed:
+        found: list[Computed] = []
+        return bounded_list([*found]) if through(iterators, read, found) else None
+
+    return iterated
 
 
-def _filter(node: Filter, read: ReadValue, rules: Rules) -> Computed:
-    container = evaluate(node.container, read, rules)
-    if container is None:
-        return None
-    items = container if isinstance(container, list) else [container]
-    if isinstance(node.condition, Literal | Negate | Name | Arithmetic | Call):
-        place = evaluate(node.condition, read, rules)
-        if feel.is_number(place):
-            whole = int(place)
+def _filter(node: Filter, rules: Rules) -> Evaluate:
+    container, condition = _all((node.container, node.condition), rules)
+    holds, size = _truth(condition), _size(node.condition)
+    may_be_place = isinstance(node.condition, Literal | Negate | Name | Arithmetic | Call)
+
+    def filtered(read: ReadValue) -> Computed:
+        value = container(read)
+        if value is None:
+            return None
+        items = value if isinstance(value, list) else [value]
+        if may_be_place and feel.is_number(at := condition(read)):
+            whole = int(at)
             if not whole or abs(whole) > len(items):
-                feel.without_value(f"there is no item {place} of {len(items)}")
+                feel.without_value(f"there is no item {at} of {len(items)}")
                 return None
             return items[whole - 1 if whole > 0 else whole]
-    size = sum(1 for _ in walk(node.condition))
-    chosen = []
-    for each in items:
-        look_at(size)
-        if _truth(node.condition, bind_item(each, read), rules) is True:
-            chosen.append(each)
-    return chosen
+        chosen = []
+        for each in items:
+            look_at(size)
+            if holds(bind_item(each, read)) is True:
+                chosen.append(each)
+        return chosen
+
+    return filtered
 
 
 def bind_item(item: Computed, read: ReadValue) -> ReadValue:
@@ -287,79 +346,97 @@ def bind_item(item: Computed, read: ReadValue) -> ReadValue:
     return bound
 
 
-def _path(node: Path, read: ReadValue, rules: Rules) -> Computed:
-    return feel.path(evaluate(node.container, read, rules), node.key)
+def _path(node: Path, rules: Rules) -> Evaluate:
+    container, key = evaluator(node.container, rules), node.key
+    return lambda read: feel.path(container(read), key)
 
 
-def _context(node: ContextOf, read: ReadValue, rules: Rules) -> Computed:
-    found: dict[str, Computed] = {}
+def _context(node: ContextOf, rules: Rules) -> Evaluate:
+    entries = [(key, evaluator(each, rules)) for key, each in node.entries]
 
-    def around(name: str) -> Computed:
-        head, _, rest = name.partition(".")
-        if name in found:
-            return found[name]
-        return _part(found[head], rest) if head in found else read(name)
+    def context(read: ReadValue) -> Computed:
+        found: dict[str, Computed] = {}
 
-    for key, value in node.entries:
-        found[key] = evaluate(value, around, rules)
-    return bounded_list([found])[0]
+        def around(name: str) -> Computed:
+            head, _, rest = name.partition(".")
+            if name in found:
+                return found[name]
+            return _part(found[head], rest) if head in found else read(name)
+
+        for key, run in entries:
+            found[key] = run(around)
+        return bounded_list([found])[0]
+
+    return context
 
 
-def _range(node: RangeOf, read: ReadValue, rules: Rules) -> Computed:
-    low, high = (
-        None if each is None else evaluate(each, read, rules) for each in (node.low, node.high)
+def _range(node: RangeOf, rules: Rules) -> Evaluate:
+    low_run, high_run = (
+        (lambda read: None) if each is None else evaluator(each, rules)
+        for each in (node.low, node.high)
     )
-    ends = [each for each in (low, high) if each is not None]
-    if len({feel.kind(each) for each in ends}) > 1 or not all(map(feel.is_ordered, ends)):
-        feel.without_value(f"a range from {feel.describe(low)} to {feel.describe(high)}")
-        return None
-    included, unbounded = (
-        (node.low_included, node.high_included),
-        (node.low is None, node.high is None),
-    )
-    return feel.Range(low, high, *included, node.negated, node.descends, *unbounded)
+    included, negated = (node.low_included, node.high_included), node.negated
+    opens = node.low is None, node.high is None
+
+    def ranged(read: ReadValue) -> Computed:
+        low, high = low_run(read), high_run(read)
+        ends = [each for each in (low, high) if each is not None]
+        if len({feel.kind(each) for each in ends}) > 1 or not all(map(feel.is_ordered, ends)):
+            feel.without_value(f"a range from {feel.describe(low)} to {feel.describe(high)}")
+            return None
+        return feel.Range(low, high, *included, negated, node.descends, *opens)
+
+    return ranged
 
 
-def _lambda(node: Lambda, read: ReadValue, rules: Rules) -> Computed:
+def _lambda(node: Lambda, rules: Rules) -> Evaluate:
+    body, size = evaluator(node.body, rules), _size(node.body)
+
     def call(closure: feel.Closure, arguments: list[Computed]) -> Computed:
         inner = closure.read
         for name, value in zip(closure.parameters, arguments, strict=True):
             inner = bind(name, value, inner)
-        look_at(sum(1 for _ in walk(closure.body)))
+        look_at(size)
         depth = _calls.get()
         if depth >= MAX_CALLS:
             raise ExpressionError(f"functions call each other deeper than {MAX_CALLS} levels")
         token = _calls.set(depth + 1)
         try:
-            return evaluate(closure.body, inner, rules)
+            return body(inner)
         finally:
             _calls.reset(token)
 
-    return feel.Closure(node.parameters, node.body, read, call)
+    return lambda read: feel.Closure(node.parameters, node.body, read, call)
 
 
-def _invoke(node: Invoke, read: ReadValue, rules: Rules) -> Computed:
-    function = evaluate(node.function, read, rules)
-    if not isinstance(function, feel.Closure):
-        feel.without_value(f"{feel.describe(function)} is no function")
-        return None
-    arguments = [evaluate(each, read, rules) for each in node.arguments]
-    if node.names:
-        given = dict(zip(node.names, arguments, strict=True))
-        if {*given} != {*function.parameters}:
-            feel.without_value("a function is called with other arguments than it has")
+def _invoke(node: Invoke, rules: Rules) -> Evaluate:
+    called, runs = evaluator(node.function, rules), _all(node.arguments, rules)
+
+    def invoked(read: ReadValue) -> Computed:
+        function = called(read)
+        if not isinstance(function, feel.Closure):
+            feel.without_value(f"{feel.describe(function)} is no function")
             return None
-        arguments = [given[each] for each in function.parameters]
-    if len(arguments) != len(function.parameters):
-        feel.without_value(
-            f"a function of {len(function.parameters)} arguments got {len(arguments)}"
-        )
-        return None
-    return function.call(function, arguments)
+        arguments = [run(read) for run in runs]
+        if node.names:
+            given = dict(zip(node.names, arguments, strict=True))
+            if {*given} != {*function.parameters}:
+                feel.without_value("a function is called with other arguments than it has")
+                return None
+            arguments = [given[each] for each in function.parameters]
+        if len(arguments) != len(function.parameters):
+            feel.without_value(
+                f"a function of {len(function.parameters)} arguments got {len(arguments)}"
+            )
+            return None
+        return function.call(function, arguments)
+
+    return invoked
 
 
-def _instance_of(node: InstanceOf, read: ReadValue, rules: Rules) -> Computed:
-    return _is_a(evaluate(node.value, read, rules), node.type)
+def _instance_of(node: InstanceOf, rules: Rules) -> Evaluate:
+    run, wanted = evaluator(node.value, rules), node.type
+    return lambda read: _is_a(run(read), wanted)
 
 
 def _is_a(value: Computed, wanted: TypeName) -> bool:
@@ -382,22 +459,24 @@ def _is_a(value: Computed, wanted: TypeName) -> bool:
     return True
 
 
-def _list(node: ListOf, read: ReadValue, rules: Rules) -> Computed:
-    return bounded_list([evaluate(item, read, rules) for item in node.items])
+def _list(node: ListOf, rules: Rules) -> Evaluate:
+    runs = _all(node.items, rules)
+    return lambda read: bounded_list([run(read) for run in runs])
 
 
-def _call(node: Call, read: ReadValue, rules: Rules) -> Computed:
-    arguments = [evaluate(each, read, rules) for each in node.arguments]
+def _call(node: Call, rules: Rules) -> Evaluate:
+    call, runs = LISTED[node.function].call, _all(node.arguments, rules)
     if rules.ternary and not node.function.startswith("FEEL "):
-        arguments = [feel.to_data(each) for each in arguments]
-    return LISTED[node.function].call(arguments)
+        return lambda read: call([feel.to_data(run(read)) for run in runs])
+    return lambda read: call([run(read) for run in runs])
 
 
-def _join(node: Join, read: ReadValue, rules: Rules) -> Computed:
-    return join([evaluate(part, read, rules) for part in node.parts])
+def _join(node: Join, rules: Rules) -> Evaluate:
+    runs = _all(node.parts, rules)
+    return lambda read: join([run(read) for run in runs])
 
 
-_EVALUATE: dict[type[Node], Callable[[Any, ReadValue, Rules], Computed]] = {
+_MAKE: dict[type[Node], Callable[[Any, Rules], Evaluate]] = {
     Literal: _literal,
     Name: _name,
     ListOf: _list,

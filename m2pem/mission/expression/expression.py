@@ -1,6 +1,7 @@
 """A parsed expression, and the ways to get one from text."""
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import NoReturn
@@ -8,10 +9,10 @@ from typing import NoReturn
 from m2pem.errors import ExpressionError
 from m2pem.mission.expression import feel_values
 from m2pem.mission.expression.dialect import Dialect, Span, locate, split
-from m2pem.mission.expression.evaluate import evaluate
+from m2pem.mission.expression.evaluate import evaluator
 from m2pem.mission.expression.feel import FeelParser
 from m2pem.mission.expression.literals import shorten, show_scalar
-from m2pem.mission.expression.operators import begin_work, truth
+from m2pem.mission.expression.operators import begin_work
 from m2pem.mission.expression.parser import Parser
 from m2pem.mission.expression.rules import RULES, Rules
 from m2pem.mission.expression.tree import Join, Literal, Node, names
@@ -34,10 +35,14 @@ class Expression:
     tree: Node
     names: frozenset[str] = field(init=False)
     rules: Rules = field(init=False)
+    _run: Callable[[ReadValue], Value] | None = field(init=False, default=None)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "names", names(self.tree))
         object.__setattr__(self, "rules", RULES[self.dialect])
+
+    def __reduce__(self) -> tuple[type["Expression"], tuple[str, Dialect, Node]]:
+        return Expression, (self.text, self.dialect, self.tree)
 
     @property
     def constant(self) -> bool:
@@ -56,11 +61,7 @@ class Expression:
         if new_limit:
             begin_work()
         try:
-            rules = self.rules
-            if rules.ternary:
-                feel_values.begin()
-            value = evaluate(self.tree, read, rules)
-            return rules.result(value) if rules.result else value
+            return (self._run or self._prepare())(read)
         except ExpressionError as error:
             self._explain(error)
         except RecursionError:
@@ -74,20 +75,27 @@ class Expression:
         """
         begin_work()
         try:
-            rules = self.rules
-            if rules.ternary:
-                return self._feel_holds(read)
-            value = evaluate(self.tree, read, rules)
-            return value if value is True or value is False else rules.truth(value, "a condition")
+            value = (self._run or self._prepare())(read)
+            if value is True or value is False:
+                return value
+            return self.rules.truth(value, "a condition")
         except ExpressionError as error:
             self._explain(error)
         except RecursionError:
             self._explain(ExpressionError("functions and values are nested too deep"))
 
-    def _feel_holds(self, read: ReadValue) -> bool:
-        feel_values.begin()
-        value = evaluate(self.tree, read, self.rules)
-        return truth(feel_values.result(value), "a condition")
+    def _prepare(self) -> Callable[[ReadValue], Value]:
+        """Make what evaluates it: most expressions of a mission are never evaluated."""
+        of_tree, rules, result = evaluator(self.tree, self.rules), self.rules, self.rules.result
+
+        def of_data(read: ReadValue) -> Value:
+            if rules.ternary:
+                feel_values.begin()
+            return result(of_tree(read)) if result else of_tree(read)
+
+        run: Callable[[ReadValue], Value] = of_data if result else of_tree
+        object.__setattr__(self, "_run", run)
+        return run
 
     def _explain(self, error: ExpressionError) -> NoReturn:
         raise ExpressionError(f"{error}, in {shorten(self.text.strip())!r}") from error

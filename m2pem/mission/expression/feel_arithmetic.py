@@ -3,7 +3,7 @@
 import operator
 from collections.abc import Callable, Mapping
 from datetime import UTC, date, datetime, time, timedelta
-from decimal import Decimal, InvalidOperation, localcontext
+from decimal import Decimal
 from functools import partial
 from typing import Any
 
@@ -29,23 +29,21 @@ _WHOLE: Mapping[Operation, Callable[[int, int], int]] = {
 _MOST_WHOLE = 10**18
 
 
+_COMPUTE: Mapping[Operation, Callable[[Decimal, Decimal], Decimal]] = {
+    Operation.ADD: DIGITS.add,
+    Operation.SUBTRACT: DIGITS.subtract,
+    Operation.MULTIPLY: DIGITS.multiply,
+    Operation.DIVIDE: DIGITS.divide,
+    Operation.POWER: DIGITS.power,
+}
+
+
 def _numbers(symbol: Operation, left: Decimal, right: Decimal) -> Decimal | None:
-    with localcontext(DIGITS) as context:
-        try:
-            match symbol:
-                case Operation.ADD:
-                    found = left + right
-                case Operation.SUBTRACT:
-                    found = left - right
-                case Operation.MULTIPLY:
-                    found = left * right
-                case Operation.DIVIDE:
-                    found = left / right
-                case _:
-                    found = left**right
-        except (ArithmeticError, InvalidOperation):
-            return None
-        return found if found.is_finite() and context else None
+    try:
+        found = _COMPUTE[symbol](left, right)
+    except ArithmeticError:
+        return None
+    return found if found.is_finite() else None
 
 
 def arithmetic(symbol: Operation, left: FeelValue, right: FeelValue) -> FeelValue:

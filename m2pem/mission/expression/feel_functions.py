@@ -7,7 +7,7 @@ item, and a value for a list of it, where the other is wanted (clause 10.3.2.9.4
 import math
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from decimal import (
     ROUND_CEILING,
     ROUND_DOWN,
@@ -64,6 +64,10 @@ class FeelFunction:
     others: tuple["FeelFunction", ...] = ()
     more: bool = False
     decimals: bool = False
+    _least: int = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_least", sum(not each.optional for each in self.parameters))
 
     def call(self, arguments: Sequence[FeelValue]) -> FeelValue:
         """Return the value; null where there is none."""
@@ -75,9 +79,7 @@ class FeelFunction:
 
     def accepts(self, count: int) -> bool:
         """Whether it may be called so with so many arguments."""
-        least = sum(not each.optional for each in self.parameters)
-        most = math.inf if self.rest or self.more else len(self.parameters)
-        return least <= count <= most
+        return count >= self._least and (count <= len(self.parameters) or self.rest or self.more)
 
     def _fits(self, arguments: Sequence[FeelValue]) -> bool:
         if not self.accepts(len(arguments)):
@@ -93,7 +95,9 @@ class FeelFunction:
         if self.rest and (len(arguments) > 1 or not isinstance(arguments[0], list)):
             arguments = [[*arguments]]
         taken = list[FeelValue]()
-        parameters = (*self.parameters, *[self.parameters[-1]] * (len(arguments) * self.more))
+        parameters = self.parameters
+        if self.more:
+            parameters += parameters[-1:] * len(arguments)
         for each, value in zip(parameters, arguments, strict=False):
             if value is None and each.kinds and not each.optional:
                 return None

@@ -20,6 +20,7 @@ from m2pem.mission.values import Value
 _LONG = re.compile(r"[+-]?[0-9]+")
 _DOUBLE = re.compile(r"\s*[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?\s*")
 _OF_DOUBLES = frozenset(".eE")
+_NUMBERS = frozenset({int, float})
 _DIRECT = frozenset({bool, int, str})
 """Types whose values Python compares as Java does."""
 
@@ -57,7 +58,7 @@ def _long(value: Computed) -> int:
 
 
 def _number(value: Computed, written: re.Pattern[str]) -> Any:
-    if isinstance(value, int | float) and not isinstance(value, bool):
+    if type(value) in _NUMBERS:
         return value
     if value is None or value == "":
         return 0
@@ -81,13 +82,17 @@ def _arithmetic(
     compute: Callable[[Any, Any], Any],
     doubles: Callable[[float, float], float],
 ) -> Binary:
+    what, divides = f"'{symbol}'", symbol is Operation.DIVIDE
+
     def apply(left: Computed, right: Computed) -> Computed:
-        if left is None and right is None:
-            return 0
-        if symbol is Operation.DIVIDE or _is_double(left) or _is_double(right):
-            return doubles(_double(left), _double(right))
+        if divides or not type(left) is type(right) is int:
+            if left is None and right is None:
+                return 0
+            if divides or _is_double(left) or _is_double(right):
+                return doubles(_double(left), _double(right))
+            left, right = _long(left), _long(right)
         try:
-            return bounded(compute(_long(left), _long(right)), f"'{symbol}'", left, right)
+            return bounded(compute(left, right), what, left, right)
         except ZeroDivisionError:
             raise ExpressionError(f"'{symbol}' divides {describe(left)} by zero") from None
 

@@ -122,7 +122,11 @@ def contains(container: Computed, item: Computed) -> bool:
     """`item in container`; nothing is in null."""
     if isinstance(container, list):
         look_at(len(container))
-        return any(kind(each) == kind(item) and equal(each, item) for each in container)
+        wanted = kind(item)
+        return any(
+            each == item if type(each) is str else kind(each) == wanted and equal(each, item)
+            for each in container
+        )
     if container is None:
         return False
     hint = "; use contains(text, part)" if isinstance(container, str) else ""
@@ -211,23 +215,19 @@ def _arithmetic(
     symbol: Operation, compute: Callable[[int | float, int | float], int | float]
 ) -> Binary:
     takes = "two numbers or two texts" if symbol is Operation.ADD else "two numbers"
+    what = f"'{symbol}'"
 
     def apply(left: Computed, right: Computed) -> Computed:
         if left is None or right is None:
             return None
-        if (
-            isinstance(left, (int, float))
-            and isinstance(right, (int, float))
-            and not isinstance(left, bool)
-            and not isinstance(right, bool)
-        ):
+        if type(left) in _NUMBERS and type(right) in _NUMBERS:
             try:
                 result = compute(left, right)
             except ZeroDivisionError:
                 raise ExpressionError(f"'{symbol}' divides {describe(left)} by zero") from None
             except OverflowError:
                 result = math.inf
-            return bounded(result, f"'{symbol}'", left, right)
+            return bounded(result, what, left, right)
         if symbol is Operation.ADD and isinstance(left, str) and isinstance(right, str):
             return bounded_text(left + right, "'+'")
         hint = "; text(x) turns a value into a text" if "text" in (kind(left), kind(right)) else ""

@@ -26,10 +26,6 @@ class Rules:
     result: Callable[[Computed], Value] | None = None
     ternary: bool = False
 
-    def __reduce__(self) -> tuple[Callable[[Dialect], "Rules"], tuple[Dialect]]:
-        dialect = next(each for each, rules in RULES.items() if rules is self)
-        return rules_of, (dialect,)
-
 
 BARE = Rules(truth, COMPARISONS, ARITHMETIC, negate)
 _JUEL = Rules(juel.truth, juel.COMPARISONS, juel.ARITHMETIC, juel.negate, juel.result)
@@ -51,8 +47,3 @@ RULES = {
         xpath.truth, xpath.COMPARISONS, xpath.ARITHMETIC, xpath.negate, juel.result
     ),
 }
-
-
-def rules_of(dialect: Dialect) -> Rules:
-    """Return the rules of a dialect."""
-    return RULES[dialect]
