@@ -88,10 +88,8 @@ class TeamBehavior:
 
     def start(self) -> None:
         """Begin, or go on after a restart."""
-        if self._plan.march is not None and self._plan.march.past:
-            _log.warning(
-                "%s: members pass others that wait to set off, within the spacing", self.id
-            )
+        if self._plan.march is not None and self._plan.march.in_order:
+            _log.warning("%s: members go around others that wait to set off", self.id)
         self._ticking = asyncio.get_running_loop().create_task(self._tick())
         for report in self._ended_meanwhile:
             self.report_received(report)

@@ -21,10 +21,6 @@ from m2pem.teams.plan import Marcher
 NEAREST_SHARE = 0.84
 """Share of the spacing that is aimed at, to keep a minimum distance of 0.8 in the plane."""
 
-_PAST_SHARE = 0.6
-"""Of the minimum distance: so near do members on the route pass those that stand in their starting
-places, where they could not set off else; nearer where one stands at the route's beginning."""
-
 _STEPS = 24
 """Places of a path that are looked at within the minimum distance."""
 
@@ -35,10 +31,10 @@ _Floats: TypeAlias = NDArray[np.float64]
 
 
 class Clearance:
-    """How far each member may go, by where the others are. `apart_m`: the minimum distance; `past`
-    others that stand in their starting places, members ahead of them go as near as a share."""
+    """How far each member may go, by where the others are. `apart_m`: the minimum distance.
+    `in_order`: on its way to the route, a member goes before those behind it."""
 
-    def __init__(self, marchers: Sequence[Marcher], apart_m: float, past: bool = False) -> None:
+    def __init__(self, marchers: Sequence[Marcher], apart_m: float, in_order: bool = False) -> None:
         order = sorted(range(len(marchers)), key=lambda index: marchers[index].back_m)
         self._yields: dict[int, list[tuple[int, _Floats, _Floats]]] = {each: [] for each in order}
         for first, second in combinations(order, 2):
@@ -46,16 +42,15 @@ class Clearance:
             zone, own_m, from_m, to_m = pair.rows()
             early = _lead_m(marchers[first], from_m) < _lead_m(marchers[second], own_m)
             ahead = np.isin(zone, zone[early])
+            if in_order:
+                ahead |= ~np.isin(zone, zone[np.isin(to_m, pair.ends_m[-1:])])
             self._add(second, first, own_m[ahead], to_m[ahead])
-            # Nor does the one ahead pass the other, on the route, before that has set off.
-            at_m, stands = from_m, ahead & (own_m == 0.0)
-            if past:
-                near = _Pair(marchers[first], marchers[second], _PAST_SHARE * apart_m)
-                _, waits_m, at_m, _ = near.rows()
-                stands = waits_m == 0.0
-            begins = stands & (at_m > marchers[first].path.along_m(0.0))
-            enters = at_m[begins & ~np.isin(at_m, pair.ends_m)]
+            # Nor does one pass the other before that has set off.
+            waits = ahead & (own_m == 0.0) & (from_m > 0.0)
+            enters = from_m[waits & ~np.isin(from_m, pair.ends_m)]
             self._add(first, second, enters, 0 * enters)
+            enters = own_m[~ahead & (from_m == 0.0) & (own_m > 0.0)]
+            self._add(second, first, enters, 0 * enters)
             if not ahead.all():
                 zone_too, own_m, _, to_m = pair.rows(swapped=True)
                 behind = ~np.isin(zone_too, zone[ahead])
@@ -112,11 +107,12 @@ class _Pair:
                 np.array(shapely.linestrings(np.stack([x[:-1, style], x[1:, style]], 1)))
                 for x in (a, b)
             )
+            ends_a, ends_b = (np.array(shapely.points(each[:, style])) for each in (a, b))
             i, k = shapely.STRtree(other).query(one, predicate="dwithin", distance=apart_m)
             keys = np.union1d(keys, i * len(b) + k)
             for step, ends, leg in (
-                (len(b), shapely.points(a[i + 1, style]), other[k]),
-                (1, shapely.points(b[k + 1, style]), one[i]),
+                (len(b), ends_a[i + 1], other[k]),
+                (1, ends_b[k + 1], one[i]),
             ):
                 linked = (i * len(b) + k)[shapely.distance(ends, leg) < apart_m]
                 edges.append(np.stack([linked, linked + step], 1))
@@ -124,7 +120,7 @@ class _Pair:
         links = np.searchsorted(keys, links[np.isin(links, keys).all(1)])
         graph = rustworkx.PyGraph()
         graph.add_nodes_from(range(len(keys)))
-        graph.add_edges_from_no_data(list(map(tuple, links.tolist())))
+        graph.add_edges_from_no_data(list(zip(*links.T.tolist(), strict=True)))
         self._zone = np.empty(len(keys), int)
         for number, parts in enumerate(rustworkx.connected_components(graph)):
             self._zone[list(parts)] = number
@@ -138,9 +134,11 @@ class _Pair:
         if swapped:
             own, other, i, k = other, own, k, i
         lengths_m = np.diff(own[:, 0])[i]
-        counts = np.ceil(lengths_m / self._apart_m * _STEPS).astype(int) + 1
+        low, high = self._near(own, other, i, k)
+        counts = np.ceil((high - low) * lengths_m / self._apart_m * _STEPS).astype(int) + 1
         part = np.repeat(np.arange(len(i)), counts)
-        share = (np.arange(len(part)) - (np.cumsum(counts) - counts)[part]) / (counts - 1)[part]
+        at = np.arange(len(part)) - (np.cumsum(counts) - counts)[part]
+        share = low[part] + at * ((high - low) / np.maximum(counts - 1, 1))[part]
         begin, leg = own[i][part], np.diff(own, axis=0)[i][part]
         rows = begin + share[:, None] * leg
         found = []
@@ -149,8 +147,8 @@ class _Pair:
             long_m = np.hypot(*ways.T)
             unit = (ways / long_m[:, None])[k][part]
             between = rows[:, style] - other[k, style][part]
-            foot_m = (between * unit).sum(1)
-            half_m = np.sqrt(np.maximum(0.0, self._apart_m**2 - (between**2).sum(1) + foot_m**2))
+            foot_m, off2 = _dot(between, unit), _dot(between, between)
+            half_m = np.sqrt(np.maximum(0.0, self._apart_m**2 - off2 + foot_m**2))
             low, high = np.maximum(0.0, foot_m - half_m), foot_m + half_m
             high = np.minimum(high, long_m[k][part])
             near = (half_m > 0.0) & (low <= high)
@@ -159,6 +157,25 @@ class _Pair:
             found.append([each[near] for each in columns])
         zone, own_m, begins_m, ends_m = (np.concatenate(each) for each in zip(*found, strict=True))
         return zone, own_m, begins_m, ends_m
+
+    def _near(
+        self, own: _Floats, other: _Floats, i: NDArray[np.int_], k: NDArray[np.int_]
+    ) -> tuple[_Floats, _Floats]:
+        """Return the shares of legs of one path between which those of the other one are near."""
+        found = []
+        for style in (_SHARP, _BENT):
+            begin, leg = own[i, style], np.diff(own[:, style], axis=0)[i]
+            square_m2 = np.maximum(_dot(leg, leg), _NOTHING_M)
+            feet = [_dot(other[k + end, style] - begin, leg) / square_m2 for end in (0, 1)]
+            reach = self._apart_m / np.sqrt(square_m2)
+            found.append((np.minimum(*feet) - reach, np.maximum(*feet) + reach))
+        low, high = np.minimum(*(low for low, _ in found)), np.maximum(*(high for _, high in found))
+        return np.clip(low, 0.0, 1.0), np.clip(high, 0.0, 1.0)
+
+
+def _dot(a: _Floats, b: _Floats) -> _Floats:
+    """Return the product of each two vectors."""
+    return a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1]
 
 
 def _driven(path: MemberPath) -> _Floats:

@@ -9,20 +9,30 @@ import numpy as np
 
 from m2pem.fleet.parameters import read_offsets
 from m2pem.geo.fence import Fence
+from m2pem.geo.lazy_imports import shapely
 from m2pem.geo.local_frame import EastNorth, LatLon
 from m2pem.geo.polyline import EastNorthUp, Polyline, Segment
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.geometry import Route
 from m2pem.teams.clearance import NEAREST_SHARE, Clearance
-from m2pem.teams.paths import SHAPES, SPACING_M, MemberPath, beside, lane, slot
+from m2pem.teams.paths import (
+    SHAPES,
+    SPACING_M,
+    MemberPath,
+    beside,
+    keep_out,
+    lane,
+    lead_around,
+    slot,
+)
 from m2pem.teams.plan import (
-    MOTIONS,
     NO_MEETING,
     Leg,
     March,
     Marcher,
     Meeting,
     MemberPose,
+    Motion,
     Plan,
     PlanningContext,
     TeamRefusedError,
@@ -33,6 +43,9 @@ GAP_SHARE = 0.5
 
 HEADROOM_SHARE = 0.4
 """Share of the spacing that the stopping distance may take, to avoid frequent braking."""
+
+_AROUND_SHARE = 0.9
+"""Share of the spacing at which members go around others that wait."""
 
 _SAME_PLACE_M = 0.01
 _LOOKS = 10_000
@@ -50,12 +63,14 @@ def march(context: PlanningContext, default_shape: str) -> Plan:
     route = context.parameters.route
     if route is None:
         return Plan(_forming_up(context, places, chained=False))
-    ways, past = _ways(context, route, places, spacing)
-    marchers = tuple(way.marcher(context) for way in ways)
+    ways, in_order = _ways(context, route, places, spacing)
+    marchers = tuple(way.marcher(context.motion(way.member)) for way in ways)
     speed = _march_speed(context, marchers, spacing)
     legs = tuple(way.leg(context, speed, None) for way in ways)
     closes = shape == "column"
-    return Plan(legs, March(marchers, spacing, speed, closes, context.frame, context.fence, past))
+    return Plan(
+        legs, March(marchers, spacing, speed, closes, context.frame, context.fence, in_order)
+    )
 
 
 def one_by_one(context: PlanningContext) -> Plan:
@@ -64,7 +79,7 @@ def one_by_one(context: PlanningContext) -> Plan:
     route = context.parameters.route
     if route is None:
         return Plan(_forming_up(context, places, chained=True))
-    ways, _ = _ways(context, route, places, spacing)
+    ways = _ways_in_order(context, route, places, spacing)
     befores: list[ResourceId | None] = [None, *(way.member for way in ways)]
     speed_m_s = context.parameters.speed_m_s
     return Plan(
@@ -98,11 +113,12 @@ def turns(context: PlanningContext, behavior: str, least_m: float) -> Meeting:
         for member, (back, left) in zip(context.members, places, strict=False)
     }
     context = replace(context, poses=poses)
+    find = _ways_in_order if behavior == "bridge_crossing" else _ways
     try:
-        _ways(context, route, places, spacing)
+        find(context, route, places, spacing)
     except TeamRefusedError as error:
         return str(error), "", error.place
-    distance_m, place, text = _meeting(context, _drawn(context, route, places, spacing))
+    distance_m, place, text = _meeting(context, _drawn(context, route, places))
     if distance_m >= GAP_SHARE * spacing or behavior == "bridge_crossing":
         return NO_MEETING
     remedy = f"the members pass it one after the other, or else {_REMEDY}"
@@ -115,79 +131,71 @@ def lane_mates(a: Marcher, b: Marcher, spacing_m: float) -> bool:
 
 
 class _Way:
-    """A member's route: the team's, shifted sideways and shortened by its distance behind."""
+    """A member's route: the team's, shifted sideways and shortened by its distance behind.
+
+    `begin`: where it comes from; None: it is on the route.
+    """
 
     def __init__(
         self,
         member: ResourceId,
         route: Sequence[EastNorthUp],
         place: tuple[float, float],
-        spacing_m: float,
+        begin: EastNorth | None,
     ) -> None:
-        self.member, self._spacing_m = member, spacing_m
+        self.member, self._begin = member, begin
+        self._around: Fence | None = None
         self._back_m, self._left_m = place
         self._route = route
         self._route_marks_m = Polyline(each[:2] for each in route).marks_m
         self._end_at(self._route_marks_m[-1] - self._back_m)
 
     def _end_at(self, mark_m: float) -> None:
-        self._places = lane(self._route, self._route_marks_m[-1] - mark_m, self._left_m)
-        self._marks = [*self._route_marks_m[: len(self._places) - 1], mark_m]
+        places = lane(self._route, self._route_marks_m[-1] - mark_m, self._left_m)
+        marks_m = [*self._route_marks_m[: len(places) - 1], mark_m]
+        self._mark_m, self.alone = mark_m, len(places) == 1
+        self.lane = MemberPath(places * (1 + self.alone), marks_m * (1 + self.alone))
+        self.path = self.lane
+        if self._begin is not None:
+            places = [(*self._begin, places[0][2]), *places]
+            first_m = marks_m[0] - math.dist(places[0][:2], places[1][:2])
+            self.path = MemberPath(places, [first_m, *marks_m])
+            if self._around and (led := lead_around(places, self._around)):
+                self.path = self.path.onward(led)
+                self.alone = self.alone and len(led) == 2
 
-    def marcher(self, context: PlanningContext | None = None) -> Marcher:
-        """The member on its path; without a context, without the way from where it is."""
-        kept, marks = self._places, self._marks
-        begin = context.begin(self.member) if context is not None else None
-        motion = context.motion(self.member) if context is not None else MOTIONS["ground"]
-        if begin is not None:
-            way = [(*begin, 0.0), *((*each, 0.0) for each in self._via(context)), kept[0]]
-            line = Polyline(each[:2] for each in way)
-            first_m = marks[0] - line.length_m
-            kept = [*way, *kept[1:]]
-            marks = [*(first_m + each for each in line.marks_m), *marks[1:]]
-        elif len(kept) == 1:
-            kept, marks = [*kept, *kept], [*marks, *marks]
-        return Marcher(self.member, MemberPath(kept, marks), self._back_m, self._left_m, motion)
+    def lead_around(
+        self, waiting: Sequence[EastNorth], spacing_m: float, context: PlanningContext
+    ) -> None:
+        """Lead it around where others wait, as far from them as where it begins and ends."""
+        ends = context.poses[self.member].place, self.path.places[-1][:2]
+        discs = []
+        for place in waiting:
+            nearest_m = min(math.dist(place, end) for end in ends)
+            radius_m = min(_AROUND_SHARE * spacing_m, nearest_m - _SAME_PLACE_M)
+            discs.append(shapely.Point(place).buffer(radius_m))
+        self._around = keep_out(discs, context.fence, context.frame)
+        self._end_at(self._mark_m)
 
-    def _via(self, context: PlanningContext | None) -> Sequence[EastNorth]:
-        """The places to pass on the way to the route, around where those behind it begin."""
-        begin = None if context is None else context.begin(self.member)
-        if context is None or begin is None:
-            return ()
-        apart_m = NEAREST_SHARE * self._spacing_m
-        behind = context.members[context.members.index(self.member) + 1 :]
-        others = [context.begin(each) for each in behind]
-        ends = begin, self._places[0][:2]
-        discs = [
-            [*ring, ring[0]]
-            for each in others
-            if each is not None and min(math.dist(each, end) for end in ends) > apart_m
-            for ring in [
-                [beside(each, math.tau * k / 16, apart_m * 1.03, 0.0)[:2] for k in range(16)]
-            ]
-        ]
-        via = (Fence.around(discs).way(*ends) or ()) if discs else ()
-        track = [begin, *via, ends[1]]
-        fenced = via and context.fence is not None
-        if fenced and Fence(context.fence, frame=context.frame).leaves(track):
-            return ()
-        return via
+    def marcher(self, motion: Motion, *, begins: bool = True) -> Marcher:
+        """The member on its path; or on that without its way to the route."""
+        path = self.path if begins else self.lane
+        return Marcher(self.member, path, self._back_m, self._left_m, motion)
 
     def shorten(self, by_m: float) -> None:
         """Let it end so much earlier, or a little more."""
-        self._end_at(self._marks[-1] - by_m - _SAME_PLACE_M)
+        self._end_at(self._mark_m - by_m - _SAME_PLACE_M)
 
     def leg(
         self, context: PlanningContext, speed_m_s: float | None, after: ResourceId | None
     ) -> Leg:
         route = context.parameters.route
-        if len(self._places) < 2 or route is None:
-            return context.to_place(self.member, self._places[0], after=after)
-        ups = [waypoint[2] for waypoint in _apart(context, route)]
-        via = [(*each, self._places[0][2]) for each in self._via(context)]
+        if self.alone or route is None:
+            return context.to_place(self.member, self.path.places[-1], after=after)
+        high = all(each[2] is not None for each in route.waypoints)
         waypoints = tuple(
-            context.coordinate(place, None if up is None else place[2])
-            for place, up in zip([*via, *self._places], [*ups[:1] * len(via), *ups], strict=False)
+            context.coordinate(place, place[2] if high else None)
+            for place in self.path.places[self._begin is not None :]
         )
         parameters = {"route": Route(waypoints, route.altitude_frame), "speed": speed_m_s}
         return context.leg(self.member, "single_vehicle_routing", parameters, after)
@@ -222,22 +230,35 @@ def _ways(
     offsets: Sequence[tuple[float, float]],
     spacing_m: float,
 ) -> tuple[list[_Way], bool]:
-    """Return the members' ways, and whether some lead past where others wait to set off."""
-    ways = _drawn(context, route, offsets, spacing_m)
+    """Return the members' ways, and whether they set off in their order: where they are in each
+    other's ways else."""
+    ways = _drawn(context, route, offsets)
     try:
-        _keep_ends_apart(context, ways, spacing_m, past=False)
+        _keep_ends_apart(context, ways, spacing_m, in_order=False)
     except _InTheWayError:
-        ways = _drawn(context, route, offsets, spacing_m)
-        _keep_ends_apart(context, ways, spacing_m, past=True)
-        return ways, True
+        return _ways_in_order(context, route, offsets, spacing_m), True
     return ways, False
 
 
-def _drawn(
+def _ways_in_order(
     context: PlanningContext,
     route: Route,
     offsets: Sequence[tuple[float, float]],
     spacing_m: float,
+) -> list[_Way]:
+    """Return ways around those that have not set off, and those that have arrived."""
+    ways = _drawn(context, route, offsets)
+    if not context.begun:
+        begins = [context.poses[way.member].place for way in ways]
+        ends = [way.lane.places[-1][:2] for way in ways]
+        for index, way in enumerate(ways):
+            way.lead_around([*ends[:index], *begins[index + 1 :]], spacing_m, context)
+    _keep_ends_apart(context, ways, spacing_m, in_order=True)
+    return ways
+
+
+def _drawn(
+    context: PlanningContext, route: Route, offsets: Sequence[tuple[float, float]]
 ) -> list[_Way]:
     if route.altitude_frames and context.parameters.altitude_m is None:
         raise TeamRefusedError(
@@ -246,7 +267,7 @@ def _drawn(
         )
     places = [(*context.level(each), each[2] or 0.0) for each in _apart(context, route)]
     return [
-        _Way(member, places, offset, spacing_m)
+        _Way(member, places, offset, context.begin(member))
         for member, offset in zip(context.members, offsets, strict=False)
     ]
 
@@ -262,7 +283,7 @@ class _InTheWayError(TeamRefusedError):
 
 
 def _keep_ends_apart(
-    context: PlanningContext, ways: Sequence[_Way], spacing_m: float, *, past: bool
+    context: PlanningContext, ways: Sequence[_Way], spacing_m: float, *, in_order: bool
 ) -> None:
     """Let members end earlier that would come too near to those at their ends.
 
@@ -273,8 +294,8 @@ def _keep_ends_apart(
     farther_m = [0.0 for _ in ways]
     shorter = True
     while shorter:
-        marchers = [way.marcher(context) for way in ways]
-        clearance = Clearance(marchers, NEAREST_SHARE * spacing_m, past)
+        marchers = [way.marcher(context.motion(way.member)) for way in ways]
+        clearance = Clearance(marchers, NEAREST_SHARE * spacing_m, in_order)
         ends_m = [each.path.line.length_m for each in marchers]
         shorter = False
         for index, at_m in enumerate(clearance.reached_m([0.0] * len(ways), ends_m, short_m)):
@@ -284,7 +305,7 @@ def _keep_ends_apart(
             if not context.begun and too_far:
                 _, place, text = _meeting(context, ways)
                 text = f"{text}, and {way.member} cannot wait until it is free: {_REMEDY}"
-                alone = [each.marcher() for each in ways]  # without their ways to the route
+                alone = [each.marcher(context.motion(each.member), begins=False) for each in ways]
                 ends_m = [each.path.line.length_m for each in alone]
                 begins_m = [0.0] * len(ways)
                 clearance = Clearance(alone, NEAREST_SHARE * spacing_m)
@@ -298,7 +319,8 @@ def _keep_ends_apart(
 
 def _meeting(context: PlanningContext, ways: Sequence[_Way]) -> tuple[float, LatLon, str]:
     """Return how near a formation brings two of its members, the corner there, and a text."""
-    marchers = sorted((way.marcher() for way in ways), key=lambda each: each.back_m)
+    marchers = [way.marcher(context.motion(way.member), begins=False) for way in ways]
+    marchers.sort(key=lambda each: each.back_m)
     ends_m = [each.back_m + mark_m for each in marchers for mark_m in each.path.marks_m]
     lead_m = np.linspace(min(ends_m), max(ends_m), _LOOKS)
     tracks = [

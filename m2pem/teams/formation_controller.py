@@ -12,13 +12,12 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from m2pem.api.telemetry import TeamMemberState
-from m2pem.geo.fence import Fence
 from m2pem.geo.lazy_imports import shapely
 from m2pem.geo.polyline import EastNorthUp
 from m2pem.mission.catalogue import ResourceId
-from m2pem.mission.geometry import Area
 from m2pem.teams.clearance import NEAREST_SHARE, Clearance
 from m2pem.teams.columns import GAP_SHARE, lane_mates
+from m2pem.teams.paths import keep_out, lead_around
 from m2pem.teams.plan import (
     REACTION_S,
     REACTION_SHARE,
@@ -159,24 +158,11 @@ class FormationController:
         track, frame = self._tracks[member], self._march.frame
         path, tracks = track.marcher.path, list(self._tracks.values())
         behind = [each.pose.place for each in tracks[tracks.index(track) + 1 :] if each.pose]
-        kept_out = (
-            each.buffer(self.spacing_m) for each in (*self._lost, *map(shapely.Point, behind))
-        )
-        rings = [[frame.to_latlon((x, y)) for x, y in each.exterior.coords] for each in kept_out]
-        areas = [Area((tuple((*corner, None) for corner in ring),)) for ring in rings]
-        fence = Fence(self._march.fence, areas, frame=frame)
-        here, *rest = path.rest(pose.place, track.find(pose))
-        places = [here]
-        for there in rest:
-            free = fence.is_free(there[:2], there[:2])
-            if not free and there is not rest[-1]:
-                continue
-            between = fence.way(places[-1][:2], there[:2])
-            if between is None:
-                return []
-            places += [(*each, there[2]) for each in between]
-            if free:
-                places.append(there)
+        where = (*self._lost, *map(shapely.Point, behind))
+        fence = keep_out((each.buffer(self.spacing_m) for each in where), self._march.fence, frame)
+        places = lead_around(path.rest(pose.place, track.find(pose)), fence)
+        if not places:
+            return []
         path = path.onward(places)
         track.marcher, track.along_m, track.stops_m = replace(track.marcher, path=path), 0.0, 0.0
         self._clearance = self._clear()
@@ -247,7 +233,7 @@ class FormationController:
 
     def _clear(self) -> Clearance:
         marchers = [track.marcher for track in self._tracks.values()]
-        return Clearance(marchers, self._nearest_m, self._march.past)
+        return Clearance(marchers, self._nearest_m, self._march.in_order)
 
     def _look(self, track: _Track, stand: MemberPose | None, arrived: bool) -> None:
         path = track.marcher.path

@@ -107,7 +107,7 @@ class March:
     """Members that move along one route and keep their places to each other, the lead first.
 
     `closes`: the members behind a lost one move up. `frame`: of the places; `fence`: the area that
-    no vehicle may leave. `past`: members go nearer than that past others that wait to set off.
+    no vehicle may leave. `in_order`: on its way to the route, each goes before those behind it.
     """
 
     marchers: tuple[Marcher, ...]
@@ -116,7 +116,7 @@ class March:
     closes: bool
     frame: LocalFrame
     fence: Area | None = None
-    past: bool = False
+    in_order: bool = False
 
 
 @dataclass(frozen=True, slots=True)
