@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from m2pem.bpmn.rules.data import UNWRITTEN_NAME
+from m2pem.bpmn.value_kinds import doubts
 from m2pem.findings import Finding
 from m2pem.mission.behavior import Assignment, Behavior, Parameter, Role
 from m2pem.mission.behavior import Mapping as DataMapping
@@ -27,11 +28,14 @@ from m2pem.mission.elements import (
 )
 from m2pem.mission.events import ConditionalEventDefinition, TimerEventDefinition, caught_data
 from m2pem.mission.expression import Expression, parse
+from m2pem.mission.expression.kinds import DATA, kinds
 from m2pem.mission.expression.temporal import NOW
 from m2pem.mission.loops import INSTANCE_COUNTS, LOOP_COUNTER, MultiInstance, StandardLoop
 from m2pem.mission.mission import Mission
 from m2pem.mission.remaining import GEOMETRIES, split_name
 from m2pem.suggestions import suggest_or
+
+_OF_ANY_KIND: Mapping[str, frozenset[str]] = {}
 
 
 class Read(NamedTuple):
@@ -60,6 +64,20 @@ class _Store:
     written: set[str] = field(default_factory=set)
     anything: bool = False
     """Whether something may write any name, such as a service that is not registered."""
+    kinds: dict[str, frozenset[str]] = field(default_factory=dict)
+    """What all that writes a name may make it, besides null."""
+
+    def write(
+        self, names: Iterable[str], known: Mapping[str, frozenset[str]] = _OF_ANY_KIND
+    ) -> None:
+        """Note what writes some names. `known`: the kinds of values; of others, any."""
+        self.written.update(names)
+        for name in names:
+            self.kinds[name] = self.kinds.get(name, frozenset()) | known.get(name, DATA)
+
+    def kinds_of(self, name: str) -> frozenset[str]:
+        """What a name may be, besides null."""
+        return DATA if self.anything else self.kinds.get(name, DATA)
 
     def has(self, name: str) -> bool:
         """Whether the name, or a map that holds it, is written."""
@@ -75,12 +93,14 @@ def unwritten(
     service_writes: Mapping[str, Sequence[str]],
     behavior_writes: Mapping[str, Sequence[str]],
 ) -> Iterator[Finding]:
-    """A warning for each name that a process reads and nothing writes; it would be null."""
+    """A warning for each name that a process reads and nothing writes, which would be null; and for
+    each expression that the kinds of what it reads let have no value, or another one than before.
+    """
     within: dict[Container, _Store] = {process: _Store() for process in mission.processes}
     stores = {process: within[process] for process in mission.processes}
     everywhere = {*known_names, *mission.associated}
     for store in stores.values():
-        store.written |= everywhere
+        store.write(everywhere)
     main = mission.process()
     called = {node.called for node in mission.nodes if isinstance(node, CallActivity)}
     for node in mission.nodes:
@@ -96,14 +116,14 @@ def unwritten(
         of_main = begins and node.container not in called
         if isinstance(node, Event):
             (stores[main] if of_main else store).reads += _conditions(node)
-        store.written |= written_by(node)
+        store.write(written_by(node), _kinds_written_by(node))
         if isinstance(node, ServiceTask) and node.call is not None:
             writes = service_writes.get(node.call.service)
-            store.written.update(writes or ())
+            store.write(writes or ())
             store.anything |= writes is None
         behavior = getattr(node, "behavior", None)
         if isinstance(behavior, Behavior):
-            store.written.update(behavior_writes.get(behavior.name, ()))
+            store.write(behavior_writes.get(behavior.name, ()))
         if isinstance(node, CallActivity):
             _note_mappings(node, store, stores[node.called])
     shared = {
@@ -113,9 +133,14 @@ def unwritten(
         if name in mission.data_stores or name.partition(".")[0] in mission.data_stores
     }
     for store in stores.values():
-        store.written |= shared
+        store.write(shared)
     for process, store in stores.items():
         yield from _findings(mission, process, store)
+        for read in store.reads:
+            for rule, said, remedy in doubts(read.expression, store.kinds_of):
+                reader = mission.elements.get(read.element)
+                file = mission.file_of(reader if isinstance(reader, FlowNode) else process)
+                yield rule.finding(file, read.line, read.element, said, remedy)
 
 
 def _findings(mission: Mission, process: Process, store: _Store) -> Iterator[Finding]:
@@ -255,9 +280,24 @@ def written_by(node: FlowNode) -> set[str]:
     return written - {""}
 
 
+def _kinds_written_by(node: FlowNode) -> dict[str, frozenset[str]]:
+    """The kinds of the values that a node writes itself, where they are known."""
+    found: dict[str, frozenset[str]] = {}
+    if isinstance(node, Activity) and node.loop is not None:
+        found |= dict.fromkeys((LOOP_COUNTER, *INSTANCE_COUNTS), frozenset({"number"}))
+    if isinstance(node, ScriptTask) and node.script is not None:
+        for statement in node.script.statements:
+            if isinstance(statement, Assignment):
+                key, made = statement.key, kinds(statement.expression.tree)
+                found[key] = found.get(key, frozenset()) | made
+    elif isinstance(node, UserTask) and node.prompt is not None:
+        found[node.prompt.store] = frozenset({"text"})
+    return found
+
+
 def _note_mappings(call: CallActivity, caller: _Store, called: _Store) -> None:
     for mapping in call.mappings.inputs:
         caller.reads.append(Read(mapping.source, call.id, mapping.line))
-        called.written.add(mapping.target)
+        called.write([mapping.target])
     for mapping in call.mappings.outputs:
         called.reads.append(Read(mapping.source, call.id, mapping.line))

@@ -39,6 +39,18 @@ UNWRITTEN_NAME = warning(
     "a name is read that nothing writes",
     "write it before, or pass it in",
 )
+MIXED_KINDS = warning(
+    319,
+    "mixed-kinds",
+    "an expression compares or computes kinds that do not go together",
+    "write number(x) or text(x)",
+)
+OTHER_VALUE = warning(
+    320,
+    "other-value",
+    "an expression has another value than in earlier versions, as its language says",
+    "write number(x) or text(x)",
+)
 EMPTY_ASSIGNMENT = warning(
     311,
     "empty-assignment",

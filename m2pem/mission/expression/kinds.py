@@ -1,7 +1,8 @@
 """Which kinds of values an expression can have, whatever is in the data."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import chain, product, repeat
+from typing import TypeAlias
 
 from m2pem.mission.expression.feel_functions import FeelFunction, Parameter
 from m2pem.mission.expression.functions import LISTED
@@ -28,37 +29,46 @@ from m2pem.mission.expression.tree import (
     RangeOf,
 )
 
-_DATA = frozenset({"boolean", "number", "text", "list", "map"})
+DATA = frozenset({"boolean", "number", "text", "list", "map"})
+"""What a name of data may be."""
+
+Of: TypeAlias = Callable[[str], frozenset[str]]
+"""The kinds that the values of a name may have, besides null."""
+
 _NEGATED = frozenset({"number", DAYS, MONTHS})
 
 
-def kinds(node: Node, *, coerced: bool = False) -> frozenset[str]:
+def kinds(node: Node, *, coerced: bool = False, of: Of = lambda _: DATA) -> frozenset[str]:
     """The kinds of its values besides null, as `operators.kind` calls them; none: it has no value
     but null, or an error. `coerced`: as of JUEL and XPath, whose arithmetic gives numbers.
     """
+
+    def within(inner: Node) -> frozenset[str]:
+        return kinds(inner, coerced=coerced, of=of)
+
     match node:
+        case Name(name):
+            return of(name)
         case Negate() | Arithmetic() if coerced:
             return frozenset({"number"})
         case Literal(value):
             return frozenset() if value is None else frozenset({kind(value)})
-        case Name() | Index() | Filter() | Path() | Invoke():
-            return _DATA
+        case Index() | Filter() | Path() | Invoke():
+            return DATA
         case Call(function, arguments):
             called = LISTED[function]
             if isinstance(called, FeelFunction):
-                given = [kinds(each) for each in arguments]
-                return (frozenset(called.gives) or _DATA) if _fits(called, given) else frozenset()
+                given = [within(each) for each in arguments]
+                return (frozenset(called.gives) or DATA) if _fits(called, given) else frozenset()
             takes = chain(called.takes, repeat(called.takes[-1]))
-            fits = all(
-                (kinds(each, coerced=coerced) | {"null"}) & {*next(takes)} for each in arguments
-            )
+            fits = all((within(each) | {"null"}) & {*next(takes)} for each in arguments)
             return frozenset(called.gives) if fits else frozenset()
         case If(_, then, otherwise):
-            return kinds(then, coerced=coerced) | kinds(otherwise, coerced=coerced)
+            return within(then) | within(otherwise)
         case Negate(operand):
-            return kinds(operand) & _NEGATED
+            return within(operand) & _NEGATED
         case Arithmetic(sign, left, right):
-            pairs = product(kinds(left), kinds(right))
+            pairs = product(within(left), within(right))
             found = (_result(one, sign, other) for one, other in pairs)
             return frozenset(each for each in found if each is not None)
         case Join():
