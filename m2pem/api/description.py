@@ -152,7 +152,11 @@ def _run_started(view: RunView, record: r.RunStarted) -> _Sentence:
 
 
 def _run_claimed(view: RunView, record: r.RunClaimed) -> _Sentence:
-    return f"{view.run} taken up again{_by(record)}", Importance.GOOD
+    text = f"{view.run} taken up again{_by(record)}"
+    if not record.expression_rules:
+        return text, Importance.GOOD
+    rules = "conditions and values are decided from here on by the rules of this version of m2pem"
+    return f"{text}; {rules}, which are others than those of its records", Importance.WARNING
 
 
 def _run_paused(view: RunView, record: r.RunPaused) -> _Sentence:
@@ -273,7 +277,8 @@ def _token_left(view: RunView, record: r.TokenLeft) -> _Sentence:
 
 
 def _flow_taken(view: RunView, record: r.FlowTaken) -> _Sentence:
-    return f"{view.label(record.element)}: flow {record.flow}", Importance.DETAIL
+    text = f"{view.label(record.element)}: flow {record.flow}{_in_brackets(record.reason)}"
+    return text, Importance.NORMAL if record.reason else Importance.DETAIL
 
 
 def _scope_opened(view: RunView, record: r.ScopeOpened) -> _Sentence:

@@ -31,6 +31,7 @@ from m2pem.api.people import OpenControlRequest, OperatorPresence, OperatorsChan
 from m2pem.api.revision import RevisionPreview, RunVersion
 from m2pem.api.runs import (
     Alert,
+    ExpressionValue,
     GeometryVersion,
     IncidentPreview,
     OpenIncident,
@@ -187,6 +188,7 @@ OPERATIONS: dict[str, Operation] = {
         Operation("step"),
         Operation("set_data"),
         Operation("data", list[ScopeData], who_asks=True),
+        Operation("evaluate", ExpressionValue, who_asks=True),
         Operation("set_geometry"),
         Operation("delete_geometry"),
         Operation("geometry_versions", list[GeometryVersion]),

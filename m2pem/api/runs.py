@@ -1,5 +1,6 @@
 """Runs as operators see them: their status, records, prompts, incidents and alerts."""
 
+import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -124,6 +125,24 @@ class ScopeData:
     scope: int | None = None
     instance: int | None = None
     token: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ExpressionValue:
+    """What an expression gives over the data of a run.
+
+    `kind`: of the value in the expression's language; data has dates and durations as ISO 8601
+    texts. `reason`: which name is not set, so that it is null; "": none.
+    """
+
+    value: Value
+    kind: str
+    reason: str = ""
+
+    def __str__(self) -> str:
+        if self.value is None:
+            return f"null: {self.reason}" if self.reason else "null"
+        return f"{json.dumps(self.value, ensure_ascii=False)} ({self.kind})"
 
 
 @dataclass(frozen=True, slots=True)

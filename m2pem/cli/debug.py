@@ -206,6 +206,16 @@ class DebugShell(cmd.Cmd):
             for name, value in each.data.items():
                 print(f"    {name} = {value!r}")
 
+    def do_print(self, text: str) -> None:
+        """print EXPRESSION: its value as the element sees it that is next, and of which kind it is.
+        The language is the one of its marks: '= x' is FEEL, '${x}' JUEL."""
+        print(f"  {self._session.evaluate(text)}")
+
+    def complete_print(self, text: str, *_: object) -> list[str]:
+        """Complete names of the data."""
+        names = {name for each in self._session.data() for name in each.data}
+        return sorted(name for name in names if name.startswith(text))
+
     def do_vehicles(self, _: str) -> None:
         """vehicles: where they are, and what they do."""
         for name, state in self._session.here.states.items():

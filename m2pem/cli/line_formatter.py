@@ -45,6 +45,7 @@ SHOWN = frozenset(
         r.MessageThrown,
         r.EscalationThrown,
         r.ErrorThrown,
+        r.FlowTaken,
         r.IncidentOpened,
         r.IncidentUpdated,
         r.IncidentResolved,
@@ -164,6 +165,8 @@ class LineFormatter:
             return interrupted and _is_activity_or_event(view, record.element)
         if isinstance(record, r.PromptOpened):
             return self._asks
+        if isinstance(record, r.FlowTaken):
+            return bool(record.reason)
         return type(record) in SHOWN
 
 

@@ -148,7 +148,10 @@ def due_after(
 def _value(expression: Expression, holder: TokenOrScope) -> Value:
     value = expression.evaluate(reader(holder))
     if value is None:
-        raise ExpressionError(f"{shorten(expression.text.strip())!r} gives null")
+        why = expression.why_null(reader(holder))
+        raise ExpressionError(
+            f"{shorten(expression.text.strip())!r} gives null{why and f': {why}'}"
+        )
     return value
 
 

@@ -51,6 +51,7 @@ from m2pem.engine.triggering import (
     trigger,
 )
 from m2pem.mission.elements import Activity
+from m2pem.mission.expression import EXPRESSION_RULES
 
 _THROW_NOTHING = (
     i.Continue,
@@ -105,7 +106,7 @@ def _start(x: Steps, item: i.StartRun) -> None:
     except KeyError:
         x.ignore(f"the mission has no process {item.process!r}")
         return
-    x.emit(r.RunStarted(process.id, x.now_us, item.by))
+    x.emit(r.RunStarted(process.id, x.now_us, item.by, EXPRESSION_RULES))
     if item.step:
         x.emit(r.BreakpointsSet(step=True, by=item.by))
         x.look_for_breakpoints()
@@ -125,7 +126,8 @@ def _start(x: Steps, item: i.StartRun) -> None:
 
 
 def _claim(x: Steps, item: i.ClaimRun) -> None:
-    x.emit(r.RunClaimed(item.epoch, item.by, item.lost))
+    rules = EXPRESSION_RULES if x.state.expression_rules != EXPRESSION_RULES else 0
+    x.emit(r.RunClaimed(item.epoch, item.by, item.lost, rules))
 
 
 def _stop(x: Steps, item: i.StopRun) -> None:

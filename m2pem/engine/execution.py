@@ -255,16 +255,17 @@ class Execution:
         self.leave(token, TokenOutcome.COMPLETED)
         self.check_scope_later(token.scope)
 
-    def proceed(self, token: Token, flows: Iterable[SequenceFlow]) -> None:
-        """Leave along `flows`: the token takes the first, a new token each of the others (4.1)."""
+    def proceed(self, token: Token, flows: Iterable[SequenceFlow], reason: str = "") -> None:
+        """Leave along `flows`: the token takes the first, a new token each of the others (4.1).
+        `reason`: why conditions of other flows were null."""
         node, scope = token.node, token.scope
         process = self.process_ids[node.index]
         self.leave(token, TokenOutcome.COMPLETED)
         number = token.id
         for flow in flows:
-            self.emit(r.FlowTaken(number, process, node.id, scope.id, flow.id))
+            self.emit(r.FlowTaken(number, process, node.id, scope.id, flow.id, reason))
             self.enter(number, flow.target, scope, flow)
-            number = self.state.last_token + 1
+            number, reason = self.state.last_token + 1, ""
         self.check_scope_later(scope)
 
     def check_scope_later(self, scope: Scope) -> None:

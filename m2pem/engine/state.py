@@ -404,6 +404,8 @@ class RunState:
     epoch: int = 1
     seq: int = 0
     started_us: int = 0
+    expression_rules: int = 0
+    """Those by which the run is decided."""
     paused_at_us: int = 0
     paused_total_us: int = 0
 

@@ -24,6 +24,7 @@ NOTHING_TO_DO = {
     "step": "there is no step to make",
     "set_data": "its data is changed no more",
     "data": "none of its processes is active: m2pem replay prints what was written",
+    "evaluate": "its data is gone: m2pem replay prints what was written",
     "resume": "there is nothing to go on with: m2pem start begins its mission anew",
     "answer": "no question of it is open",
     "resolve_incident": "no incident of it is open",

@@ -20,14 +20,14 @@ import msgspec
 
 from m2pem.api.clock import run_virtual
 from m2pem.api.run_view import RunView
-from m2pem.api.runs import RunStatus, RunSummary, ScopeData, StampedRecord
+from m2pem.api.runs import ExpressionValue, RunStatus, RunSummary, ScopeData, StampedRecord
 from m2pem.api.telemetry import PayloadState, VehicleState
 from m2pem.engine import inputs as i
 from m2pem.engine import records as r
 from m2pem.engine.breakpoints import why_refused
 from m2pem.engine.state import RunStatus as EngineStatus
 from m2pem.errors import InternalError, OperatorError
-from m2pem.executive.mission_control.debugging import data_of
+from m2pem.executive.mission_control.debugging import data_of, evaluate_at
 from m2pem.executive.runner import Runner
 from m2pem.fleet.fleet import Fleet
 from m2pem.mission.mission import Mission
@@ -149,6 +149,17 @@ class DebugSession:
         """The data of the data stores and of each active process, subprocess and task, from the
         outside in: what is not empty, and that of each process."""
         return self._rehearsed.data()
+
+    def evaluate(self, expression: str) -> ExpressionValue:
+        """The value of an expression, as the element sees the data that is next. Nothing changes.
+
+        Raises:
+            OperatorError: it cannot be read or evaluated, or the run has ended.
+        """
+        reached = self.here.reached
+        if reached is None:
+            raise OperatorError("the run has ended: go back to a moment before")
+        return self._rehearsed.evaluate(expression, reached)
 
     def moment_at(self, t_s: float) -> int:
         """The moment of the last record before a mission time in seconds."""
@@ -302,6 +313,12 @@ class _Rehearsed:
         """See `DebugSession.data`; nothing is executed meanwhile."""
         assert self._runner is not None
         return data_of(self._runner.run.state)
+
+    def evaluate(self, expression: str, at: r.BreakpointReached) -> ExpressionValue:
+        """See `DebugSession.evaluate`; nothing is executed meanwhile."""
+        assert self._runner is not None
+        state = self._runner.run.state
+        return evaluate_at(state, expression, state.paused_at_us, at.token)
 
     def _next_stop(self) -> Stop:
         answer = self._answered.get()

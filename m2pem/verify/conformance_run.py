@@ -113,7 +113,7 @@ class _StepsWithOpenConditions(Steps):
             if chosen := self.choices.get(flow.target.id):
                 self._decide(flow.target, self.state.scopes[record.scope], chosen[0])
 
-    def proceed(self, token: Token, flows: Iterable[SequenceFlow]) -> None:
+    def proceed(self, token: Token, flows: Iterable[SequenceFlow], reason: str = "") -> None:
         """Leave by the flows of the run, where the mission leaves that open."""
         node = token.node
         chosen = self.choices.get(node.id)
@@ -121,7 +121,7 @@ class _StepsWithOpenConditions(Steps):
             taken = chosen.popleft()
             if isinstance(node, ExclusiveGateway | InclusiveGateway) and is_free_choice(node):
                 flows = [flow for flow in node.outgoing if flow.id in taken]
-        super().proceed(token, flows)
+        super().proceed(token, flows, reason)
 
     def _decide(self, node: FlowNode, scope: Scope, taken: tuple[str, ...]) -> None:
         """Write data that nothing in the mission writes, so that a token leaves by these flows."""

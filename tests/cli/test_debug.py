@@ -7,9 +7,11 @@ from pathlib import Path
 
 import pytest
 
+from m2pem.cli.debug import DebugShell
 from tests.cli.conftest import Invoke
 from tests.command_line import ANSWERS, FLEET, MISSION
 from tests.engine.notation import xml
+from tests.rehearsal.test_debugging import debugged
 
 DETECTION = (MISSION, "--fleet", FLEET, "--answers", ANSWERS / "vignette1_detection.yaml")
 Printed = Callable[..., list[str]]
@@ -67,6 +69,34 @@ def test_data_of_stores_and_of_each_instance(
         "  ask (ask), instance 1:",
         "    item = 'y'",
     ]
+
+
+def test_an_expression_is_printed_with_its_kind_or_what_fails_in_it(printed: Printed) -> None:
+    lines = printed(
+        "step 3",
+        "print user.decision",
+        "print = armed",
+        "print ${user.decision + 1}",
+        "print = 1 +",
+        "print",
+    )
+    assert lines[-5:] == [
+        '"continue" (text)',
+        "null: armed is not set",
+        "the text 'continue' is no number, in 'user.decision + 1' at column 3 of "
+        "'${user.decision + 1}', where user.decision is the text 'continue'",
+        "expected a value, found the end at column 6 of '= 1 +'",
+        "an expression is missing",
+    ]
+
+
+def test_names_of_the_data_are_completed() -> None:
+    with debugged() as session:
+        session.step()
+        shell = DebugShell(session)
+        shell.onecmd("step 2")
+        assert shell.complete_print("user.", "print user.", 6, 11) == ["user.decision"]
+        assert shell.complete_print("x", "print x", 6, 7) == []
 
 
 def test_breakpoints_are_listed_and_deleted(printed: Printed) -> None:

@@ -97,6 +97,7 @@ NO_COMMAND = {
     "end_presence": "operator control units announce who is present",
     "note_edit": "editors note who saves a mission",
     "execute_behavior": "programs command vehicles through faces; an operator starts missions",
+    "evaluate": "the page evaluates; m2pem debug does in a rehearsal",
     "message": "programs send messages: over the control socket, REST or ROS",
     "simulated": "the fleet file says it, and m2pem run --simulate",
     "speed": "the person who starts an executive sets it: m2pem run --speed",

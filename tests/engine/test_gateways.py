@@ -231,3 +231,49 @@ def test_an_activity_that_nothing_follows_ends_its_path() -> None:
     assert play.trace("leave", "close", "end") == table("""
         leave start; leave last; close MAIN; end completed
     """)
+
+
+def test_a_flow_that_is_taken_says_which_conditions_were_null_and_why() -> None:
+    text = """
+        <startEvent id="start"/> <exclusiveGateway id="which" default="other"/>
+        <task id="a"/> <task id="b"/>
+        start -> which
+        when_armed: which -> a if = armed
+        when_near: which -> a if = x > 1 and near
+        other: which -> b
+    """
+    play = Play(text).start({"x": 2})
+    taken = [each for each in play.records() if isinstance(each, r.FlowTaken)]
+    assert [each.reason for each in taken if each.flow == "other"] == [
+        "condition of when_armed is null: armed is not set; "
+        "condition of when_near is null: near is not set"
+    ]
+    assert [each.reason for each in taken if each.flow != "other"] == [""]
+    play = Play(text).start({"x": 0, "armed": False})
+    taken = [each for each in play.records() if isinstance(each, r.FlowTaken)]
+    assert {each.reason for each in taken} == {""}
+
+
+def test_where_no_flow_is_true_the_error_says_which_conditions_were_null() -> None:
+    play = Play("""
+        <startEvent id="start"/> <exclusiveGateway id="which"/> <task id="a"/> <task id="b"/>
+        start -> which
+        first: which -> a if = armed
+        which -> b if = x > 5
+    """).start({"x": 2})
+    assert "NO_FLOW" in play.detail
+    assert play.detail.endswith("; condition of first is null: armed is not set")
+
+
+def test_a_condition_that_fails_names_its_part_and_the_values_in_the_record() -> None:
+    play = Play("""
+        <startEvent id="start"/> <exclusiveGateway id="which"/> <task id="a"/>
+        start -> which
+        first: which -> a if = x > 1 and a + 1 > 3
+    """).start({"x": 2, "a": "low"})
+    [error] = [record for record in play.records() if isinstance(record, r.ErrorThrown)]
+    assert error.reason == (
+        "condition of first: it has no value: '+' of the text 'low' and the number 1, "
+        "in 'a + 1' at column 13 of '= x > 1 and a + 1 > 3', where a is the text 'low'"
+    )
+    assert error.reason in play.detail

@@ -173,6 +173,39 @@ def test_the_data_of_each_scope_is_read_and_changed_where_it_is(play):
     ]
 
 
+def test_an_expression_is_evaluated_where_its_data_is_seen(play):
+    async def story(world: World):
+        control = world.executive.control
+        run = await asked(world, STORES)
+        seen = [
+            await control.evaluate(run, "speed * 2"),
+            await control.evaluate(run, "= field"),
+            await control.evaluate(run, "field", token=3),
+            await control.evaluate(run, "${field}", token=2),
+            await control.evaluate(run, "= now() - now()"),
+        ]
+        for more, why in (
+            ({"token": 9}, "r1: token 9 is not there"),
+            ({}, "in 'speed' at column 1|'-' takes two numbers, not the number 2"),
+        ):
+            with pytest.raises(OperatorError, match=why):
+                await control.evaluate(run, "speed - 'x'", **more)
+        before = len(world.seen)
+        await control.stop(run)
+        with pytest.raises(OperatorError, match=r"r1 has ended.*its data is gone"):
+            await control.evaluate(run, "speed")
+        return seen, before
+
+    seen, _ = play(story, fleet=DEBUGGED)
+    assert [str(each) for each in seen] == [
+        "4 (number)",
+        "null: field is not set",
+        '"south" (text)',
+        '"north" (text)',
+        '"PT0S" (days and time duration)',
+    ]
+
+
 def test_the_data_of_a_task_is_read_and_cannot_be_changed(play):
     async def story(world: World):
         control = world.executive.control

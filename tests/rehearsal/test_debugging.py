@@ -180,6 +180,42 @@ def test_the_stop_at_a_mission_time_is_found(session: DebugSession) -> None:
     assert session.go_back(0).t_s == 0.0
 
 
+def test_an_expression_is_evaluated_as_the_next_element_sees_the_data_and_changes_nothing() -> None:
+    items = "m2pem:collection=\"['north', 'south']\" m2pem:elementVariable=\"field\""
+    source = mission(f"""
+        <startEvent id="start"/> <scriptTask id="write">lap = 3; note = 'x'</scriptTask>
+        <task id="each"><each {items}></each></task>
+        start -> write -> each
+    """)
+    with DebugSession(source, None, plugins=PluginManager()) as there:
+        there.set_breakpoints(["each"])
+        there.resume()
+        while there.evaluate("field").value is None:
+            there.step()
+        before = made(there)
+        for text, shown in (
+            ("field == 'north' and lap > 2", "true (boolean)"),
+            ("= lap / 2", "1.5 (number)"),
+            ("${lap + '2'}", "5 (number)"),
+            ('= duration("PT" + string(lap) + "S")', '"PT3S" (days and time duration)'),
+            ("= [lap, field]", '[3, "north"] (list)'),
+            ("= armed and lap > 2", "null: armed is not set"),
+            ('= now() > @"2020-01-01T00:00:00Z"', "true (boolean)"),
+        ):
+            assert str(there.evaluate(text)) == shown
+        with pytest.raises(OperatorError, match=r"in 'note \+ 1' at column 3 of .*is the text 'x'"):
+            there.evaluate("= note + 1 > lap")
+        with pytest.raises(OperatorError, match="expected a value, found the end at column 6"):
+            there.evaluate("lap > ")
+        big = "= count(for a in 1..400, b in 1..400 return a)"
+        with pytest.raises(OperatorError, match="it looks at more than 100,000 values"):
+            there.evaluate(big)
+        assert made(there) == before
+        to_the_end(there)
+        with pytest.raises(OperatorError, match="the run has ended: go back"):
+            there.evaluate("lap")
+
+
 def test_what_cannot_be_done_says_why(session: DebugSession) -> None:
     with pytest.raises(OperatorError, match="no 'Revers': did you mean 'Reverse'"):
         session.set_breakpoints(["Revers"])

@@ -3,15 +3,16 @@
 from collections.abc import Mapping, Sequence
 from typing import Protocol
 
-from m2pem.api.runs import RunId, ScopeData
+from m2pem.api.runs import ExpressionValue, RunId, ScopeData
 from m2pem.mission.values import Value
 
 
 class DebugControl(Protocol):
     """The operations of `MissionControl` on a run that is debugged (docs/debugging.md).
 
-    All but `data` raise OperatorError where the fleet does not allow it (`Fleet.may_be_debugged`):
-    it does where all of it is simulated, or the fleet file says `debugging: true`.
+    All but `data` and `evaluate` raise OperatorError where the fleet does not allow it
+    (`Fleet.may_be_debugged`): it does where all of it is simulated, or the fleet file says
+    `debugging: true`.
     """
 
     async def set_breakpoints(
@@ -44,4 +45,13 @@ class DebugControl(Protocol):
     async def data(self, run: RunId) -> Sequence[ScopeData]:
         """The data of a run that goes on: of its data stores, then of each active process,
         and of each active subprocess and task that has some, from the outside in."""
+        ...
+
+    async def evaluate(self, run: RunId, expression: str, *, token: int = 0) -> ExpressionValue:
+        """The value of an expression over the data of a run that goes on, as the element sees it
+        that a token is on; 0: the process that it began with. It changes nothing.
+
+        Raises:
+            OperatorError: it cannot be read or evaluated, or there is no such token.
+        """
         ...

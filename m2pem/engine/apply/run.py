@@ -15,10 +15,12 @@ def run_started(state: RunState, record: r.RunStarted) -> None:
     state.status = RunStatus.RUNNING
     state.by = record.by
     state.started_us = record.started_us
+    state.expression_rules = record.expression_rules
 
 
 def run_claimed(state: RunState, record: r.RunClaimed) -> None:
     state.epoch = record.epoch
+    state.expression_rules = record.expression_rules or state.expression_rules
     state.telemetry_conditions.clear()  # no executive has looked meanwhile
     state.last_allocation += record.lost
     state.last_keeping += record.lost

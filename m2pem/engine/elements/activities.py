@@ -102,9 +102,10 @@ def leave_activity(x: Execution, token: Token) -> None:
     if token.compensates is not None:
         compensated(x, token)
         return
-    flows = true_flows(x, token, node.default)
-    if flows is not None:
+    decided = true_flows(x, token, node.default)
+    if decided is not None:
+        flows, reason = decided
         enable_compensation(x, token)
-        x.proceed(token, [*flows] * node.completion_quantity)
+        x.proceed(token, [*flows] * node.completion_quantity, reason)
         if isinstance(node.container, AdHocSubProcess) and not begins_by_itself(node):
             x.queue.append(token.scope)

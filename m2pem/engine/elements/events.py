@@ -32,9 +32,9 @@ from m2pem.mission.events import (
 
 def complete(x: Execution, token: Token) -> None:
     """Leave an event that has occurred, by every flow."""
-    flows = true_flows(x, token, None)
-    if flows is not None:
-        x.proceed(token, flows)
+    decided = true_flows(x, token, None)
+    if decided is not None:
+        x.proceed(token, *decided)
 
 
 def start(x: Execution, token: Token) -> None:

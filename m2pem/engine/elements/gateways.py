@@ -38,9 +38,9 @@ def exclusive(x: Execution, token: Token) -> None:
     if len(node.outgoing) == 1 and node.outgoing[0].condition is None:
         x.proceed(token, node.outgoing)
         return
-    flows = true_flows(x, token, node.default, first_only=True)
-    if flows is not None:
-        x.proceed(token, flows)
+    decided = true_flows(x, token, node.default, first_only=True)
+    if decided is not None:
+        x.proceed(token, *decided)
 
 
 def parallel(x: Execution, token: Token) -> None:
@@ -68,9 +68,9 @@ def inclusive(x: Execution, token: Token) -> None:
 
 def split_inclusive(x: Execution, token: Token, node: InclusiveGateway) -> None:
     """Take every true flow, else the default (table 13.3)."""
-    flows = true_flows(x, token, node.default)
-    if flows is not None:
-        x.proceed(token, flows)
+    decided = true_flows(x, token, node.default)
+    if decided is not None:
+        x.proceed(token, *decided)
 
 
 def merge(x: Execution, last: Token, join: Join) -> None:
@@ -106,14 +106,14 @@ def complex_gateway(x: Execution, token: Token) -> None:
             return
         if not active:
             return
-    flows = true_flows(x, token, node.default, read=read)
-    if flows is None:
+    decided = true_flows(x, token, node.default, read=read)
+    if decided is None:
         return
     used = _consume_tokens(x, scope, node, keep=token)
     if len(used) < len(node.incoming):
         flow_ids = tuple(flow.id for flow in used)
         x.emit(r.GatewayActivated(x.process_of(node), node.id, scope.id, flow_ids))
-    x.proceed(token, flows)
+    x.proceed(token, *decided)
 
 
 def reset_complex_gateway(x: Execution, scope: Scope, node: ComplexGateway) -> None:

@@ -18,8 +18,9 @@ def true_flows(
     *,
     first_only: bool = False,
     read: ReadValue | None = None,
-) -> Sequence[SequenceFlow] | None:
-    """Return the flows whose condition is true, in the XML's order, else the default one.
+) -> tuple[Sequence[SequenceFlow], str] | None:
+    """Return the flows whose condition is true, in the XML's order, else the default one; and why
+    conditions were null, "" if none was.
 
     Out of an activity, flows with and without conditions are an inclusive and a parallel split
     (clause 13.3.1): its default is taken when no condition is true, beside those that have none.
@@ -30,12 +31,17 @@ def true_flows(
     node = token.node
     read = read or reader(token)
     chosen: list[SequenceFlow] = []
+    nulls: list[str] = []
     for flow in node.outgoing:
         if flow is default:
             continue
         if flow.condition is not None:
             try:
-                if not flow.condition.holds(read):
+                holds = flow.condition.truth(read)
+                if holds is None:
+                    why = flow.condition.why_null(read)
+                    nulls.append(f"condition of {flow.id} is null{why and f': {why}'}")
+                if not holds:
                     continue
             except ExpressionError as error:
                 reason = f"condition of {flow.id}: {error}"
@@ -44,11 +50,14 @@ def true_flows(
         chosen.append(flow)
         if first_only:
             break
+    reason = "; ".join(nulls)
     if default is not None and isinstance(node, Activity):
-        return chosen if any(flow.condition for flow in chosen) else [*chosen, default]
+        conditional = any(flow.condition for flow in chosen)
+        return chosen if conditional else [*chosen, default], reason
     if chosen or not node.outgoing:
-        return chosen
+        return chosen, reason
     if default is not None:
-        return (default,)
-    throw_error(x, token, "NO_FLOW", f"no flow out of {node.id} is true and it has no default")
+        return (default,), reason
+    nothing = f"no flow out of {node.id} is true and it has no default"
+    throw_error(x, token, "NO_FLOW", f"{nothing}{reason and f'; {reason}'}")
     return None

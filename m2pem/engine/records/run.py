@@ -18,22 +18,26 @@ class StopReason(StrEnum):
 
 
 class RunStarted(BaseRecord, frozen=True):
-    """The run began. `started_us`: microseconds since the Unix epoch, the zero of mission time."""
+    """The run began. `started_us`: microseconds since the Unix epoch, the zero of mission time.
+    `expression_rules`: those that it is decided by (`m2pem.mission.expression`)."""
 
     process: str
     started_us: int
     by: str = ""
+    expression_rules: int = 0
 
 
 class RunClaimed(BaseRecord, frozen=True):
     """Another executive, or the same after a restart, has claimed the run.
 
     `lost`: number of records that the journal had lost; so many ids are left out.
+    `expression_rules`: those of what is decided from here on, if they are others than before.
     """
 
     epoch: int
     by: str = ""
     lost: int = 0
+    expression_rules: int = 0
 
 
 class RunPaused(BaseRecord, frozen=True):

@@ -72,13 +72,15 @@ class InstanceOutput(BaseRecord, frozen=True):
 
 
 class FlowTaken(BaseRecord, frozen=True):
-    """A token takes a sequence flow; `element` is its source."""
+    """A token takes a sequence flow; `element` is its source. `reason`: which conditions of other
+    flows were null when it was decided, and why."""
 
     token: int
     process: str
     element: str
     scope: int
     flow: str
+    reason: str = ""
 
 
 class ScopeInterrupted(BaseRecord, frozen=True):

@@ -2,15 +2,19 @@
 
 from collections.abc import Mapping, Sequence
 
-from m2pem.api.runs import RunId, ScopeData
+from m2pem.api.runs import ExpressionValue, RunId, ScopeData
 from m2pem.engine import inputs as i
 from m2pem.engine.breakpoints import ROOT
+from m2pem.engine.data import reader
 from m2pem.engine.state import RunState
 from m2pem.engine.state import RunStatus as EngineStatus
-from m2pem.errors import OperatorError
+from m2pem.errors import ExpressionError, ExpressionSyntaxError, OperatorError
 from m2pem.executive.ended_runs import refuse_ended
 from m2pem.executive.mission_control.parts import ControlParts, bounded
 from m2pem.mission.elements import Process
+from m2pem.mission.expression import parse
+from m2pem.mission.expression.temporal import NOW
+from m2pem.mission.timers import date_text
 from m2pem.mission.values import Value
 
 
@@ -54,6 +58,14 @@ class DebugOperations(ControlParts):
             refuse_ended(runner)
             return data_of(runner.run.state)
 
+    async def evaluate(self, run: RunId, expression: str, *, token: int = 0) -> ExpressionValue:
+        """The value of an expression over the data of a run that goes on."""
+        async with self._explain_end("evaluate", run):
+            runner = self._supervisor.runner(run)
+            refuse_ended(runner)
+            now_us = self._supervisor.clock.now_us()
+            return evaluate_at(runner.run.state, expression, now_us, token)
+
     def _refuse_debugging(self) -> None:
         fleet = self._supervisor.fleet
         if not fleet.may_be_debugged:
@@ -83,6 +95,31 @@ def data_of(state: RunState) -> list[ScopeData]:
                 at = inside.get(token.id)
                 found.append(ScopeData(*place, dict(token.own), at, token.instance, token.id))
     return found
+
+
+def evaluate_at(state: RunState, text: str, now_us: int, token: int = 0) -> ExpressionValue:
+    """See `DebugControl.evaluate`; `now_us`: what the expression reads as the present time.
+
+    Raises:
+        OperatorError: it cannot be read or evaluated, or there is no such token.
+    """
+    tokens = (each.tokens.get(token) for each in state.scopes.values())
+    place = next(filter(None, tokens), None) if token else state.scopes.get(ROOT)
+    if place is None:
+        raise OperatorError(f"{state.run}: token {token} is not there")
+    seen = reader(place)
+
+    def read(name: str) -> Value:
+        return date_text(now_us) if name == NOW else seen(name)
+
+    try:
+        expression = parse(text)
+        value = expression.evaluate(read)
+    except (ExpressionError, ExpressionSyntaxError) as error:
+        raise OperatorError(str(error)) from None
+    return ExpressionValue(
+        value, expression.kind(read), expression.why_null(read) if value is None else ""
+    )
 
 
 def _why_no_step(state: RunState) -> str:

@@ -6,6 +6,12 @@ listed functions, bounded length, depth and number size.
 """
 
 from m2pem.mission.expression.dialect import Dialect
-from m2pem.mission.expression.expression import Expression, literal, parse, template
+from m2pem.mission.expression.expression import (
+    EXPRESSION_RULES,
+    Expression,
+    literal,
+    parse,
+    template,
+)
 
-__all__ = ["Dialect", "Expression", "literal", "parse", "template"]
+__all__ = ["EXPRESSION_RULES", "Dialect", "Expression", "literal", "parse", "template"]

@@ -54,6 +54,9 @@ Evaluate: TypeAlias = Callable[[ReadValue], Computed]
 MAX_CALLS = 50
 """How deep functions may call each other."""
 
+tracing = ContextVar[Callable[[Node, Evaluate], Evaluate] | None]("tracing", default=None)
+"""Wraps what evaluates each node, to see what fails."""
+
 _calls = ContextVar("_calls", default=0)
 _TYPES = {"string": "text"}
 
@@ -94,7 +97,8 @@ def evaluate(node: Node, read: ReadValue, rules: Rules) -> Computed:
 
 def evaluator(node: Node, rules: Rules) -> Evaluate:
     """Return what evaluates a tree by the rules of its language."""
-    return _MAKE[type(node)](node, rules)
+    run, traced = _MAKE[type(node)](node, rules), tracing.get()
+    return run if traced is None else traced(node, run)
 
 
 def _all(nodes: Iterable[Node], rules: Rules) -> list[Evaluate]:

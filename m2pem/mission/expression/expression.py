@@ -2,12 +2,13 @@
 
 import re
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import NoReturn
 
 from m2pem.errors import ExpressionError
-from m2pem.mission.expression import feel_values
+from m2pem.mission.expression import cause, feel_values, operators
 from m2pem.mission.expression.dialect import Dialect, Span, locate, split
 from m2pem.mission.expression.evaluate import evaluator
 from m2pem.mission.expression.feel import FeelParser
@@ -17,6 +18,10 @@ from m2pem.mission.expression.parser import Parser
 from m2pem.mission.expression.rules import RULES, Rules
 from m2pem.mission.expression.tree import Join, Literal, Node, names
 from m2pem.mission.values import ReadValue, Value
+
+EXPRESSION_RULES = 1
+"""Which rules expressions are evaluated by: another number since some have other values than
+before, so that operators of a run that was begun by others can know. 0: not numbered yet."""
 
 _BARE = (None, Dialect.BARE.value)
 _INTEGER = re.compile(r"-?[0-9]{1,18}")
@@ -63,7 +68,7 @@ class Expression:
         try:
             return (self._run or self._prepare())(read)
         except ExpressionError as error:
-            self._explain(error)
+            self._explain(error, read)
         except RecursionError:
             self._explain(ExpressionError("functions and values are nested too deep"))
 
@@ -73,14 +78,18 @@ class Expression:
         Raises:
             ExpressionError: as `evaluate`, and when the value is not true or false.
         """
+        return self.truth(read) is True
+
+    def truth(self, read: ReadValue) -> bool | None:
+        """As `holds`; None: the value is null, for the reason that `why_null` gives."""
         begin_work()
         try:
             value = (self._run or self._prepare())(read)
-            if value is True or value is False:
+            if value is None or value is True or value is False:
                 return value
             return self.rules.truth(value, "a condition")
         except ExpressionError as error:
-            self._explain(error)
+            self._explain(error, read)
         except RecursionError:
             self._explain(ExpressionError("functions and values are nested too deep"))
 
@@ -97,7 +106,29 @@ class Expression:
         object.__setattr__(self, "_run", run)
         return run
 
-    def _explain(self, error: ExpressionError) -> NoReturn:
+    def kind(self, read: ReadValue) -> str:
+        """The kind of the value in its language, where `evaluate` has one: in FEEL also a date or
+        a duration, which data has as a text.
+
+        Raises:
+            ExpressionError: as `evaluate`.
+        """
+        if self.rules.ternary:
+            begin_work()
+            return feel_values.kind(evaluator(self.tree, self.rules)(read))
+        return operators.kind(self.evaluate(read))
+
+    def why_null(self, read: ReadValue) -> str:
+        """Why the value is null: `armed is not set`; "": no name alone is the reason."""
+        return cause.why_null(self.tree, self.rules, read)
+
+    def _explain(self, error: ExpressionError, read: ReadValue | None = None) -> NoReturn:
+        if read is not None:
+            with suppress(RecursionError):
+                why = cause.why_failed(
+                    self.text, self.dialect, self.tree, self.rules, read, str(error)
+                )
+                raise ExpressionError(why) from error
         raise ExpressionError(f"{error}, in {shorten(self.text.strip())!r}") from error
 
     def __eq__(self, other: object) -> bool:

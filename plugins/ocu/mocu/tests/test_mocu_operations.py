@@ -88,6 +88,7 @@ NOT_SERVED = {
     "step": "missions are debugged on the command line and the page",
     "set_data": "missions are debugged on the command line and the page",
     "data": "missions are debugged on the command line and the page",
+    "evaluate": "missions are debugged on the command line and the page",
     "add_note": "notes are written on the page, or with m2pem note; topic events has them",
     "approval": "start_mission answers with who must approve",
     "approve": "persons approve on the page, or with m2pem approve",

@@ -64,7 +64,7 @@ async def test_a_run_is_stopped_looked_at_changed_and_goes_on(desk: Desk) -> Non
     page = desk.page
     await page.set_viewport_size({"width": 1440, "height": 960})
     await desk.start()
-    desk.refusals.append(409)  # of a condition that cannot be read
+    desk.refusals += [409, 409]  # of an expression that fails, and a condition that cannot be read
     other = await desk.another()
     run = await watch(other, desk)
 
@@ -94,6 +94,7 @@ async def test_a_run_is_stopped_looked_at_changed_and_goes_on(desk: Desk) -> Non
     await look_at(page, "debugging")
     await picture(page, "debugging")
     await data_is_changed(pane, other)
+    await expressions_are_evaluated(pane)
     await conditions_are_set(pane)
 
     await banner(page).get_by_role("button", name="Step").click()
@@ -141,12 +142,32 @@ async def data_is_changed(pane: Locator, other: Page) -> None:
     await expect(pane.locator("dd", has_text="2")).to_be_visible()
 
 
+async def expressions_are_evaluated(pane: Locator) -> None:
+    """The value and its kind; a name that is not set; what fails, and where."""
+    expression = pane.get_by_role("textbox", name="Expression, such as")
+    for text, shown in (
+        ("seen.count * 2", "4 number"),
+        ("= user.decision", '"continue" text'),
+        ("= armed and seen.count > 1", "null armed is not set"),
+    ):
+        await expression.fill(text)
+        await expression.press("Enter")
+        await expect(pane.get_by_role("status")).to_have_text(shown)
+    await expression.fill("= user.decision + 1 > 3")
+    await pane.get_by_role("button", name="Evaluate").click()
+    await expect(pane.get_by_role("status")).to_contain_text(
+        "in 'user.decision + 1' at column 3 of '= user.decision + 1 > 3', "
+        "where user.decision is the text 'continue'"
+    )
+
+
 async def conditions_are_set(pane: Locator) -> None:
     """A condition that cannot be read is refused where it is typed."""
     condition = pane.get_by_label("Or when this has become true")
     await condition.fill("seen.count >")
     await condition.press("Enter")
-    await expect(pane.get_by_role("alert").first).to_contain_text("'seen.count >' is no condition")
+    refused = pane.get_by_role("alert").filter(has_text="'seen.count >' is no condition")
+    await expect(refused).to_be_visible()
     await condition.fill("seen.count > 5")
     await pane.get_by_role("button", name="Set", exact=True).click()
     await expect(pane.get_by_text("when seen.count > 5")).to_be_visible()

@@ -111,6 +111,7 @@ QUERIES = {
     "runs": "/api/runs",
     "records": "/api/runs/{run}/records",
     "data": "/api/runs/{run}/data",
+    "evaluate": "/api/runs/{run}/value",
     "mission": "/api/runs/{run}/mission",
     "versions": "/api/runs/{run}/versions",
     "version_files": "/api/runs/{run}/mission",

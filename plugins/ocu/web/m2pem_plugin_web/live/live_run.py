@@ -104,6 +104,7 @@ def _stop(view: RunView, reached: r.BreakpointReached) -> dict[str, Any]:
         "condition": reached.condition,
         "process": reached.process,
         "element": reached.element,
+        "token": reached.token,
         "scope": reached.scope,
         "instance": token.instance if token is not None else None,
         "within": _around(view, reached.scope),

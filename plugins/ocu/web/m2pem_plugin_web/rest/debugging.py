@@ -1,8 +1,8 @@
-"""/api/runs/{run}/breakpoints, .../step, .../data: runs that are debugged (docs/debugging.md)."""
+"""/api/runs/{run}/breakpoints, step, data, value: runs that are debugged (docs/debugging.md)."""
 
 from typing import Annotated, Any
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Query
 from pydantic import Field, StringConstraints
 
 from m2pem.api import MissionControl
@@ -41,6 +41,15 @@ class ScopeDataModel(Answer):
     token: int | None
 
 
+class ExpressionValueModel(Answer):
+    """The value of an expression, and its kind. `reason`: which name is not set, so that it is
+    null; "": none."""
+
+    value: Any
+    kind: str
+    reason: str
+
+
 def router(control: MissionControl) -> APIRouter:
     """The routes of debugging."""
     routes = APIRouter(prefix="/api", tags=["debugging"], responses=RESPONSES)
@@ -70,5 +79,15 @@ def router(control: MissionControl) -> APIRouter:
         async with known_run(control, run):
             found = await control.data(run)
         return [ScopeDataModel.of(each) for each in found]
+
+    @routes.get("/runs/{run}/value")
+    async def value(
+        _: Viewer, run: str, expression: Condition, token: Annotated[int, Query(ge=0)] = 0
+    ) -> ExpressionValueModel:
+        """Return the value of an expression, as the element sees the data that a token is on; 0:
+        as the first process does."""
+        async with known_run(control, run):
+            found = await control.evaluate(run, expression, token=token)
+        return ExpressionValueModel.of(found)
 
     return routes

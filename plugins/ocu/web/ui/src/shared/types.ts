@@ -343,8 +343,9 @@ export interface Around {
   instance: number | null;
 }
 
-/** `scope`: what sees the data of what is next; 0: nothing is. `within`: from the outside in. */
+/** `token`, in `scope`, sees the data of what is next; 0: nothing is. `within`: from the outside in. */
 export interface Reached extends Stop {
+  token: number;
   scope: number;
   instance: number | null;
   within: Around[];

@@ -49,6 +49,8 @@ export const debug = {
   save: "Save",
   cancel: "Cancel",
   addValue: "Add a value",
+  expression: "Expression, such as = speed > 3",
+  evaluate: "Evaluate",
   wrong: "This is not JSON. A text is in quotation marks: \"north\"",
   breakpoint: "breakpoint",
   next: "the run is stopped before it",

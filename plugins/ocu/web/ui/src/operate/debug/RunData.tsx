@@ -23,6 +23,13 @@ interface ScopeData {
   token: number | null;
 }
 
+/** As `GET /api/runs/{run}/value` has it. `reason`: which name is not set. */
+interface ExpressionValue {
+  value: unknown;
+  kind: string;
+  reason: string;
+}
+
 export function RunData({ mayChange }: { mayChange: boolean }) {
   const shown = useOperating();
   const { scene } = shown;
@@ -53,7 +60,41 @@ export function RunData({ mayChange }: { mayChange: boolean }) {
       {found.value.map((each) => (
         <Scope key={`${each.element} ${each.scope} ${each.token}`} of={each} mayChange={mayChange} />
       ))}
+      <Evaluate />
     </section>
+  );
+}
+
+/** The value of an expression, as the element sees the data that is next; nothing changes. */
+function Evaluate() {
+  const shown = useOperating();
+  const typed = useSignal("");
+  const answer = useSignal("");
+  const evaluate = async (event: Event) => {
+    event.preventDefault();
+    const token = String(shown.scene.debugging.value?.reached?.token ?? 0);
+    const query = new URLSearchParams({ expression: typed.value.trim(), token });
+    try {
+      const { value, kind, reason } = await get<ExpressionValue>(`${pathOf(shown)}/value?${query}`);
+      answer.value = `${JSON.stringify(value)} ${value === null ? reason : kind}`;
+    } catch (error) {
+      answer.value = error instanceof Error ? error.message : String(error);
+    }
+  };
+  return (
+    <form class="value-form" onSubmit={(event) => void evaluate(event)}>
+      <input
+        aria-label={text.expression}
+        placeholder={text.expression}
+        value={typed.value}
+        spellcheck={false}
+        onInput={(event) => (typed.value = event.currentTarget.value)}
+      />
+      <button class="secondary" disabled={!typed.value.trim()}>
+        {text.evaluate}
+      </button>
+      <output class="problem">{answer.value}</output>
+    </form>
   );
 }
 

@@ -19,6 +19,7 @@ const stop = (element: string): Reached => ({
   condition: "",
   process: "P",
   element,
+  token: 1,
   scope: 1,
   instance: null,
   within: [],

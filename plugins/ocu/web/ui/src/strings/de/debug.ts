@@ -53,6 +53,8 @@ export const debug: Translation<typeof english.debug> = {
   save: "Speichern",
   cancel: "Abbrechen",
   addValue: "Wert hinzufügen",
+  expression: "Ausdruck, etwa = speed > 3",
+  evaluate: "Auswerten",
   wrong: "Das ist kein JSON. Ein Text steht in Anführungszeichen: \"Nord\"",
   breakpoint: "Haltepunkt",
   next: "der Lauf ist davor angehalten",
