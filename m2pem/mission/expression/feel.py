@@ -66,7 +66,7 @@ _PART = re.compile(r"[\w\U00010000-\U000EFFFF]+|[^\s\w]")
 _ESCAPE = re.compile(r"\\(?:u([0-9A-Fa-f]{4})|U([0-9A-Fa-f]{6})|(.))", re.DOTALL)
 _ESCAPED = {"n": "\n", "t": "\t", "r": "\r", "b": "\b", "f": "\f", "\\": "\\", '"': '"', "'": "'"}
 _SPELLED = ("sign", "word")
-_KEYWORDS = frozenset(
+KEYWORDS = frozenset(
     {
         *("and", "between", "else", "every", "false", "for", "function", "if", "in", "instance"),
         *("null", "or", "return", "satisfies", "some", "then", "true"),
@@ -185,14 +185,14 @@ class FeelParser:
         if word == "not":
             after = _SPACE.match(self._text, stop, self._stop)
             self._fail("expected '(' after FEEL's 'not'", after.end() if after else stop)
-        if word in _KEYWORDS:
+        if word in KEYWORDS:
             return _new(_Token, ("word", word, start, stop))
         text = word
         while text not in self._locals and text not in FEEL_FUNCTIONS:
             following = _NEXT.match(self._text, stop, self._stop)
             if following is None or following.lastgroup != "word":
                 break
-            if following["word"] in _KEYWORDS:
+            if following["word"] in KEYWORDS:
                 break
             text, stop = f"{text} {following['word']}", following.end()
         return _new(_Token, ("name", text, start, stop))

@@ -160,3 +160,13 @@ async def test_what_is_no_geometry_is_refused(geometry: object, tmp_path: Path) 
         await rest.put("/geometries/gate", {**good, "run": "r9"}, 404)
         await rest.put("/geometries/..", good, 404)
         await rest.put("/geometries/ a", good, 422)
+
+
+async def test_the_editor_knows_what_expressions_are_written_with(tmp_path: Path) -> None:
+    async with rest_world(tmp_path) as rest:
+        found = await rest.get("/expressions")
+    assert sorted(found) == ["feel", "juel", "m2pem", "xpath"]
+    substring = next(each for each in found["feel"]["functions"] if each["name"] == "substring")
+    assert substring["signatures"] == ["substring(string, start position, length?)"]
+    assert "a position" in substring["doc"]
+    assert "satisfies" in found["feel"]["words"] and "&&" in found["juel"]["operators"]

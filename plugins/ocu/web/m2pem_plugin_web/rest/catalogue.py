@@ -1,4 +1,4 @@
-"""/api/fleet, /api/behaviors, /api/services: vehicles, payloads and teams, and what they can do."""
+"""/api/fleet, /api/behaviors, /api/services, /api/expressions: what missions are written with."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -15,6 +15,7 @@ from m2pem.api import (
     ParameterKind,
     ResourceId,
     as_geojson,
+    expression_dialects,
 )
 from m2pem_plugin_web.access.permissions import Viewer
 from m2pem_plugin_web.problems import RESPONSES
@@ -129,6 +130,22 @@ class ServiceModel(BaseModel):
     writes: list[str]
 
 
+class FunctionModel(Answer):
+    """A function: the ways to call it (`x?` may be left out), and what it gives."""
+
+    name: str
+    signatures: list[str]
+    doc: str
+
+
+class DialectModel(Answer):
+    """What conditions of a dialect are written with."""
+
+    functions: list[FunctionModel]
+    words: list[str]
+    operators: list[str]
+
+
 def router(control: MissionControl) -> APIRouter:
     """The routes of the catalogue."""
     routes = APIRouter(prefix="/api", tags=["catalogue"], responses=RESPONSES)
@@ -150,6 +167,16 @@ def router(control: MissionControl) -> APIRouter:
             ServiceModel(name=name, writes=list(writes))
             for name, writes in sorted(control.services().items())
         ]
+
+    @routes.get("/expressions")
+    async def expressions(_: Viewer) -> dict[str, DialectModel]:
+        """Return the dialects of expressions: m2pem (bare), juel, xpath and feel."""
+        return {
+            dialect: DialectModel.of(
+                words, functions=[FunctionModel.of(each) for each in words.functions]
+            )
+            for dialect, words in expression_dialects().items()
+        }
 
     return routes
 
