@@ -27,6 +27,7 @@ ON_DEMAND = (
     "SettingsDialog-*.*",
     "hls.light-*.js",
     "de-*.js",
+    "ExpressionCode-*.*",
     "CompareDialog-*.*",
     "Comparison-*.*",
     "ReviseDialog-*.*",

@@ -273,7 +273,15 @@ export const editor = {
   },
   expression: {
     offered: "What may come next",
-    groups: { names: "Data", values: "Values", operators: "Operators", functions: "Functions" },
+    groups: {
+      names: "Data",
+      values: "Values",
+      words: "Words",
+      operators: "Operators",
+      functions: "Functions",
+    },
+    writtenBy: "{name}: data, written by {by}",
+    notWritten: "{name}: data that is read only",
   },
   script: {
     label: "Statements",

@@ -18,7 +18,7 @@ const survey = {
   resources: ["uav1"],
   teams: [],
 } as unknown as Behavior;
-const catalogue = new Catalogue({ vehicles: [] } as never, [survey], [], []);
+const catalogue = new Catalogue({ vehicles: [] } as never, [survey], [], [], {} as never);
 
 function surveying(area: string, vehicle: string) {
   const task = factory.create("bpmn:ScriptTask");

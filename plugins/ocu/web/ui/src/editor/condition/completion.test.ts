@@ -1,5 +1,6 @@
 import { describe, expect, it } from "vitest";
 import { complete, type Decided } from "./completion";
+import type { Dialect, DialectName } from "./dialect";
 
 const names = [
   { name: "user.decision", from: "UserSendRoute" },
@@ -16,8 +17,19 @@ const decided: Decided[] = [
   },
 ];
 
-const offered = (text: string) => complete(text, text.length, names, decided);
-const values = (text: string) => offered(text).options.map(({ value }) => value);
+const dialect: Dialect = {
+  functions: [
+    { name: "round", signatures: ["round(x)"], doc: "the nearest integer" },
+    { name: "string join", signatures: ["string join(list, delimiter?)"], doc: "one text" },
+    { name: "string length", signatures: ["string length(string)"], doc: "characters" },
+  ],
+  words: ["and", "true"],
+  operators: ["==", "<", "and"],
+};
+const offered = (text: string, name: DialectName = "m2pem") =>
+  complete(text, text.length, names, decided, name, dialect);
+const values = (text: string, name?: DialectName) =>
+  offered(text, name).options.map(({ value }) => value);
 
 describe("what is offered in a condition", () => {
   it("is every name at its beginning", () => {
@@ -33,6 +45,23 @@ describe("what is offered in a condition", () => {
   it("is functions and constants once they are begun", () => {
     expect(values("ro")).toEqual(["round("]);
     expect(values("tr")).toEqual(["true"]);
+    expect(offered("1 < ro").options).toEqual([
+      { value: "round(", note: "(x)", doc: "the nearest integer", group: "functions" },
+    ]);
+  });
+
+  it("is the rest of a function's name that has several words", () => {
+    expect(offered("= 1 < string le", "feel")).toMatchObject({
+      from: 6,
+      options: [{ value: "string length(" }],
+    });
+    expect(values("= string ", "feel")).toEqual(["string join(", "string length("]);
+    expect(values("mission.speed ")).toContain("== ");
+  });
+
+  it("is what reads a name in XPath, and texts as FEEL writes them", () => {
+    expect(values("det", "xpath")).toEqual(["getDataObject('detection.type')"]);
+    expect(values("= user.decision = ", "feel")).toEqual(['"continue"', '"abort"']);
   });
 
   it("is operators after a name, a value or a bracket", () => {
@@ -63,6 +92,6 @@ describe("what is offered in a condition", () => {
   });
 
   it("looks at what stands before the cursor only", () => {
-    expect(complete("det == 1", 3, names, decided).options[0]?.value).toBe("detection.type");
+    expect(complete("det == 1", 3, names, decided, "m2pem", dialect).options[0]?.value).toBe("detection.type");
   });
 });

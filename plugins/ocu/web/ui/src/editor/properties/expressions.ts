@@ -6,6 +6,12 @@ export function expressionText(owner: ModdleElement, name: string): string {
   return expression ? text(expression, "body").trim() : "";
 }
 
+/** The language that the file gives an expression; "": none. */
+export function expressionLanguage(owner: ModdleElement, name: string): string {
+  const expression = child(owner, name);
+  return expression ? text(expression, "language") : "";
+}
+
 /** The properties that make an owner's expression say something else; "" removes it. */
 export function expressionProperties(
   factory: Factory,

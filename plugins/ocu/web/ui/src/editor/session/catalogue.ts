@@ -3,6 +3,7 @@ import { computed, signal, type ReadonlySignal, type Signal } from "@preact/sign
 import { withOwn } from "../../map/ownGeometry";
 import { get } from "../../shared/api";
 import type { Behavior, Fleet, Geometry } from "../../shared/types";
+import type { Dialects } from "../condition/dialect";
 import type { BehaviorUse, ResourceKind } from "../moddle/behavior";
 
 export interface Service {
@@ -32,19 +33,21 @@ export class Catalogue {
     readonly behaviors: readonly Behavior[],
     readonly services: readonly Service[],
     geometries: Geometry[],
+    readonly dialects: Dialects,
   ) {
     this.shared = signal(geometries);
     this.geometries = computed(() => withOwn(this.own.value, this.shared.value));
   }
 
   static async load(): Promise<Catalogue> {
-    const [fleet, behaviors, services, geometries] = await Promise.all([
+    const [fleet, behaviors, services, geometries, dialects] = await Promise.all([
       get<Fleet>("/fleet"),
       get<Behavior[]>("/behaviors"),
       get<Service[]>("/services"),
       get<Geometry[]>("/geometries"),
+      get<Dialects>("/expressions"),
     ]);
-    return new Catalogue(fleet, behaviors, services, geometries);
+    return new Catalogue(fleet, behaviors, services, geometries, dialects);
   }
 
   /** Routes, areas and points may have been drawn meanwhile. */

@@ -297,9 +297,12 @@ export const editor: Translation<typeof english.editor> = {
     groups: {
       names: "Daten",
       values: "Werte",
+      words: "Wörter",
       operators: "Operatoren",
       functions: "Funktionen",
     },
+    writtenBy: "{name}: Daten, geschrieben von {by}",
+    notWritten: "{name}: Daten, die nur gelesen werden",
   },
   script: {
     label: "Anweisungen",

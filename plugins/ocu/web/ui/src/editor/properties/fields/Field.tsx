@@ -15,7 +15,8 @@ export interface FieldProps {
 export function Field({ id, label, required, unit, hint, error, children }: FieldProps) {
   return (
     <div class={error ? "m2-field m2-field-wrong" : "m2-field"} data-field={id}>
-      <label for={id}>
+      {/* `for` reaches no editor of code, which is no form control. */}
+      <label id={`${id}-label`} for={id} onClick={() => document.getElementById(id)?.focus()}>
         {label}{" "}
         {unit && <span class="m2-unit">{unit}</span>}
         {required && (

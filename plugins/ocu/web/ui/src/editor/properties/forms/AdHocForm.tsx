@@ -1,7 +1,7 @@
 // What is done in an ad-hoc subprocess, and when that is enough.
 import { strings } from "../../../strings";
 import { text } from "../../moddle/moddle";
-import { expressionProperties, expressionText } from "../expressions";
+import { expressionLanguage, expressionProperties, expressionText } from "../expressions";
 import { CheckField } from "../fields/SelectField";
 import { factoryOf, objectOf, set, type FormProps } from "../form";
 import { ExpressionField } from "./ExpressionField";
@@ -27,6 +27,7 @@ export function AdHocForm(form: FormProps) {
         label={words.completion}
         hint={words.completionHint}
         value={expressionText(subprocess, "completionCondition")}
+        language={expressionLanguage(subprocess, "completionCondition")}
         write={(body) =>
           write(expressionProperties(factoryOf(form), subprocess, "completionCondition", body))
         }

@@ -1,8 +1,7 @@
 // When a sequence flow is taken, a gateway's default, and what conditional events wait for.
-import type { Finding } from "../../../shared/types";
 import { strings } from "../../../strings";
 import { child, isA, list, text, type ModdleElement } from "../../moddle/moddle";
-import { expressionProperties, expressionText } from "../expressions";
+import { expressionLanguage, expressionProperties, expressionText } from "../expressions";
 import { CheckField } from "../fields/SelectField";
 import { factoryOf, objectOf, set, type FormProps } from "../form";
 import { ExpressionField } from "./ExpressionField";
@@ -27,10 +26,6 @@ export function conditionalEventOf(element: ModdleElement): ModdleElement | unde
   );
 }
 
-function said({ message, remedy }: Finding): string {
-  return [message, remedy].filter(Boolean).join("; ");
-}
-
 export function ConditionForm(form: FormProps) {
   const flow = objectOf(form);
   const source = child(flow, "sourceRef")!;
@@ -45,7 +40,8 @@ export function ConditionForm(form: FormProps) {
         value={expressionText(flow, "conditionExpression")}
         hint={isDefault ? words.defaultHint : words.hint}
         rows={3}
-        error={findings.map(said).join("\n") || undefined}
+        findings={findings}
+        language={expressionLanguage(flow, "conditionExpression")}
         write={(body) =>
           set(form, flow, expressionProperties(factoryOf(form), flow, "conditionExpression", body))
         }
@@ -70,6 +66,7 @@ export function ActivationForm(form: FormProps) {
       id="m2-activation"
       label={words.activation}
       value={expressionText(gateway, "activationCondition")}
+      language={expressionLanguage(gateway, "activationCondition")}
       hint={words.activationHint}
       rows={3}
       write={(body) =>
@@ -92,6 +89,7 @@ export function ConditionalEventForm(form: FormProps) {
       id="m2-event-condition"
       label={words.event}
       value={expressionText(event, "condition")}
+      language={expressionLanguage(event, "condition")}
       hint={words.eventHint}
       rows={3}
       write={(body) =>

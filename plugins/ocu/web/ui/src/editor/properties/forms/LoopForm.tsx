@@ -1,7 +1,7 @@
 // How often an activity is done: a loop, or once for each item of a list.
 import { strings } from "../../../strings";
 import { child, isA, text } from "../../moddle/moddle";
-import { expressionProperties, expressionText } from "../expressions";
+import { expressionLanguage, expressionProperties, expressionText } from "../expressions";
 import { ComboField } from "../fields/ComboField";
 import { CheckField } from "../fields/SelectField";
 import { TextField } from "../fields/TextField";
@@ -25,6 +25,7 @@ export function LoopForm(form: FormProps) {
           label={words.condition}
           hint={words.conditionHint}
           value={expressionText(loop, "loopCondition")}
+          language={expressionLanguage(loop, "loopCondition")}
           write={writeExpression("loopCondition")}
         />
         <TextField
@@ -83,6 +84,7 @@ export function LoopForm(form: FormProps) {
         label={words.completion}
         hint={words.completionHint}
         value={expressionText(loop, "completionCondition")}
+        language={expressionLanguage(loop, "completionCondition")}
         write={writeExpression("completionCondition")}
       />
       <CheckField

@@ -8,16 +8,16 @@ const words = strings.editor.script;
 
 export function ScriptForm(form: FormProps) {
   const task = objectOf(form);
-  const findings = form.editor.checks.of(text(task, "id"));
   return (
     <ExpressionField
       form={form}
       id="m2-script"
       label={words.label}
       value={text(task, "script")}
+      language="m2pem"
       hint={words.hint}
       rows={5}
-      error={findings.map(({ message }) => message).join("\n") || undefined}
+      findings={form.editor.checks.of(text(task, "id"))}
       write={(script) =>
         set(form, task, {
           script: script.trim() === "" ? undefined : script,
