@@ -27,7 +27,7 @@ def drawn(page: Page, element: str) -> Locator:
 
 def offered(page: Page) -> Locator:
     """What may come next in a field, or be chosen for it."""
-    return page.locator(".m2-listbox")
+    return page.get_by_role("listbox")
 
 
 async def test_a_run_into_a_deadlock_is_stepped_through_on_the_diagram(desk: Desk) -> None:
@@ -110,10 +110,12 @@ async def test_requirements_are_written_verified_undone_and_kept(desk: Desk) -> 
     await expect(caret).to_have_text("[](activ(Reverse) -> <> ended)\n   ^")
 
     # What may come next: an element.
-    await formula.fill("[](completed(rev")
+    await formula.fill("[](completed(")
+    await formula.press_sequentially("rev")
+    await expect(offered(page).get_by_role("option").first).to_be_visible()
     await page.keyboard.press("ArrowDown")
     await page.keyboard.press("Enter")
-    await expect(formula).to_have_value("[](completed(Reverse)")
+    await expect(formula).to_have_text("[](completed(Reverse)")
     await page.keyboard.type(" -> once(user.decision == ")
     await offered(page).get_by_role("option", name="'continue'").click()
     await page.keyboard.type("))")

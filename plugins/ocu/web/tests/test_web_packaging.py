@@ -27,7 +27,7 @@ ON_DEMAND = (
     "SettingsDialog-*.*",
     "hls.light-*.js",
     "de-*.js",
-    "ExpressionCode-*.*",
+    "CodeEditor-*.*",
     "CompareDialog-*.*",
     "Comparison-*.*",
     "ReviseDialog-*.*",

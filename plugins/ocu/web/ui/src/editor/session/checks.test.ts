@@ -50,6 +50,19 @@ describe("checks while drawing", () => {
     expect(checks.state.value).toBe("checked");
   });
 
+  it("let those wait who need what is in the mission", async () => {
+    const { open, ask } = asking();
+    const checks = new Checks(async () => "<xml/>", ask);
+    const known = checks.known();
+    const outline = { processes: [], elements: [], names: [], signals: [], messages: [] };
+    const first = checks.now();
+    await settled();
+    open[0]!({ findings: [], outline });
+    await first;
+    expect(await known).toBe(outline);
+    expect(await checks.known()).toBe(outline);
+  });
+
   it("say so when nobody answers, and keep what was found", async () => {
     const ask = vi.fn<(xml: string) => Promise<Check>>();
     const checks = new Checks(async () => "<xml/>", ask);

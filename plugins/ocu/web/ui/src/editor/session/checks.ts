@@ -46,6 +46,17 @@ export class Checks {
     this.asked += 1;
   }
 
+  /** Resolves with what is in the mission, once that is known. */
+  known(): Promise<Outline> {
+    return new Promise((resolve) => {
+      const left = this.outline.subscribe((found) => {
+        if (!found) return;
+        resolve(found);
+        queueMicrotask(() => left());
+      });
+    });
+  }
+
   of(element: string): Finding[] {
     return this.findings.value.filter((each) => each.element === element);
   }

@@ -1,6 +1,6 @@
 // A formula, with what may come next.
 import { strings } from "../../../strings";
-import { SuggestingField } from "../../properties/fields/SuggestingField";
+import { CodeField } from "../../properties/fields/CodeField";
 import { Caret } from "../ProblemView";
 import { completeFormula, type Vocabulary } from "./completion";
 
@@ -22,10 +22,11 @@ export interface FormulaFieldProps {
 export function FormulaField({ vocabulary, isCondition, ...field }: FormulaFieldProps) {
   const { error } = field;
   return (
-    <SuggestingField
+    <CodeField
       {...field}
       rows={isCondition ? 1 : 3}
       isOneLine={isCondition}
+      wrongAt={[]}
       offered={words.offered}
       suggest={(typed, cursor) => {
         const { from, options } = completeFormula(typed, cursor, vocabulary, isCondition);
