@@ -244,7 +244,6 @@ if TYPE_CHECKING:
     from m2pem.mission.catalogue import ParameterSpec as ParameterSpec
     from m2pem.mission.catalogue import ResourceId as ResourceId
     from m2pem.mission.catalogue import ResumePolicy as ResumePolicy
-    from m2pem.mission.expression.described import DialectWords as DialectWords
     from m2pem.mission.expression.described import expression_dialects as expression_dialects
     from m2pem.mission.geometry import Area as Area
     from m2pem.mission.geometry import Point as Point
@@ -339,7 +338,7 @@ _MODULES = {
     ),
     "m2pem.mission.library": "MissionFile",
     "m2pem.mission.mission": "Mission",
-    "m2pem.mission.expression.described": "DialectWords expression_dialects",
+    "m2pem.mission.expression.described": "expression_dialects",
     "m2pem.mission.geometry": "Area Point Route VehiclePosition",
     "m2pem.mission.values": "Value",
     "m2pem.fleet.behaviors": "FLOWN SHARED takeoff_first",
