@@ -74,6 +74,26 @@ def test_a_mission_that_was_just_uploaded_is_tried_again_while_it_is_denied(virt
     virtual(main)
 
 
+def test_a_heartbeat_from_before_its_mission_ended_does_not_show_that_the_next_one_is_flown(
+    virtual: Run,
+) -> None:
+    async def main(clock: Clock) -> None:
+        async with Playing(px4(clock)) as (link, vehicle):
+            link.custom_mode = AUTO_MISSION
+            await vehicle.until(lambda: vehicle.state.custom_mode == AUTO_MISSION, 5.0)
+            link.custom_mode = AUTO_LOITER
+            accept, ready_s = link.obey[SET_MODE], link.now_s() + 0.1
+
+            def obey(message: Any) -> int | None:
+                return accept(message) if link.now_s() > ready_s else DENIED
+
+            link.obey[SET_MODE] = obey
+            await vehicle.driver.set_mode(FlightMode.MISSION)
+            assert link.custom_mode == AUTO_MISSION
+
+    virtual(main)
+
+
 def test_a_px4_copter_arms_in_a_mode_that_holds_and_takes_off_to_a_height_above_the_sea(
     virtual: Run,
 ) -> None:

@@ -203,6 +203,8 @@ class Autopilot(ABC):
             lambda: self._command_mode(custom_mode),
             lambda: self.state.custom_mode == custom_mode,
             within_s,
+            # The last heartbeat may show a mode that it has left by itself since.
+            must_accept=self.modes.purpose(custom_mode) not in _STAYS,
         )
 
     @abstractmethod
