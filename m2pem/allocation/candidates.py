@@ -2,15 +2,14 @@
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, TypeAlias
 
 from m2pem.api.telemetry import PayloadState, VehicleState
 from m2pem.fleet.facts import fleet_facts, of_kind, vehicle_of
+from m2pem.fleet.fence import fence_of
 from m2pem.fleet.fleet import Fleet, Vehicle
 from m2pem.fleet.graph import ResourceGraph
 from m2pem.fleet.parameters import ResolvedValue
-from m2pem.geo.fence import Fence
 from m2pem.geo.local_frame import LatLon, LocalFrame
 from m2pem.mission.behavior import RoleKind
 from m2pem.mission.catalogue import ResourceId
@@ -132,20 +131,15 @@ class Candidates:
             ]
         return facts
 
-    @cached_property
-    def fence(self) -> Fence | None:
-        """What no vehicle may leave; None: the fleet has none."""
-        area = self.fleet.geometries.get(self.fleet.fence)
-        return Fence(area) if isinstance(area, Area) else None
-
     def breach(self, resource: ResourceId, place: Place) -> str:
         """Return where the straight way to a task leaves the fence; "": not, or it is not known."""
-        state = self._latest(vehicle_of(self.fleet, resource).id)
-        if self.fence is None or not isinstance(state, VehicleState) or state.position is None:
+        vehicle = vehicle_of(self.fleet, resource)
+        fence, state = fence_of(self.fleet, vehicle.domain), self._latest(vehicle.id)
+        if fence is None or not isinstance(state, VehicleState) or state.position is None:
             return ""
         found, start = "", state.position.latlon
         for each in place.corners:
-            if not (found := self.fence.breach([each], start, lambda _: "where the task begins")):
+            if not (found := fence.breach([each], start, lambda _: "where the task begins")):
                 break
         return found
 

@@ -390,7 +390,7 @@ class RoleEvaluator:
 
     def _fenced(self, task: Task) -> bool:
         """Whether the fence says who can get to a task."""
-        return task.behavior.name in _GOES_THERE and self.candidates.fence is not None
+        return task.behavior.name in _GOES_THERE and self.candidates.fleet.fenced
 
     def _why_not_same(self, resource: ResourceId, need: Need, task: Task) -> str:
         """Return why it is not what an earlier role chose; "": it is, or nothing asks for that."""

@@ -13,8 +13,9 @@ from uuid import UUID, uuid4
 from m2pem.api.capabilities import ArbiterCapabilities, arbiter_capabilities
 from m2pem.api.telemetry import Telemetry, VehicleState
 from m2pem.fleet import parameters
+from m2pem.fleet.fence import fence_of
+from m2pem.geo.fence import Fence
 from m2pem.mission.catalogue import BehaviorSpec, BehaviorState, ResourceId
-from m2pem.mission.geometry import Area
 from m2pem.mission.values import Value
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ class Connection:
 
     `behaviors`: the names that the fleet allows; None means all that the arbiter offers.
     `failsafe`: the vehicle's own reaction to a lost link, as the fleet states it, or "".
-    `fence`: the area that the vehicle may not leave; None: the fleet has none. `sitl`: software in
+    `fence`: where the vehicle may be; None: anywhere. `sitl`: software in
     the loop: the vehicle is simulated on this machine. `cruise_speed_m_s`: its default speed;
     `endurance_s`: how long it can move with a full battery; None: the fleet states none. `folder`:
     of the fleet file; names of files are relative to it.
@@ -50,7 +51,7 @@ class Connection:
     detector: bool = False
     lost_after_s: float | None = None
     failsafe: str = ""
-    fence: Area | None = None
+    fence: Fence | None = None
     sitl: bool = False
     cruise_speed_m_s: float | None = None
     endurance_s: float | None = None
@@ -61,7 +62,6 @@ class Connection:
         """Return how a resource of a fleet is reached, as its arbiter gets it."""
         payload = fleet.payloads.get(resource)
         vehicle = fleet.vehicles[resource if payload is None else payload.vehicle]
-        area = fleet.geometries.get(fleet.fence)
         return cls(
             resource,
             vehicle.domain.value,
@@ -70,7 +70,7 @@ class Connection:
             detector=payload is not None and payload.detector,
             lost_after_s=vehicle.lost_after_s,
             failsafe=vehicle.failsafe,
-            fence=area if isinstance(area, Area) else None,
+            fence=fence_of(fleet, vehicle.domain),
             sitl=vehicle.sitl,
             cruise_speed_m_s=vehicle.cruise_speed_m_s if payload is None else None,
             endurance_s=vehicle.endurance_s if payload is None else None,

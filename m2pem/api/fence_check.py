@@ -10,7 +10,7 @@ from m2pem.fleet.parameters import ResolvedValue
 from m2pem.geo.fence import Breach, Fence
 from m2pem.geo.local_frame import LatLon, offset
 from m2pem.mission.catalogue import ResourceId
-from m2pem.mission.geometry import Area, Point
+from m2pem.mission.geometry import Point
 
 OFFSET_M = 15.0
 BEHIND_RAD = math.pi
@@ -36,9 +36,9 @@ class FenceCheck:
         self._stance = stance
 
     @classmethod
-    def of(cls, area: Area | None, bus: FleetBus) -> "FenceCheck":
-        """Return the check of an area's fence for vehicles where their telemetry says."""
-        return cls(None if area is None else Fence(area), stance_on(bus))
+    def of(cls, fence: Fence | None, bus: FleetBus) -> "FenceCheck":
+        """Return the check of a fence for vehicles where their telemetry says."""
+        return cls(fence, stance_on(bus))
 
     def find_breach(
         self,

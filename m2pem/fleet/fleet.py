@@ -130,7 +130,7 @@ CONFLICT_WAIT_S = 600.0
 @dataclass(frozen=True, slots=True)
 class SharedSpace:
     """A named area, or a corridor of `width_m` along a named route, in which no more than
-    `capacity` vehicles of `domains` are at a time."""
+    `capacity` vehicles of `domains` are at a time; 0: it is closed to them."""
 
     name: str
     capacity: int
@@ -157,7 +157,8 @@ class Fleet:
     `surface_separation_m`: between two vehicles of a domain other than air; they are kept apart in
     the domains that are named. `on_conflict`, `conflict_wait_s`: what becomes of a task whose
     behavior would bring two vehicles too near, and how long it waits.
-    `handed_over`: names of geometries that missions may use and operators hand over.
+    `closed_space`: shared space with no place. `handed_over`: names of geometries that missions may
+    use and operators hand over.
     `battery_cost_s`, `switching_cost_s`: travel time that an empty battery, and a vehicle which is
     new to a run, count as when vehicles are chosen for roles. `on_error`: what an error does that
     no event of the mission catches, where the mission does not say. `unattended`: scheduled
@@ -195,6 +196,7 @@ class Fleet:
     on_conflict: OnConflict = OnConflict.REFUSE
     conflict_wait_s: float = CONFLICT_WAIT_S
     shared_space: Mapping[str, SharedSpace] = field(default_factory=dict)
+    closed_space: Mapping[str, SharedSpace] = field(default_factory=dict)
     handed_over: tuple[str, ...] = ()
     battery_cost_s: float = 60.0
     switching_cost_s: float = 10.0
@@ -220,6 +222,11 @@ class Fleet:
 
     def __deepcopy__(self, memo: object) -> Self:
         return self  # it never changes
+
+    @property
+    def fenced(self) -> bool:
+        """Whether there is anywhere that a vehicle may not be."""
+        return bool(self.fence or self.closed_space)
 
     @property
     def detectors(self) -> tuple[ResourceId, ...]:

@@ -342,7 +342,8 @@ def _build(source: YamlSource, model: FleetModel, geometries: dict[str, Geometry
         surface_separation_m=_surface_separation(said),
         on_conflict=OnConflict(said.on_conflict),
         conflict_wait_s=said.wait,
-        shared_space=_shared_space(source, model),
+        shared_space=_shared_space(source, model, closed=False),
+        closed_space=_shared_space(source, model, closed=True),
         handed_over=tuple(model.handed_over),
         battery_cost_s=costs.battery,
         switching_cost_s=costs.switching,
@@ -419,7 +420,7 @@ def _surface_separation(model: DeconflictionModel) -> dict[Domain, float]:
     return {domain: each.horizontal for domain, each in said.items() if each is not None}
 
 
-def _shared_space(source: YamlSource, model: FleetModel) -> dict[str, SharedSpace]:
+def _shared_space(source: YamlSource, model: FleetModel, *, closed: bool) -> dict[str, SharedSpace]:
     return {
         name: SharedSpace(
             name,
@@ -431,6 +432,7 @@ def _shared_space(source: YamlSource, model: FleetModel) -> dict[str, SharedSpac
             source.line(("shared_space", name)),
         )
         for name, each in model.shared_space.items()
+        if closed is (each.capacity == 0)
     }
 
 

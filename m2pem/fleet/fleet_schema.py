@@ -11,7 +11,7 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Field,
-    PositiveInt,
+    NonNegativeInt,
     StringConstraints,
 )
 from pydantic.json_schema import WithJsonSchema
@@ -273,8 +273,8 @@ class DeconflictionModel(_Model):
 
 
 def _capacity(value: object) -> object:
-    if isinstance(value, bool) or not isinstance(value, int) or value < 1:
-        raise ValueError(f"{value!r} is no number of vehicles; write a whole number, 1 or more")
+    if isinstance(value, bool) or not isinstance(value, int) or value < 0:
+        raise ValueError(f"{value!r} is no number of vehicles; write a whole number, 0 or more")
     return value
 
 
@@ -284,8 +284,8 @@ class SharedSpaceModel(_Model):
 
     capacity: Annotated[
         int,
-        Field(ge=1, description="How many vehicles at a time."),
-        BeforeValidator(_capacity, json_schema_input_type=PositiveInt),
+        Field(ge=0, description="How many vehicles at a time; 0: none may enter."),
+        BeforeValidator(_capacity, json_schema_input_type=NonNegativeInt),
     ]
     width: Annotated[
         Annotated[Distance, Field(gt=0)] | None,
@@ -474,7 +474,7 @@ class FleetModel(_Model):
             Annotated[
                 SharedSpaceModel,
                 BeforeValidator(
-                    _shared_space, json_schema_input_type=SharedSpaceModel | PositiveInt
+                    _shared_space, json_schema_input_type=SharedSpaceModel | NonNegativeInt
                 ),
             ],
         ],

@@ -6,9 +6,9 @@ plane of a local frame.
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -55,25 +55,29 @@ class Breach:
 class Fence:
     """Where vehicles may be; public in `m2pem.api`.
 
-    `inclusion`: may not be left; None: no limit. `exclusions`: may not be entered; their holes may.
-    `clearance_m`: half of the width that a vehicle needs. `frame`: of `is_free`, `way` and
-    `closed`; None: one at the first corner. Rings that are not valid are made so.
+    `inclusion`: may not be left; None: no limit. `exclusions`: may not be entered; their holes may;
+    with names, messages say which is entered. `clearance_m`: half of the width that a vehicle
+    needs. `frame`: of `is_free`, `way` and `closed`; None: one at the first corner. Rings that are
+    not valid are made so.
     """
 
     def __init__(
         self,
         inclusion: Area | None,
-        exclusions: Sequence[Area] = (),
+        exclusions: Sequence[Area] | Mapping[str, Area] = (),
         clearance_m: float = 0.0,
         frame: LocalFrame | None = None,
     ) -> None:
+        named = exclusions if isinstance(exclusions, Mapping) else {}
+        areas = [*named.values()] if named else [*exclusions]
         if frame is None:
-            first, *_ = (inclusion, *exclusions) if inclusion is not None else exclusions
+            first = inclusion or areas[0]
             frame = LocalFrame(first.rings[0][0][:2])
         self.frame = frame
         self._given = inclusion, exclusions
         inside = None
-        kept_out = [area_in(each.rings, frame) for each in exclusions]
+        kept_out = [area_in(each.rings, frame) for each in areas]
+        self._named = dict(zip(named, kept_out, strict=False))
         if inclusion is not None:
             inside = area_in(inclusion.rings[:1], frame).buffer(-clearance_m, join_style="mitre")
             kept_out += [area_in([hole], frame) for hole in inclusion.rings[1:]]
@@ -84,6 +88,7 @@ class Fence:
         """Return the fence that keeps out what closed rings bound, in metres of any local frame: it
         has no `frame`, and is for `is_free`, `way` and `closed`."""
         fence = cls.__new__(cls)
+        fence._named = {}
         fence._keep(None, [valid(ring) for ring in rings], 0.0)
         return fence
 
@@ -108,6 +113,10 @@ class Fence:
     def with_clearance(self, clearance_m: float) -> "Fence":
         """Return the same one for a vehicle that needs another width."""
         return Fence(*self._given, clearance_m, self.frame)
+
+    def in_frame(self, frame: LocalFrame) -> "Fence":
+        """Return the same one, without clearance, in another local frame."""
+        return _in_frame(self, frame)
 
     def outside_m(self, place: LatLon) -> float:
         """How far a place is from where one may be; 0 inside."""
@@ -139,8 +148,9 @@ class Fence:
         levels = [self.frame.to_local(place) for place in way]
         for index, (place, level) in enumerate(zip(way, levels, strict=True)):
             if (by_m := self._outside_m(level)) > MARGIN_M:
-                said = f"{name(index)}, {_text(place)}, is {_by(by_m)} outside the fleet's fence"
-                return Breach(said, place)
+                closed = self._name_of(level)
+                where = f"inside {closed}" if closed else "outside the fleet's fence"
+                return Breach(f"{name(index)}, {_text(place)}, is {_by(by_m)} {where}", place)
         order = [*range(len(way)), *([0] if loop else [])]
         legs = [
             (f"the way between {name(a)} and {name(b)}", levels[a], levels[b])
@@ -210,8 +220,15 @@ class Fence:
         level, by_m = max(legs, key=lambda deepest: deepest[1], default=((0.0, 0.0), 0.0))
         if by_m <= 0:
             return None
-        place = self.frame.to_latlon(level)
-        return Breach(f"{what} leaves the fleet's fence by {_by(by_m)} at {_text(place)}", place)
+        place, closed = self.frame.to_latlon(level), self._name_of(level)
+        does = f"enters {closed}," if closed else "leaves the fleet's fence"
+        return Breach(f"{what} {does} by {_by(by_m)} at {_text(place)}", place)
+
+    def _name_of(self, level: EastNorth) -> str:
+        """Return what has a place that is kept out by its name; "": nothing."""
+        place = shapely.Point(level)
+        names = (name for name, area in self._named.items() if area.covers(place))
+        return next((f"'{name}', which is closed" for name in names), "")
 
     def _deepest(self, a: EastNorth, b: EastNorth) -> tuple[EastNorth, float]:
         """Return the point of a line that is farthest out, and how far."""
@@ -262,6 +279,11 @@ class Fence:
         index: int = graph.add_node(place)
         graph.add_edges_from([(index, at, length_m) for at, length_m in ways])
         return index
+
+
+@lru_cache(16)
+def _in_frame(fence: Fence, frame: LocalFrame) -> Fence:
+    return Fence(*fence._given, 0.0, frame)
 
 
 def area_in(rings: Sequence[Sequence[Coordinate]], frame: LocalFrame) -> "BaseGeometry":

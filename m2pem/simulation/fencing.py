@@ -24,7 +24,6 @@ from m2pem.geo.fence import Breach, Fence
 from m2pem.mission.behavior import Behavior, BehaviorType
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.elements import Activity, Process
-from m2pem.mission.geometry import Area
 from m2pem.mission.mission import Mission
 from m2pem.mission.token_flow import TokenFlow
 from m2pem.simulation.course import Craft, RefusedError, track_of
@@ -80,19 +79,20 @@ def crossed(parameters: LocalParameters, made: Manoeuvre) -> str:
 def fence_findings(mission: Mission, fleet: Fleet) -> list[Finding]:
     """Return an error for each behavior that the fence refuses, or a warning where it does if the
     vehicle begins at its home; and where a return would leave it, once for each vehicle."""
-    area = fleet.geometries.get(fleet.fence)
-    return list(_Fenced(mission, fleet, area).found()) if isinstance(area, Area) else []
+    return list(_Fenced(mission, fleet).found())
 
 
 class _Fenced:
-    def __init__(self, mission: Mission, fleet: Fleet, area: Area) -> None:
+    def __init__(self, mission: Mission, fleet: Fleet) -> None:
         self._mission = mission
         self._flow = TokenFlow(mission)
         self._frame = FlatFrame(fleet.origin)
-        self._fence = Fence(area, frame=self._frame)
+        self._fences: dict[ResourceId, Fence] = {}
         self._vehicles: dict[ResourceId, SimVehicle] = {}
         for place, each in enumerate(fleet.vehicles):
             connection = Connection.of(fleet, each)
+            if connection.fence is not None:
+                self._fences[each] = connection.fence.in_frame(self._frame)
             with suppress(FleetError):  # other checks say why
                 settings = read_settings(connection, fleet.origin)
                 self._vehicles[each] = SimVehicle(connection, settings, self._frame, place, 0)
@@ -142,8 +142,9 @@ class _Fenced:
     ) -> list[ResourceId]:
         """Find where a return of a vehicle leaves the fence; return the vehicle, if it does."""
         home = self._frame.to_latlon(self._vehicles[name].home[:2])
+        fence = self._fences.get(name)
         for at in map(self._frame.to_latlon, track_of(plan)):
-            if breach := self._fence.find_breach([home], at, lambda _: "its home"):
+            if fence and (breach := fence.find_breach([home], at, lambda _: "its home")):
                 findings.add(
                     "return-leaves-fence",
                     f"{name}: on a straight return from [{at[0]:.6f}, {at[1]:.6f}], as after a "
@@ -191,7 +192,9 @@ class _Fenced:
             craft = replace(craft, pose=start[0])
         if does in ALONG_ROUTES:
             does = "single_vehicle_routing"
-        parameters = LocalParameters(self._values[task], self._frame, self._poses.get, self._fence)
+        parameters = LocalParameters(
+            self._values[task], self._frame, self._poses.get, self._fences.get(name)
+        )
         try:
             made = MANOEUVRES[does](craft, parameters)
         except RefusedError:

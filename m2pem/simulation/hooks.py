@@ -27,7 +27,7 @@ def m2pem_register_arbiters(register: "Callable[[str, Callable[..., Arbiter]], N
 def m2pem_check_mission(mission: "Mission", fleet: "Fleet | None") -> "Sequence[Finding]":
     """Warn of vehicles whose stated endurance is not enough, and find what leaves the fence."""
     found: list[Finding] = []
-    if fleet is not None and fleet.fence:
+    if fleet is not None and fleet.fenced:
         from m2pem.simulation.fencing import fence_findings  # noqa: PLC0415  # as above
 
         found += fence_findings(mission, fleet)

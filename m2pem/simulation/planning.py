@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -99,7 +99,6 @@ class Planner:
     _context: ArbiterContext
     _frame: FlatFrame
     _bodies: Mapping[ResourceId, Body]
-    _fences: dict[int, Fence] = field(default_factory=dict)
 
     def pose_of(self, vehicle: str, now_us: int) -> Pose | None:
         """Return the pose of a vehicle: of a simulated one, or by its telemetry on the bus."""
@@ -184,12 +183,8 @@ class Planner:
         return str(found or fence.leaves([*(each.place[:2] for each in track), stop[:2]]) or "")
 
     def _fence(self, resource: ResourceId) -> Fence | None:
-        area = self._connections[resource].fence
-        if area is None:
-            return None
-        if id(area) not in self._fences:  # the fleet has one for all
-            self._fences[id(area)] = Fence(area, frame=self._frame)
-        return self._fences[id(area)]
+        fence = self._connections[resource].fence
+        return None if fence is None else fence.in_frame(self._frame)
 
     def catalogue(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
         """What the resource can do."""

@@ -13,7 +13,7 @@ from m2pem.allocation.explanation import MAX_LISTED, lack, reason, what_was_cons
 from m2pem.allocation.needs import Occupancy, RoleEvaluator, Task
 from m2pem.api.telemetry import GeoPosition, VehicleState
 from m2pem.fleet.behaviors import SHARED
-from m2pem.fleet.fleet import Domain, Fleet, Vehicle
+from m2pem.fleet.fleet import Domain, Fleet, SharedSpace, Vehicle
 from m2pem.fleet.graph import ResourceGraph
 from m2pem.mission.behavior import Behavior, BehaviorType, Need, Role, RoleKind
 from m2pem.mission.catalogue import ResourceId
@@ -146,3 +146,15 @@ def test_a_vehicle_whose_way_leaves_the_fence_is_not_chosen_when_another_can_get
     states[near] = VehicleState(near, 0, GeoPosition(50e-5, 65e-5, 0.0))
     evaluator.look_again()
     assert given("goto", across)[0] == {"driver": (near,)}
+
+
+def test_a_vehicle_whose_way_enters_closed_space_cannot_get_there():
+    ring = ((40, 40), (60, 40), (60, 60), (40, 60), (40, 40))
+    pond = Area((tuple((north / 1e5, east / 1e5, None) for east, north in ring),))
+    closed = {"pond": SharedSpace("pond", 0)}
+    fleet = replace(FLEET, geometries={"pond": pond}, closed_space=closed)
+    near = NAMES[0]
+    states = {near: VehicleState(near, 0, GeoPosition(50e-5, 30e-5, 0.0))}
+    candidates = Candidates(fleet, GRAPH, states.get)
+    assert "enters 'pond', which is closed" in candidates.breach(near, Place(((50e-5, 70e-5),)))
+    assert candidates.breach(near, Place(((5e-5, 5e-5),))) == ""

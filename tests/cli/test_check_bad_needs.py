@@ -99,7 +99,7 @@ PLACES = [
 FLEETS = [
     ("shared_space: {field: many}", "'many' is no number of vehicles; write a whole number"),
     ("shared_space: {field: true}", "True is no number of vehicles; write a whole number"),
-    ("shared_space: {field: -1}", "-1 is no number of vehicles; write a whole number, 1 or more"),
+    ("shared_space: {field: -1}", "-1 is no number of vehicles; write a whole number, 0 or more"),
     ("shared_space: {feild: 1}", "no area or route is named 'feild'; did you mean 'field'?"),
     ("shared_space: {road: {capacity: 1, width: wide}}", "'wide' is not a number with a unit"),
     ("shared_space: {road: {capacity: 1, width: 0 m}}", "'0 m' is not above 0"),

@@ -5,6 +5,7 @@ import pytest
 
 from m2pem.api import Arbiter, ArbiterContext, Area, Connection, Route
 from m2pem.executive.fleet_connections import FleetArbiters
+from m2pem.fleet.fence import fence_of
 from m2pem.fleet.fleet import Domain, Fleet, Payload, Vehicle, simulated_fleet
 from m2pem.mission.catalogue import ResourceId
 
@@ -48,7 +49,9 @@ def test_an_arbiter_is_told_the_failsafe_and_the_fence(fence: str, lent: Area | 
     FleetArbiters(fleet, cast("Any", plugins), cast("ArbiterContext", object()))
     for resource in (UAV1, CAMERA):
         connection = plugins.connections[resource]
-        assert (connection.failsafe, connection.fence) == ("return_to_launch", lent)
+        assert connection.failsafe == "return_to_launch"
+        assert connection.fence is fence_of(fleet, Domain.AIR)
+        assert (connection.fence is None) is (lent is None)
 
 
 @pytest.mark.parametrize(

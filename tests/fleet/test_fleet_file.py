@@ -295,8 +295,8 @@ def test_shared_space_and_distances_on_the_ground_arrive_in_si(tmp_path: Path) -
     ("space", "said"),
     [
         ("  brigde: 1\n", "no area or route is named 'brigde'; did you mean 'bridge'?"),
-        ("  bridge: 0\n", "0 is no number of vehicles; write a whole number, 1 or more"),
-        ("  bridge: 1.5\n", "1.5 is no number of vehicles; write a whole number, 1 or more"),
+        ("  bridge: -1\n", "-1 is no number of vehicles; write a whole number, 0 or more"),
+        ("  bridge: 1.5\n", "1.5 is no number of vehicles; write a whole number, 0 or more"),
         ("  bridge: {capacity: true}\n", "True is no number of vehicles"),
         ("  bridge: {}\n", "'capacity' is missing"),
         ("  bridge: {capcity: 1}\n", "unknown key 'capcity'; did you mean 'capacity'?"),

@@ -10,6 +10,7 @@ import shapely
 
 from m2pem.api.arbiter import Connection
 from m2pem.api.clock import Clock, run_virtual
+from m2pem.geo.fence import Fence
 from m2pem.geo.geojson import parse_geojson
 from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.mission.geometry import Area, Point, VehiclePosition
@@ -36,7 +37,7 @@ def area(polygon: shapely.Polygon, *spikes: Any) -> Area:
 
 
 def play(
-    fence: Area,
+    fence: Area | Fence | None,
     home: tuple[float, float],
     behaviors: list[tuple[str, dict[str, Any]]],
     domain: str = "ground",
@@ -47,8 +48,9 @@ def play(
 
     async def run(clock: Clock) -> None:
         homes = {V: home, **{ResourceId(k): at for k, at in (others or {}).items()}}
+        kept = Fence(fence) if isinstance(fence, Area) else fence
         connections = {
-            each: Connection(each, domain, {"home": place(*at, 0.0)}, fence=fence)
+            each: Connection(each, domain, {"home": place(*at, 0.0)}, fence=kept)
             for each, at in homes.items()
         }
         arbiter = SimArbiter(connections, replace(context(clock), journal=JOURNAL))
@@ -138,7 +140,7 @@ def test_a_vehicle_that_follows_stops_where_its_station_leaves_the_fence() -> No
                 ResourceId(name),
                 "ground",
                 {"home": place(*at, 0.0)},
-                fence=area(YARD) if name == "v" else None,
+                fence=Fence(area(YARD)) if name == "v" else None,
             )
             for name, at in homes.items()
         }

@@ -15,7 +15,6 @@ from m2pem.api import (
     BehaviorSpec,
     BehaviorState,
     Connection,
-    Fence,
     Limits,
     LinkState,
     ResolvedValue,
@@ -111,7 +110,6 @@ class MavlinkArbiter(UnitArbiter["VehicleController"]):
         self._make_vehicle_connections = make_vehicle_connections
         self._vehicle_connections: VehicleConnections | None = None
         self._takeover_monitors: list[TakeoverMonitor] = []
-        self._fences: dict[ResourceId, Fence] = {}
         self._failsafe_problems: dict[ResourceId, tuple[str, ...]] = {}
         self._pending: dict[BehaviorId, Behavior] = {}
         self._queried: set[BehaviorId] = set()
@@ -161,7 +159,6 @@ class MavlinkArbiter(UnitArbiter["VehicleController"]):
         )
         vehicles = await self._vehicle_connections.open()
         create = asyncio.get_running_loop().create_task
-        fences: dict[int, Fence] = {}
         for resource, vehicle in vehicles.items():
             watch = self._vehicle_connections.watch(vehicle)
             watch.open()
@@ -170,9 +167,6 @@ class MavlinkArbiter(UnitArbiter["VehicleController"]):
             self._units[resource] = VehicleController(
                 vehicle, watch, self._tracker, limits, self._context.logger
             )
-            area = self._connections[resource].fence
-            if area is not None:
-                self._fences[resource] = fences[id(area)] = fences.get(id(area)) or Fence(area)
             self._publish_mode_changes(self._units[resource])
             self._tasks.append(create(self._monitor_vehicle(resource)))
         known = await asyncio.gather(
@@ -271,7 +265,7 @@ class MavlinkArbiter(UnitArbiter["VehicleController"]):
             self._context.bus,
             self._context.origin,
             lambda: clock.now_us() / 1e6,
-            self._fences.get(checkpoint.resource),
+            self._connections[checkpoint.resource].fence,
             controller.cruise_m_s,
             self._settings[checkpoint.resource].actuators,
         )

@@ -5,7 +5,7 @@ from collections.abc import Awaitable, Callable
 from m2pem_plugin_mavlink.arbiter import MavlinkArbiter
 from mavlink_double import Body, DoubleStation, connections
 
-from m2pem.api import Area, BehaviorReport, ResourceId
+from m2pem.api import BehaviorReport, Fence, ResourceId
 from m2pem.api.clock import run_virtual
 from m2pem.testing.contracts.arbiter_harness import ArbiterHarness, context
 
@@ -58,7 +58,7 @@ def after_a_restart(
     before: Callable[[Bench], None] = lambda _: None,
     meanwhile: Callable[[Body], None] = lambda _: None,
     runs_for_s: float = 4.0,
-    fence: Area | None = None,
+    fence: Fence | None = None,
     **parameters,
 ) -> None:
     """Begin a behavior, close the arbiter, and run `main` with another one and the reference."""

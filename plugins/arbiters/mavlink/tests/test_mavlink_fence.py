@@ -6,7 +6,7 @@ from m2pem_plugin_mavlink.vehicle.driver import FlightMode
 from mavlink_double import Body, at
 from mavlink_play import V, after_a_restart, play
 
-from m2pem.api import Area, BehaviorState, Point, Route
+from m2pem.api import Area, BehaviorState, Fence, Point, Route
 
 
 def ring(*corners: tuple[float, float]) -> tuple:
@@ -15,7 +15,8 @@ def ring(*corners: tuple[float, float]) -> tuple:
 
 HOLE_M = ((40, 40), (60, 40), (60, 60), (40, 60))
 HOLE = ring(*HOLE_M)
-FIELD = Area((ring((0, 0), (100, 0), (100, 100), (0, 100)), HOLE))
+RIM = ring((0, 0), (100, 0), (100, 100), (0, 100))
+FIELD = Fence(Area((RIM, HOLE)))
 
 
 @pytest.mark.parametrize(
@@ -69,7 +70,7 @@ def test_a_circle_is_checked_between_the_corners_of_its_polygon() -> None:
 
     angle = math.pi / 2 + math.tau / 32
     start = (50 + 35 * math.cos(angle), 29.7 + 35 * math.sin(angle))
-    hole_free = Area(FIELD.rings[:1])
+    hole_free = Fence(Area((RIM,)))
     play(Body(east=start[0], north=start[1]).fly(), main, fence=hole_free)
 
 
@@ -113,7 +114,7 @@ def test_a_return_leads_around_what_is_kept_out(domain) -> None:
 
 
 def test_a_return_with_no_way_around_is_done_and_said(caplog) -> None:
-    moat = Area((*FIELD.rings[:1], ring((-5, 40), (110, 40), (110, 60), (-5, 60))))
+    moat = Fence(Area((RIM, ring((-5, 40), (110, 40), (110, 60), (-5, 60)))))
 
     async def main(bench) -> None:
         end = await bench.do("return_to_launch")

@@ -13,6 +13,7 @@ from mavlink_simulated import PATIENT
 
 from m2pem.api import SHARED, BehaviorType, Clock, Connection, ResourceId
 from m2pem.fleet.parameters import resolve
+from m2pem.geo.fence import Fence
 from m2pem.geo.geojson import parse_geojson
 from m2pem.testing.contracts.arbiter_harness import ORIGIN, ArbiterHarness, context
 from m2pem.testing.loopback import run_on_loopback
@@ -40,7 +41,7 @@ class Flight(ArbiterHarness):
     """A trial on simulated autopilots. `tracks`: where they really were."""
 
     def __init__(self, trial: Trial, simulator: Simulator, clock: Clock) -> None:
-        fence = parse_geojson(trial.fence)
+        fence = Fence(parse_geojson(trial.fence))
         connections = {}
         for name, vehicle in zip(trial.homes, simulator, strict=True):
             host, port = vehicle.address

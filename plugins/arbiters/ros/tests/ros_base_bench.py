@@ -29,6 +29,7 @@ from m2pem.api import (
     ResourceId,
     Route,
 )
+from m2pem.geo.fence import Fence
 from m2pem.telemetry.bus import Bus
 
 BASE = Path(__file__).with_name("ros_base_peer.py")
@@ -67,7 +68,7 @@ class Bench:
     """Implements `DriverEvents`, and gives orders. `said`: the commands that the base has got."""
 
     def __init__(self, ros: RosRuntime, namespace: str, clock: Clock, **options: Any) -> None:
-        fence = options.pop("fence", None)
+        area = options.pop("fence", None)
         self.clock = clock
         self.bus = Bus()
         self.heard_count = 0
@@ -80,7 +81,7 @@ class Bench:
         ros.subscribe(String, f"{namespace}/said", self._say, qos.EVENTS)
         settings = Settings(namespace, **{"bounds": Bounds(acceleration_m_s2=2.0), **options})
         context = ArbiterContext(clock, self.bus, logging.getLogger("m2pem.testing"), ORIGIN)
-        connection = Connection(ResourceId("ugv1"), "ground", sitl=True, fence=fence)
+        connection = Connection(ResourceId("ugv1"), "ground", sitl=True, fence=area and Fence(area))
         self.driver = BaseDriver(DriverSetup(connection, settings, context, ros, self.where, self))
 
     def alive(self) -> None:

@@ -29,6 +29,7 @@ from m2pem.api import (
     Route,
     VehicleState,
 )
+from m2pem.geo.fence import Fence
 
 ORIGIN = (38.1075, -77.3192, 60.0)
 STEP_S = 0.1
@@ -284,7 +285,7 @@ def connections(
             resource,
             "ground",
             {"namespace": f"/{vehicle}", **settings},
-            fence=fence,
+            fence=fence and Fence(fence),
             behaviors=behaviors,
         )
     return made

@@ -8,9 +8,8 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem.api import (
     PRESENCE_EVERY_S,
-    Area,
+    Connection,
     EventThrower,
-    Fence,
     MissionControl,
     PayloadState,
     ResourceId,
@@ -96,8 +95,6 @@ class FaceServer:
             resource: frozenset(spec.name for spec in specs)
             for resource, specs in control.catalogue().items()
         }
-        area = fleet.geometries.get(fleet.fence)
-        fence = Fence(area) if isinstance(area, Area) else None
         self._vehicles = {
             name: ShownVehicle(
                 name,
@@ -106,7 +103,7 @@ class FaceServer:
                 behaviors.get(name, frozenset()),
                 cameras_of(name, fleet, behaviors),
                 type=TYPES.get(fleet.vehicles[name].domain, dialect.MAV_TYPE_GENERIC),
-                fence=fence,
+                fence=Connection.of(fleet, name).fence,
             )
             for name, system in self._settings.systems.items()
             if name not in self._settings.forwarded

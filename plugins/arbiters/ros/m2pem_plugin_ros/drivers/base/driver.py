@@ -12,7 +12,6 @@ from uuid import UUID
 
 from m2pem.api import (
     ArbiterContext,
-    Area,
     BehaviorRequest,
     BehaviorState,
     Clock,
@@ -341,9 +340,9 @@ class Surroundings:
     """Positions and other vehicles in the local frame, by the bus, the origin and the fence of the
     fleet."""
 
-    def __init__(self, context: ArbiterContext, fence: Area | None = None) -> None:
+    def __init__(self, context: ArbiterContext, fence: Fence | None = None) -> None:
         self._context = context
-        self._fence = None if fence is None else Fence(fence)
+        self._fence = fence
 
     def outside_m(self, place: Place) -> float:
         """Return how far a position is outside the fence; 0 inside, or without a fence."""
