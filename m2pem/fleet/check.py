@@ -36,16 +36,16 @@ if TYPE_CHECKING:
 
 _ROUTE = ("single_vehicle_routing",)
 
-TEAM_NEEDS: Mapping[str, tuple[str, ...]] = {
-    "formation": _ROUTE,
-    "road_following_formation": _ROUTE,
-    "road_sweep": _ROUTE,
-    "bridge_crossing": _ROUTE,
-    "area_survey": _ROUTE,
-    "area_observe": _ROUTE,
-    "escort": (*_ROUTE, "follow"),
+TEAM_NEEDS: Mapping[str, tuple[tuple[str, ...], ...]] = {
+    "formation": (_ROUTE,),
+    "road_following_formation": (_ROUTE,),
+    "road_sweep": (_ROUTE,),
+    "bridge_crossing": (_ROUTE,),
+    "area_survey": ((*_ROUTE, "area_survey"),),
+    "area_observe": (_ROUTE,),
+    "escort": (_ROUTE, ("follow",)),
 }
-"""By the team behavior's name: the vehicle behaviors that each member must have."""
+"""By the team behavior's name: the vehicle behaviors of which each member must have one each."""
 
 
 def lacking(team_behavior: str, offered: Collection[str]) -> tuple[str, ...]:
@@ -54,7 +54,7 @@ def lacking(team_behavior: str, offered: Collection[str]) -> tuple[str, ...]:
     Nothing for a behavior that cannot be made of others: then there is nothing to be said.
     """
     needs = TEAM_NEEDS.get(team_behavior, ())
-    return tuple(name for name in needs if name not in offered)
+    return tuple(" or ".join(each) for each in needs if not any(name in offered for name in each))
 
 
 def place(fleet: Fleet, resource: str) -> str:

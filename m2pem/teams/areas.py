@@ -34,10 +34,14 @@ def lanes(tracks: SurveyTracks, shares: Sequence[float]) -> list[list[Place]]:
     return [list(points[first.get(each, 0) : last.get(each, 0)]) for each in range(len(shares))]
 
 
-def strips(ring: Ring, tracks: SurveyTracks, shares: Sequence[float]) -> list[list[list[Place]]]:
-    """Return each member's band of an area without holes as rings, an empty list for a member
-    without a pass; or nothing where a band is in several pieces."""
-    level = [turned(corner, tracks.yaw_rad) for corner in ring]
+def strips(
+    rings: Sequence[Ring], tracks: SurveyTracks, shares: Sequence[float]
+) -> list[list[list[Place]]]:
+    """Return each member's band of an area as rings, an empty list for a member without a pass; or
+    nothing where a band is in several pieces, or where tracks over one would enter a hole: one that
+    other bands have a part of is no hole of it."""
+    level, *_ = corners = [[turned(corner, tracks.yaw_rad) for corner in ring] for ring in rings]
+    holes = Fence.around(rings[1:])
     west, east = (extreme(x for x, _ in level) for extreme in (min, max))
     low, high = (extreme(y for _, y in level) for extreme in (min, max))
     count = max(1, round((high - low) / tracks.width_m))
@@ -54,11 +58,24 @@ def strips(ring: Ring, tracks: SurveyTracks, shares: Sequence[float]) -> list[li
             parts.append([])
             continue
         bottom, top = low + mine[0] * tracks.width_m, low + (mine[-1] + 1) * tracks.width_m
-        band = rings_of(valid(level).intersection(shapely.box(west - 1, bottom, east + 1, top)))
-        if not band:
+        inside = shapely.box(west - 1, bottom, east + 1, top)
+        band = [
+            [turned(corner, -tracks.yaw_rad) for corner in ring]
+            for ring in rings_of(valid(*corners).intersection(inside))
+        ]
+        if not band or (rings[1:] and not _keeps_out(holes, band, tracks)):
             return []
-        parts.append([[turned(corner, -tracks.yaw_rad) for corner in ring] for ring in band])
+        parts.append(band)
     return parts
+
+
+def _keeps_out(holes: Fence, band: Sequence[Ring], tracks: SurveyTracks) -> bool:
+    spacing_m = tracks.spacing_m(band)
+    try:
+        own = SurveyTracks.over(band, spacing_m, tracks.yaw_rad, tracks.overshoot_m)
+    except ValueError:
+        return False
+    return all(holes.is_free(*leg) for leg in pairwise(own.line.points))
 
 
 _CORNER_M = 0.2
@@ -74,8 +91,8 @@ def survey(context: PlanningContext) -> Plan:
     """Divide the passes over the area into one band for each member, by speed and endurance.
 
     If all members offer `area_survey`, each surveys the area of its band, so that its arbiter can
-    trigger a camera. Else each moves along its passes, as it does where the area has holes: who
-    surveys a band does not know those beside it.
+    trigger a camera. Else each moves along its passes, as it does where the area has holes, if all
+    can: who surveys a band does not know those beside it.
     """
     area = context.parameters.area
     if area is None:
@@ -91,9 +108,19 @@ def survey(context: PlanningContext) -> Plan:
     speed_m_s = context.parameters.speed_m_s
     lengths = [tracks.line.segments[index].length_m for index, *_ in tracks.passes]
     shares = context.split or _shares(context, rings[0], lengths, speed_m_s)
-    themselves = all("area_survey" in context.offered[member] for member in context.members)
-    holes = Fence.around(rings[1:])
-    bands = strips(rings[0], tracks, shares) if themselves and not rings[1:] else []
+    holes, lacks_survey, lacks_route = (
+        Fence.around(rings[1:]),
+        *(
+            ", ".join(member for member in context.members if name not in context.offered[member])
+            for name in ("area_survey", "single_vehicle_routing")
+        ),
+    )
+    themselves = not lacks_survey and (lacks_route or not rings[1:])
+    bands = strips(rings, tracks, shares) if themselves else []
+    if lacks_route and not bands:
+        pieces = "a band would be in pieces, or a hole lies across two"
+        lacks_survey = f"{lacks_survey} does not offer area_survey" if lacks_survey else pieces
+        raise TeamRefusedError(f"{lacks_route} needs single_vehicle_routing: {lacks_survey}")
     legs: list[Leg] = []
     for index, (member, ends) in enumerate(
         zip(context.members, lanes(tracks, shares), strict=True)
