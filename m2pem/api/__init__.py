@@ -85,7 +85,7 @@ if TYPE_CHECKING:
     from m2pem.api.face import FaceSettings as FaceSettings
     from m2pem.api.fence_check import BEHIND_RAD as BEHIND_RAD
     from m2pem.api.fence_check import OFFSET_M as OFFSET_M
-    from m2pem.api.fence_check import FenceCheck as FenceCheck
+    from m2pem.api.fence_check import find_breach as find_breach
     from m2pem.api.fence_check import known_yaw_rad as known_yaw_rad
     from m2pem.api.fence_check import stance_on as stance_on
     from m2pem.api.follower import Follower as Follower
@@ -229,6 +229,7 @@ if TYPE_CHECKING:
     from m2pem.geo.survey_pattern import SurveyRoute as SurveyRoute
     from m2pem.geo.survey_pattern import best_heading_rad as best_heading_rad
     from m2pem.geo.survey_pattern import survey_routes as survey_routes
+    from m2pem.geo.survey_tracks import SURVEY_SPACING_M as SURVEY_SPACING_M
     from m2pem.geo.survey_tracks import SurveyTracks as SurveyTracks
     from m2pem.geo.terrain import ProfilePoint as ProfilePoint
     from m2pem.geo.terrain import lowest as lowest
@@ -344,7 +345,7 @@ _MODULES = {
     "m2pem.fleet.behaviors": "FLOWN SHARED takeoff_first",
     "m2pem.geo.cameras": "ImagePlan KNOWN_CAMERAS SurveyCamera image_plan",
     "m2pem.geo.fence": "Fence",
-    "m2pem.api.fence_check": "BEHIND_RAD FenceCheck OFFSET_M known_yaw_rad stance_on",
+    "m2pem.api.fence_check": "BEHIND_RAD OFFSET_M find_breach known_yaw_rad stance_on",
     "m2pem.fleet.endurance": "lasts_s",
     "m2pem.fleet.approval": "file_digest person_of",
     "m2pem.fleet.fleet": "Fleet",
@@ -359,7 +360,7 @@ _MODULES = {
     "m2pem.geo.polygon": "convex_hull edges_enclose middle_of",
     "m2pem.geo.polyline": "Polyline Segment",
     "m2pem.geo.survey_pattern": "SurveyPattern SurveyRoute Surveyor best_heading_rad survey_routes",
-    "m2pem.geo.survey_tracks": "SurveyTracks",
+    "m2pem.geo.survey_tracks": "SURVEY_SPACING_M SurveyTracks",
     "m2pem.geo.elevation_files": "TERRAIN_FOLDER Terrain TerrainError",
     "m2pem.geo.terrain": "ProfilePoint lowest profile",
     "m2pem.geo.terrain_following": "TOLERANCE_M follow_terrain not_covered",

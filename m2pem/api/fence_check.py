@@ -1,12 +1,11 @@
 """Whether a behavior of a vehicle would leave the fence of the fleet, before it begins."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
 from m2pem.api.behavior_parameters import BehaviorParameters
 from m2pem.api.bus import FleetBus
 from m2pem.api.telemetry import VehicleState
-from m2pem.fleet.parameters import ResolvedValue
 from m2pem.geo.fence import Breach, Fence
 from m2pem.geo.local_frame import LatLon, offset
 from m2pem.mission.catalogue import ResourceId
@@ -24,53 +23,41 @@ Stance = tuple[LatLon, float]
 """Where a vehicle is, and its yaw: from east, counter-clockwise, in rad."""
 
 
-class FenceCheck:
-    """Where the behaviors of a vehicle would leave a fence; None: nowhere.
+def find_breach(
+    fence: Fence | None,
+    behavior: str,
+    parameters: BehaviorParameters,
+    start: LatLon | None,
+    yaw_rad: float | None,
+    stance_of: Callable[[str], Stance | None],
+) -> Breach | None:
+    """Return where a behavior of a vehicle would leave a fence, if there is one; None: nowhere.
 
-    `stance`: of a vehicle by its name, None if it is not known; of targets that move, only the
-    current position is known.
+    `start` and `yaw_rad` are those of the vehicle. Without them, the way from the vehicle is not
+    checked. `stance_of`: of a vehicle by its name, None if it is not known; of targets that move,
+    only the current position is known.
     """
-
-    def __init__(self, fence: Fence | None, stance: Callable[[str], Stance | None]) -> None:
-        self.fence = fence
-        self._stance = stance
-
-    @classmethod
-    def of(cls, fence: Fence | None, bus: FleetBus) -> "FenceCheck":
-        """Return the check of a fence for vehicles where their telemetry says."""
-        return cls(fence, stance_on(bus))
-
-    def find_breach(
-        self,
-        behavior: str,
-        values: Mapping[str, ResolvedValue],
-        start: LatLon | None,
-        yaw_rad: float | None = None,
-    ) -> Breach | None:
-        """Return where the way would leave the fence; None: it does not. `start` and `yaw_rad` are
-        those of the vehicle. Without them, the way from the vehicle is not checked."""
-        if self.fence is None:
-            return None
-        parameters = BehaviorParameters(values)
-        stance = self._stance(parameters.target_vehicle or "")
-        place, name = None, ""
-        match behavior:
-            case "single_vehicle_routing" if parameters.route is not None:
-                way = [waypoint[:2] for waypoint in parameters.route.waypoints]
-                return self.fence.find_breach(way, start, _waypoint, parameters.loop)
-            case "goto":
-                place, name = stance and stance[0], "the target"
-                if isinstance(parameters.target, Point):
-                    place = parameters.target.position[:2]
-            case "follow" if stance is not None:
-                bearing_rad, offset_m = parameters.bearing_rad, parameters.offset_m
-                yaw = stance[1] - (BEHIND_RAD if bearing_rad is None else bearing_rad)
-                place = _beside(stance[0], yaw, OFFSET_M if offset_m is None else offset_m)
-                name = "its station at the target"
-            case "reverse" if start is not None and yaw_rad is not None:
-                place = _beside(start, yaw_rad, -parameters.distance_m)
-                name = "the place behind it"
-        return None if place is None else self.fence.find_breach([place], start, lambda _: name)
+    if fence is None:
+        return None
+    stance = stance_of(parameters.target_vehicle or "")
+    place, name = None, ""
+    match behavior:
+        case "single_vehicle_routing" if parameters.route is not None:
+            way = [waypoint[:2] for waypoint in parameters.route.waypoints]
+            return fence.find_breach(way, start, _waypoint, parameters.loop)
+        case "goto":
+            place, name = stance and stance[0], "the target"
+            if isinstance(parameters.target, Point):
+                place = parameters.target.position[:2]
+        case "follow" if stance is not None:
+            bearing_rad, offset_m = parameters.bearing_rad, parameters.offset_m
+            yaw = stance[1] - (BEHIND_RAD if bearing_rad is None else bearing_rad)
+            place = _beside(stance[0], yaw, OFFSET_M if offset_m is None else offset_m)
+            name = "its station at the target"
+        case "reverse" if start is not None and yaw_rad is not None:
+            place = _beside(start, yaw_rad, -parameters.distance_m)
+            name = "the place behind it"
+    return None if place is None else fence.find_breach([place], start, lambda _: name)
 
 
 def stance_on(bus: FleetBus) -> Callable[[str], Stance | None]:

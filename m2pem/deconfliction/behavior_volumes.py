@@ -19,10 +19,10 @@ from m2pem.deconfliction.participant import (
 )
 from m2pem.geo.local_frame import EastNorth
 from m2pem.geo.polygon import Hull, buffered_hull, convex_hull, middle_of
+from m2pem.geo.survey_tracks import SURVEY_SPACING_M
 
 RADIUS_M = 30.0
-SURVEY_SPACING_M = 20.0
-"""Of circles and surveys that give no radius or spacing."""
+"""Of circles that give no radius."""
 
 RETURN_HEIGHT_M = 30.0
 """Above home: as high as an autopilot rises, if it is lower, before it returns by itself."""

@@ -22,6 +22,7 @@ from m2pem.fleet.endurance import BatteryReading, too_low_for_rest, use_per_s
 from m2pem.fleet.fleet import Vehicle
 from m2pem.fleet.parameters import ParameterError, ResolvedValue, resolve
 from m2pem.geo.local_frame import EastNorth, LocalFrame
+from m2pem.geo.survey_tracks import SURVEY_SPACING_M
 from m2pem.mission.behavior import Behavior as BehaviorOfTask
 from m2pem.mission.behavior import BehaviorType, OnLoss
 from m2pem.mission.catalogue import BehaviorSpec, ResourceId
@@ -30,8 +31,6 @@ from m2pem.mission.losses import BATTERY_LOW
 from m2pem.units import US_PER_S
 
 LOOK_EVERY_S = 2.0
-SURVEY_SPACING_M = 20.0
-"""Between the tracks of a survey whose task says none."""
 
 
 @dataclass(slots=True)

@@ -191,6 +191,18 @@ class Fence:
         between = [graph[at] for at in paths[end][1:-1]]
         return [place for place in (near[0], *between, near[1]) if place is not None]
 
+    def way_home(
+        self, here: LatLon, home: LatLon, aside_m: float = 0.0
+    ) -> tuple[list[LatLon], str]:
+        """Return the places to pass on a return, which is never refused, and where it leaves the
+        fence all the same; "": nowhere. `aside_m`: so far from what is kept out, if there is room.
+        """
+        ends = self.frame.to_local(here), self.frame.to_local(home)
+        around = self.with_clearance(aside_m).way(*ends) if aside_m else None
+        places = [*map(self.frame.to_latlon, around or self.way(*ends) or ())]
+        names = [*["a corner of its way home"] * len(places), "its home"]
+        return places, self.breach([*places, home], here, names.__getitem__)
+
     def _outside_m(self, level: EastNorth) -> float:
         distance_m = float(self._free.distance(shapely.Point(level)))
         return math.inf if math.isnan(distance_m) else distance_m  # nothing is left of it

@@ -11,7 +11,14 @@ from itertools import pairwise
 from typing import TypeAlias
 
 from m2pem.geo.fence import Fence, rings_of
-from m2pem.geo.lawn_mower import Ring, Span, merged, passes_over, strip_width_m
+from m2pem.geo.lawn_mower import (
+    Ring,
+    Span,
+    longest_edge_yaw,
+    merged,
+    passes_over,
+    strip_width_m,
+)
 from m2pem.geo.lazy_imports import shapely
 from m2pem.geo.local_frame import EastNorth
 from m2pem.geo.polygon import turned
@@ -23,6 +30,9 @@ and how far it lies to the left of the strip's middle, in metres."""
 
 Slab: TypeAlias = tuple[float, float, Sequence[Span]]
 """From one y to a greater one, and the spans of x between them."""
+
+SURVEY_SPACING_M = 20.0
+"""Between the tracks of a survey that gives no spacing."""
 
 _SEAM = 0.1
 """Share of a strip's width. Near its edges, a strip is no longer than where it meets the next one:
@@ -69,14 +79,21 @@ class SurveyTracks:
 
     @classmethod
     def over(
-        cls, rings: Sequence[Ring], spacing_m: float, yaw_rad: float, overshoot_m: float = 0.0
+        cls,
+        rings: Sequence[Ring],
+        spacing_m: float | None = None,
+        yaw_rad: float | None = None,
+        overshoot_m: float = 0.0,
     ) -> "SurveyTracks":
-        """Return the tracks of `lawn_mower` over an area, with the ways around its holes.
+        """Return the tracks of `lawn_mower` over an area, with the ways around its holes: by
+        themselves `SURVEY_SPACING_M` apart, and along the longest edge.
 
         Raises:
             ValueError: it would take too many passes, nothing of the area is left beside its holes,
                 or a part of it cannot be reached without crossing one.
         """
+        spacing_m = spacing_m or SURVEY_SPACING_M
+        yaw_rad = longest_edge_yaw(rings[0]) if yaw_rad is None else yaw_rad
         found = passes_over(rings, spacing_m, yaw_rad, overshoot_m)
         if not found:
             raise ValueError("area: nothing is left beside its holes")

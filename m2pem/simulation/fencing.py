@@ -8,11 +8,11 @@ import math
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
-from itertools import chain, pairwise
+from itertools import chain
 from typing import TypeAlias
 
 from m2pem.api.arbiter import Connection
-from m2pem.api.fence_check import FenceCheck
+from m2pem.api.fence_check import find_breach
 from m2pem.errors import FleetError
 from m2pem.findings import Finding, Severity
 from m2pem.fleet.allocation import resources_of
@@ -53,8 +53,7 @@ def breach_of(
     if fence is None:
         return None
     place = fence.frame.to_latlon(craft.pose.place[:2]) if start else None
-    check = FenceCheck(fence, parameters.stance)
-    found = check.find_breach(behavior, parameters.given, place, craft.pose.yaw)
+    found = find_breach(fence, behavior, parameters, place, craft.pose.yaw, parameters.stance)
     if found or made.plan is None or behavior not in _BY_TRACK:
         return found
     track = track_of(made.plan)
@@ -62,18 +61,6 @@ def breach_of(
         there = (at for at, each in enumerate(track) if math.dist(each, track[0]) > 1e-3)
         track = track[next(there, 0) :]
     return fence.leaves(track)
-
-
-def crossed(parameters: LocalParameters, made: Manoeuvre) -> str:
-    """Return what a way home crosses, which is never refused; "" if nothing."""
-    fence = parameters.fence
-    if fence is None or made.plan is None:
-        return ""
-    track = track_of(made.plan)
-    way = [to for at, to in pairwise(track) if math.dist(at, to) > 1e-3]
-    start, *places = map(fence.frame.to_latlon, (track[0], *way))
-    names = [*["a corner of its way home"] * (len(way) - 1), "its home"]
-    return fence.breach(places, start, names.__getitem__)
 
 
 def fence_findings(mission: Mission, fleet: Fleet) -> list[Finding]:

@@ -11,7 +11,6 @@ from m2pem.api.remaining import (
     raw_parameters,
 )
 from m2pem.fleet.behaviors import takeoff_first
-from m2pem.geo.lawn_mower import longest_edge_yaw
 from m2pem.geo.polygon import middle_of
 from m2pem.geo.polyline import Polyline
 from m2pem.geo.survey_tracks import SurveyTracks
@@ -21,7 +20,6 @@ from m2pem.simulation.pursuit import Pursuit
 from m2pem.simulation.segments import Pose, Vector
 from m2pem.simulation.trajectory import Plan
 
-SURVEY_SPACING_M = 20.0
 ORBIT_RADIUS_M = 30.0
 STANDOFF_M = 20.0
 FOLLOW_OFFSET_M = 15.0
@@ -140,11 +138,9 @@ def _survey(craft: Craft, parameters: LocalParameters) -> Manoeuvre:
     if area is None:
         raise RefusedError("parameter 'area': there is none")
     rings = parameters.rings(area)
-    heading = parameters.heading_rad
-    yaw = longest_edge_yaw(rings[0]) if heading is None else yaw_of(heading)
-    spacing, overshoot = parameters.spacing_m or SURVEY_SPACING_M, parameters.overshoot_m
+    shape = parameters.spacing_m, parameters.yaw_rad, parameters.overshoot_m
     try:
-        tracks = SurveyTracks.over(rings, spacing, yaw, overshoot)
+        tracks = SurveyTracks.over(rings, *shape)
         tracks = tracks.approached_from(craft.pose.place[:2])
     except ValueError as error:
         raise RefusedError(f"parameter {error}") from None

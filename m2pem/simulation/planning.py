@@ -18,7 +18,7 @@ from m2pem.mission.behavior import BehaviorType
 from m2pem.mission.catalogue import BehaviorSpec, ResourceId
 from m2pem.simulation.course import RefusedError
 from m2pem.simulation.executions import Aim, Body, Chase
-from m2pem.simulation.fencing import breach_of, crossed
+from m2pem.simulation.fencing import breach_of
 from m2pem.simulation.frame import FlatFrame
 from m2pem.simulation.gimbals import GAZES, MAST_M, Shots
 from m2pem.simulation.local_parameters import LocalParameters
@@ -163,8 +163,11 @@ class Planner:
         for craft, each in zip(crafts, made, strict=True):
             if breach := breach_of(request.behavior, parameters, craft, each):
                 raise RefusedError(str(breach))
-            if request.behavior == "return_to_launch" and (reason := crossed(parameters, each)):
-                self._context.logger.warning("%s returns: %s", craft.name, reason)
+            fence = parameters.fence
+            if request.behavior == "return_to_launch" and fence is not None:
+                here, home = map(fence.frame.to_latlon, (craft.pose.place[:2], craft.home[:2]))
+                if reason := fence.way_home(here, home)[1]:
+                    self._context.logger.warning("%s returns: %s", craft.name, reason)
         return [_assignment(*each) for each in zip(vehicles, made, strict=True)] + idle
 
     def strays(self, body: Body, chase: Chase, now_us: int) -> str:

@@ -7,7 +7,7 @@ from typing import TypeAlias
 
 from m2pem.fleet.parameters import accepted
 from m2pem.geo.fence import Fence, rings_of, valid
-from m2pem.geo.lawn_mower import Ring, longest_edge_yaw
+from m2pem.geo.lawn_mower import Ring
 from m2pem.geo.lazy_imports import shapely
 from m2pem.geo.polygon import middle_of, turned
 from m2pem.geo.polyline import Polyline
@@ -81,7 +81,6 @@ def _keeps_out(holes: Fence, band: Sequence[Ring], tracks: SurveyTracks) -> bool
 _CORNER_M = 0.2
 """Vehicles round corners, the less the shorter the legs are."""
 
-SURVEY_SPACING_M = 20.0
 STANDOFF_M = 20.0
 FLYING_STANDOFF_M = 30.0
 """Defaults."""
@@ -98,14 +97,12 @@ def survey(context: PlanningContext) -> Plan:
     if area is None:
         raise TeamRefusedError("parameter 'area': there is none")
     rings = [[context.level(corner) for corner in ring] for ring in area.rings]
-    heading = context.parameters.heading_rad
-    yaw = longest_edge_yaw(rings[0]) if heading is None else math.pi / 2 - heading
-    spacing = context.parameters.spacing_m or SURVEY_SPACING_M
+    given = context.parameters
     try:
-        tracks = SurveyTracks.over(rings, spacing, yaw, context.parameters.overshoot_m)
+        tracks = SurveyTracks.over(rings, given.spacing_m, given.yaw_rad, given.overshoot_m)
     except ValueError as error:
         raise TeamRefusedError(f"parameter {error}") from None
-    speed_m_s = context.parameters.speed_m_s
+    speed_m_s = given.speed_m_s
     lengths = [tracks.line.segments[index].length_m for index, *_ in tracks.passes]
     shares = context.split or _shares(context, rings[0], lengths, speed_m_s)
     holes, lacks_survey, lacks_route = (
@@ -127,9 +124,9 @@ def survey(context: PlanningContext) -> Plan:
     ):
         if bands and bands[index]:
             own = {
-                **context.parameters.only("speed", "overshoot"),
+                **given.only("speed", "overshoot"),
                 "area": _band_area(context, area, bands[index]),
-                "heading": (math.pi / 2 - yaw) % math.tau,
+                "heading": (math.pi / 2 - tracks.yaw_rad) % math.tau,
                 # With the spacing itself, rounding may give a band one pass more than it has here.
                 "spacing": tracks.spacing_m(bands[index]),
             }

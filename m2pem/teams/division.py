@@ -9,7 +9,6 @@ from m2pem.api.behavior_parameters import BehaviorParameters
 from m2pem.api.remaining import RemainingRoute, RemainingSurvey, RemainingWork, raw_parameters
 from m2pem.fleet.behaviors import SHARED
 from m2pem.fleet.parameters import ParameterError, ResolvedValue, resolve
-from m2pem.geo.lawn_mower import longest_edge_yaw
 from m2pem.geo.local_frame import EastNorth, LocalFrame
 from m2pem.geo.polyline import Polyline
 from m2pem.geo.survey_tracks import SurveyTracks
@@ -17,9 +16,6 @@ from m2pem.mission.behavior import BehaviorType
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.geometry import Route
 from m2pem.mission.values import Value
-
-SURVEY_SPACING_M = 20.0
-"""The default of `area_survey`."""
 
 ALL_ORDERS_UP_TO = 5
 """So many members are tried in every order; more take what is left in the order of the team."""
@@ -59,10 +55,8 @@ def work_of(
         return None
     area = given.area
     rings = [[frame.to_local(corner[:2]) for corner in ring] for ring in area.rings]
-    yaw = longest_edge_yaw(rings[0]) if given.yaw_rad is None else given.yaw_rad
-    spacing = given.spacing_m or SURVEY_SPACING_M
     try:
-        tracks = SurveyTracks.over(rings, spacing, yaw, given.overshoot_m)
+        tracks = SurveyTracks.over(rings, given.spacing_m, given.yaw_rad, given.overshoot_m)
     except ValueError:
         return None
     return RemainingSurvey(raw, tracks, frame, area.rings[0][0][2], area.altitude_frame)

@@ -11,11 +11,11 @@ from uuid import UUID
 from m2pem.api import (
     ArbiterContext,
     BehaviorId,
+    BehaviorParameters,
     BehaviorRequest,
     BehaviorState,
     BehaviorTracker,
     Connection,
-    FenceCheck,
     LatestTask,
     Limits,
     LinkState,
@@ -26,6 +26,8 @@ from m2pem.api import (
     Value,
     VehiclePosition,
     VehicleState,
+    find_breach,
+    stance_on,
 )
 from m2pem.api.remember import remember
 from m2pem.errors import PluginError
@@ -102,7 +104,7 @@ class Vehicle:
         self._limits = setup.limits
         self._ros_connection = ros_connection
         self._sensors, self.endpoints = ros_connection.sensors, ros_connection.endpoints
-        self._fence_check = FenceCheck.of(setup.connection.fence, setup.context.bus)
+        self._fence = setup.connection.fence
         self._log_throttle = LogThrottle(setup.context.logger, self.resource)
         self._behaviors: dict[UUID, BehaviorId] = {}
         self._runs: dict[str, BehaviorId] = {}
@@ -577,8 +579,9 @@ class Vehicle:
         where = self._sensors.localization
         start = None if where.position is None else where.position.latlon
         yaw_rad = None if where.pose is None else where.pose.yaw_rad
-        values, check = request.parameters, self._fence_check
-        return str(check.find_breach(request.behavior, values, start, yaw_rad) or "")
+        given, stance_of = BehaviorParameters(request.parameters), stance_on(self._context.bus)
+        found = find_breach(self._fence, request.behavior, given, start, yaw_rad, stance_of)
+        return str(found or "")
 
     def _health(self) -> Health:
         try:

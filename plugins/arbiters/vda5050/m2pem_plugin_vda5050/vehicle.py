@@ -16,7 +16,6 @@ from m2pem.api import (
     BehaviorState,
     BehaviorTracker,
     Connection,
-    FenceCheck,
     GeoPosition,
     Limits,
     LinkState,
@@ -24,6 +23,8 @@ from m2pem.api import (
     Point,
     ResolvedValue,
     VehicleState,
+    find_breach,
+    stance_on,
 )
 from m2pem_plugin_vda5050.catalogue import (
     DRIVING_PARAMETERS,
@@ -116,7 +117,7 @@ class Vehicle:
         self._commander = Commander(self._headers, self._clock, setup.publish)
         self._pause = PauseControl(self._commander, self._clock)
         self._own = {own.spec.name: own for own in settings.own_behaviors}
-        self._fence_check = FenceCheck.of(setup.connection.fence, setup.context.bus)
+        self._fence = setup.connection.fence
         self._factsheet: Factsheet | None = None
         self._state: State | None = None
         self._state_us = 0
@@ -607,8 +608,9 @@ class Vehicle:
         elif isinstance(parameters.target, Point):
             behavior = "goto"
         yaw_rad = None if self._place is None else self._frame.to_yaw(self._place.theta)
-        values, start = request.parameters, position.latlon
-        return str(self._fence_check.find_breach(behavior, values, start, yaw_rad) or "")
+        start, stance_of = position.latlon, stance_on(self._context.bus)
+        found = find_breach(self._fence, behavior, parameters, start, yaw_rad, stance_of)
+        return str(found or "")
 
     def _velocity_enu(self) -> tuple[float, float, float] | None:
         place, velocity = self._place, self._velocity

@@ -11,6 +11,7 @@ from itertools import zip_longest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem.api import (
+    SURVEY_SPACING_M,
     BehaviorState,
     EastNorth,
     LatLon,
@@ -21,7 +22,6 @@ from m2pem.api import (
     Route,
     SurveyTracks,
     Value,
-    longest_edge_yaw,
     raw_parameters,
 )
 from m2pem_plugin_mavlink.behaviors.arrival import (
@@ -396,9 +396,6 @@ class Routing(MissionFlight):
         return f"waypoint {index + 1} of the route"
 
 
-SPACING_M = 20.0
-
-
 class Survey(MissionFlight):
     """The behavior `area_survey`: parallel tracks over an area, from the nearer of their two
     ends."""
@@ -407,7 +404,7 @@ class Survey(MissionFlight):
 
     def __init__(self, context: BehaviorContext) -> None:
         super().__init__(context)
-        self._width_m = self.parameters.spacing_m or SPACING_M
+        self._width_m = self.parameters.spacing_m or SURVEY_SPACING_M
         self._passes: Sequence[tuple[int, float, float, float]] = ()
 
     def way(self) -> Sequence[MissionItem]:
@@ -417,11 +414,9 @@ class Survey(MissionFlight):
             raise BehaviorFailedError("parameter 'area': there is none")
         frame = LocalFrame(area.rings[0][0][:2])
         rings = [[frame.to_local(corner[:2]) for corner in ring] for ring in area.rings]
-        heading = self.parameters.heading_rad
-        yaw = longest_edge_yaw(rings[0]) if heading is None else math.pi / 2 - heading
-        spacing = self.parameters.spacing_m or SPACING_M
+        given = self.parameters
         try:
-            tracks = SurveyTracks.over(rings, spacing, yaw, self.parameters.overshoot_m)
+            tracks = SurveyTracks.over(rings, given.spacing_m, given.yaw_rad, given.overshoot_m)
         except ValueError as error:
             raise BehaviorFailedError(f"parameter {error}") from None
         first, last = (frame.to_latlon(tracks.line.points[index]) for index in (0, -1))

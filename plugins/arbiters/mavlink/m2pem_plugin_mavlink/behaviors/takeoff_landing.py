@@ -254,8 +254,9 @@ class ReturnToLaunch(Behavior):
         if self._is_there_already():
             self.modes = ANY_MODE
             return
-        self._around = self._way_around()
-        self._warn_of_breach()
+        self._around, crosses = self._way_home()
+        if crosses:
+            self.vehicle.warn(f"returns: {crosses}")
         await self._send()
 
     async def _send(self) -> None:
@@ -278,22 +279,14 @@ class ReturnToLaunch(Behavior):
         self._around.clear()
         await self._send()
 
-    def _way_around(self) -> list[LatLon]:
-        """Return the places to pass on the way home."""
+    def _way_home(self) -> tuple[list[LatLon], str]:
+        """Return the places to pass on the way home, and where that still leaves the fence."""
         fence, home, here = self.context.fence, self.vehicle.state.home, position_of(self.vehicle)
-        if fence is None or home is None or here is None or cannot_stop(self.vehicle):
-            return []
-        ends = fence.frame.to_local(here), fence.frame.to_local(home.latlon)
-        way = fence.with_clearance(AROUND_M).way(*ends) or fence.way(*ends) or ()
-        return [fence.frame.to_latlon(place) for place in way]
-
-    def _warn_of_breach(self) -> None:
-        """Say what the return still crosses."""
-        fence, home, here = self.context.fence, self.vehicle.state.home, position_of(self.vehicle)
-        if fence is not None and home is not None and here is not None:
-            reason = fence.breach([*self._around, home.latlon], here, lambda index: "its home")
-            if reason:
-                self.vehicle.warn(f"returns: {reason}")
+        if fence is None or home is None or here is None:
+            return [], ""
+        if cannot_stop(self.vehicle):
+            return [], fence.breach([home.latlon], here, lambda _: "its home")
+        return fence.way_home(here, home.latlon, AROUND_M)
 
     async def run_in_background(self) -> None:
         """Fly or drive around; then read the rally points, and disarm as `Land` does."""
@@ -379,7 +372,7 @@ class ReturnToLaunch(Behavior):
 
     def checkpoint(self) -> CheckpointState:
         """Return the way around, as it is before it begins."""
-        return {"around": [degrees for place in self._way_around() for degrees in place]}
+        return {"around": [degrees for place in self._way_home()[0] for degrees in place]}
 
     def restore(self, checkpoint: CheckpointState) -> None:
         around = checkpoint.get("around")

@@ -16,7 +16,6 @@ from m2pem.api import (
     UnitError,
     Value,
     distance_m,
-    longest_edge_yaw,
     parse_geojson,
     quantity,
 )
@@ -24,8 +23,6 @@ from m2pem.errors import M2pemError
 
 MOST_ITEMS = 1_000
 REACHED_M = 5.0
-SPACING_M = 20.0
-"""Of a survey's tracks, where its parameters say none; the vehicle may have another default."""
 
 Geometries: TypeAlias = Callable[[str], object]
 """Returns the geometry of a name; None: there is none."""
@@ -116,12 +113,8 @@ def _tracks(area: Area, parameters: Mapping[str, Value]) -> list[LatLon]:
     frame = LocalFrame(area.rings[0][0][:2])
     rings = [[frame.to_local(corner[:2]) for corner in ring] for ring in area.rings]
     heading = parameters.get("heading")
-    if heading is None:
-        yaw_rad = longest_edge_yaw(rings[0])
-    else:
-        yaw_rad = math.pi / 2 - quantity(heading, Dimension.ANGLE)
-    spacing_m = _number(parameters.get("spacing")) or SPACING_M
-    tracks = SurveyTracks.over(rings, spacing_m, yaw_rad)
+    yaw_rad = None if heading is None else math.pi / 2 - quantity(heading, Dimension.ANGLE)
+    tracks = SurveyTracks.over(rings, _number(parameters.get("spacing")), yaw_rad)
     return [frame.to_latlon(point) for point in tracks.line.points]
 
 
