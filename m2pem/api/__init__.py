@@ -211,9 +211,6 @@ if TYPE_CHECKING:
     from m2pem.geo.geometry_files import NamedGeometry as NamedGeometry
     from m2pem.geo.geometry_files import read_geometry_file as read_geometry_file
     from m2pem.geo.geometry_files import write_geometry_file as write_geometry_file
-    from m2pem.geo.lawn_mower import lawn_mower as lawn_mower
-    from m2pem.geo.lawn_mower import longest_edge_yaw as longest_edge_yaw
-    from m2pem.geo.lawn_mower import strip_width_m as strip_width_m
     from m2pem.geo.local_frame import EastNorth as EastNorth
     from m2pem.geo.local_frame import LatLon as LatLon
     from m2pem.geo.local_frame import LocalFrame as LocalFrame
@@ -355,7 +352,6 @@ _MODULES = {
         "FileFormat FileProblem GeometryFile NamedGeometry READ_SUFFIXES read_geometry_file"
         " write_geometry_file"
     ),
-    "m2pem.geo.lawn_mower": "lawn_mower longest_edge_yaw strip_width_m",
     "m2pem.geo.local_frame": "EastNorth LatLon LocalFrame distance_m offset",
     "m2pem.geo.polygon": "convex_hull edges_enclose middle_of",
     "m2pem.geo.polyline": "Polyline Segment",

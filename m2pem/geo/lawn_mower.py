@@ -71,10 +71,10 @@ def longest_edge_yaw(ring: Ring) -> float:
     return math.atan2(b[1] - a[1], b[0] - a[0])
 
 
-def lawn_mower(
+def passes_over(
     rings: Sequence[Ring], spacing_m: float, yaw_rad: float, overshoot_m: float = 0.0
-) -> list[EastNorth]:
-    """The points to pass, in order; each pair of them is one pass over the area.
+) -> list[Pass]:
+    """Return the passes over an area, in order. One that ends at a hole does not go on beyond it.
 
     The way between two passes may lead over a hole: `SurveyTracks.over` has one that does not.
 
@@ -87,14 +87,6 @@ def lawn_mower(
     Raises:
         ValueError: it would take more than `MAX_STRIPS` passes.
     """
-    found = passes_over(rings, spacing_m, yaw_rad, overshoot_m)
-    return [point for each in found for point in (each.start, each.end)]
-
-
-def passes_over(
-    rings: Sequence[Ring], spacing_m: float, yaw_rad: float, overshoot_m: float = 0.0
-) -> list[Pass]:
-    """Return the passes of `lawn_mower`. One that ends at a hole does not go on beyond its end."""
     found: list[Pass] = []
     fence = Fence.around(rings[1:]) if len(rings) > 1 else None
     closed = None if fence is None else fence.closed
@@ -196,7 +188,7 @@ def _cut(y: float, span: Span, closed: "BaseGeometry") -> Iterator[Span]:
 
 
 def strip_width_m(ring: Ring, spacing_m: float, yaw_rad: float) -> float:
-    """Return the width of each strip of `lawn_mower` over an area with that outer ring."""
+    """Return the width of each strip of `passes_over` an area with that outer ring."""
     return _strips([turned(corner, yaw_rad) for corner in ring], spacing_m)[2]
 
 

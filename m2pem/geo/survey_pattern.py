@@ -1,6 +1,6 @@
 """Survey patterns: routes that cover an area with parallel passes and keep out of other areas.
 
-The passes are those of `lawn_mower`, which teams and arbiters use. Passes that lie side by side
+The passes are those of `m2pem.geo.lawn_mower`, which teams and arbiters use. Those side by side
 make a cell, each cell is covered as a whole, and the way between two passes leads around what is
 kept out. Several vehicles get passes in a row, by their speeds.
 """

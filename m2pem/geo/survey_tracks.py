@@ -85,7 +85,7 @@ class SurveyTracks:
         yaw_rad: float | None = None,
         overshoot_m: float = 0.0,
     ) -> "SurveyTracks":
-        """Return the tracks of `lawn_mower` over an area, with the ways around its holes: by
+        """Return the tracks of `passes_over` an area, with the ways around its holes: by
         themselves `SURVEY_SPACING_M` apart, and along the longest edge.
 
         Raises:

@@ -16,11 +16,12 @@ from m2pem.api.remaining import (
 )
 from m2pem.fleet.behaviors import SHARED
 from m2pem.fleet.parameters import resolve
-from m2pem.geo.lawn_mower import lawn_mower, strip_width_m
+from m2pem.geo.lawn_mower import strip_width_m
 from m2pem.geo.local_frame import LocalFrame
 from m2pem.geo.survey_tracks import SurveyTracks
 from m2pem.mission.behavior import BehaviorType
 from m2pem.mission.geometry import Area, Route, VehiclePosition
+from tests.geo.passes import lawn_mower
 
 FRAME = LocalFrame((38.0, -77.0))
 SPEC = SHARED["single_vehicle_routing", BehaviorType.VEHICLE]

@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from m2pem.api.arbiter import BehaviorRequest
-from m2pem.geo.lawn_mower import lawn_mower, longest_edge_yaw
+from m2pem.geo.lawn_mower import longest_edge_yaw
+from tests.geo.passes import lawn_mower
 from tests.seeds import examples
 
 from .sky import FRAME, NOW_US, airspace, area, claim, point, request, route, state

@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from m2pem.geo.lawn_mower import MAX_STRIPS, Ring, lawn_mower, longest_edge_yaw
+from m2pem.geo.lawn_mower import MAX_STRIPS, Ring, longest_edge_yaw
+from tests.geo.passes import lawn_mower
 
 SQUARE: Ring = [(0, 0), (100, 0), (100, 60), (0, 60), (0, 0)]
 

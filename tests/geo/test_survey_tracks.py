@@ -8,9 +8,10 @@ import pytest
 from shapely import LineString, Polygon, union_all
 from shapely.geometry.base import BaseGeometry
 
-from m2pem.geo.lawn_mower import lawn_mower, strip_width_m
+from m2pem.geo.lawn_mower import strip_width_m
 from m2pem.geo.local_frame import EastNorth, LocalFrame
 from m2pem.geo.survey_tracks import SurveyTracks
+from tests.geo.passes import lawn_mower
 
 SQUARE = [(0.0, 0.0), (100.0, 0.0), (100.0, 95.0), (0.0, 95.0), (0.0, 0.0)]
 SLANTED = [(0.0, 0.0), (200.0, 10.0), (180.0, 120.0), (20.0, 100.0), (0.0, 0.0)]

@@ -13,7 +13,6 @@ from m2pem.api.behavior_parameters import BehaviorParameters
 from m2pem.fleet.behaviors import SHARED
 from m2pem.fleet.check import TEAM_NEEDS
 from m2pem.fleet.parameters import accepted
-from m2pem.geo.lawn_mower import lawn_mower
 from m2pem.geo.survey_tracks import SurveyTracks
 from m2pem.mission.behavior import BehaviorType
 from m2pem.mission.catalogue import ResourceId
@@ -23,6 +22,7 @@ from m2pem.teams.paths import MemberPath, slot
 from m2pem.teams.plan import MemberPose, Plan, PlanningContext, TeamRefusedError
 from m2pem.teams.restart import Reference, read_reference
 from m2pem.teams.team_state import PLANS
+from tests.geo.passes import lawn_mower
 
 from .carts import FRAME
 from .conftest import area, route

@@ -20,9 +20,9 @@ from m2pem.api import (
     LocalFrame,
     Point,
     Route,
-    lawn_mower,
 )
 from m2pem.fleet.parameters import resolve
+from tests.geo.passes import lawn_mower
 
 SUCCEEDED, RUNNING = BehaviorState.SUCCEEDED, BehaviorState.RUNNING
 WAYPOINT, CHANGE_SPEED = 16, 178
