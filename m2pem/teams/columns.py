@@ -1,7 +1,7 @@
 """Plans of teams that move along a route in a shape, all at once or one after the other."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
 
@@ -10,7 +10,7 @@ import numpy as np
 from m2pem.fleet.parameters import read_offsets
 from m2pem.geo.fence import Fence
 from m2pem.geo.lazy_imports import shapely
-from m2pem.geo.local_frame import EastNorth, LatLon
+from m2pem.geo.local_frame import EastNorth, LatLon, LocalFrame
 from m2pem.geo.polyline import EastNorthUp, Polyline, Segment
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.geometry import Route
@@ -106,13 +106,7 @@ def turns(context: PlanningContext, behavior: str, least_m: float) -> Meeting:
         name = "offsets" if context.parameters.text("offsets") else "spacing"
         said = f"parameter '{name}': members come within {apart_m:g} m of each other, below the "
         return f"{said}fleet's separation of {least_m:g} m", "set a larger spacing", None
-    start, then = (context.level(each) for each in _apart(context, route)[:2])
-    yaw_rad, first_m = Segment.between(start, then).yaw_rad, min(back for back, _ in places)
-    poses = {
-        member: MemberPose(beside(start, yaw_rad, back - first_m + 1.0, left)[:2])
-        for member, (back, left) in zip(context.members, places, strict=False)
-    }
-    context = replace(context, poses=poses)
+    context = _formed_up(context, route, places)
     find = _ways_in_order if behavior == "bridge_crossing" else _ways
     try:
         find(context, route, places, spacing)
@@ -123,6 +117,32 @@ def turns(context: PlanningContext, behavior: str, least_m: float) -> Meeting:
         return NO_MEETING
     remedy = f"the members pass it one after the other, or else {_REMEDY}"
     return f"{text} if they kept their spacing along it", remedy, place
+
+
+def lanes(context: PlanningContext, behavior: str) -> Mapping[ResourceId, Sequence[LatLon]]:
+    """Return the corners of each member's way along the route, without its way to the route.
+
+    Raises:
+        TeamRefusedError: the members cannot move along it.
+    """
+    route, (_, spacing, places) = context.parameters.route, _formation(context, SHAPES[behavior])
+    if route is None or not context.members:
+        return {}
+    ways, _ = _ways(_formed_up(context, route, places), route, places, spacing)
+    return {way.member: way.corners(context.frame) for way in ways}
+
+
+def _formed_up(
+    context: PlanningContext, route: Route, places: Sequence[tuple[float, float]]
+) -> PlanningContext:
+    """Return the context with the members in their places behind the beginning of the route."""
+    start, then = (context.level(each) for each in _apart(context, route)[:2])
+    yaw_rad, first_m = Segment.between(start, then).yaw_rad, min(back for back, _ in places)
+    poses = {
+        member: MemberPose(beside(start, yaw_rad, back - first_m + 1.0, left)[:2])
+        for member, (back, left) in zip(context.members, places, strict=False)
+    }
+    return replace(context, poses=poses)
 
 
 def lane_mates(a: Marcher, b: Marcher, spacing_m: float) -> bool:
@@ -181,6 +201,10 @@ class _Way:
         """The member on its path; or on that without its way to the route."""
         path = self.path if begins else self.lane
         return Marcher(self.member, path, self._back_m, self._left_m, motion)
+
+    def corners(self, frame: LocalFrame) -> list[LatLon]:
+        """The corners of its lane."""
+        return [frame.to_latlon(place[:2]) for place in self.lane.places]
 
     def shorten(self, by_m: float) -> None:
         """Let it end so much earlier, or a little more."""

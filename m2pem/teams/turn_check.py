@@ -1,4 +1,5 @@
-"""The static check of teams that move along a route: where their members come near each other."""
+"""The static check of teams that move along a route: where their members come near each other, and
+where one leaves the fleet's fence beside the route."""
 
 from collections.abc import Iterator
 
@@ -6,6 +7,7 @@ from m2pem.api.behavior_parameters import BehaviorParameters
 from m2pem.findings import Finding, Severity
 from m2pem.fleet.allocation import resources_of
 from m2pem.fleet.behaviors import SHARED
+from m2pem.fleet.fence import fence_of
 from m2pem.fleet.fleet import Fleet
 from m2pem.fleet.parameters import examine_behavior
 from m2pem.fleet.task_findings import TaskFindings
@@ -15,29 +17,73 @@ from m2pem.mission.elements import ScriptTask, SendTask, ServiceTask
 from m2pem.mission.geometry import Route
 from m2pem.mission.mission import Mission
 from m2pem.teams.paths import SHAPES
-from m2pem.teams.plan import NO_MEETING, Meeting, PlanningContext, TeamRefusedError
+from m2pem.teams.plan import PlanningContext, TeamRefusedError
 
 
 def check_turns(mission: Mission, fleet: Fleet) -> Iterator[Finding]:
-    """Yield a warning for each route that brings members of a team too near to each other."""
+    """Yield a warning for each route that brings members of a team too near to each other, and an
+    error for each member that leaves the fleet's fence beside a route that does not."""
     for task in mission.activities():
         behavior = task.behavior if isinstance(task, ScriptTask | ServiceTask | SendTask) else None
         if behavior is not None and behavior.type is BehaviorType.TEAM and behavior.name in SHAPES:
-            said, remedy, place = _turns(behavior, mission, fleet)
-            if said:
-                yield TaskFindings(mission.file_of(task), task).add(
-                    "members-meet",
-                    said,
-                    remedy,
-                    line=behavior.line,
-                    severity=Severity.WARNING,
-                    place=place,
-                )
+            context = _context(behavior, mission, fleet)
+            findings = TaskFindings(mission.file_of(task), task)
+            try:
+                if context is not None:
+                    _add_meeting(findings, behavior, context, fleet)
+                    _add_breaches(findings, behavior, context, fleet)
+            except (TeamRefusedError, KeyError):  # for another reason, or as the first finding says
+                pass
+            yield from findings.found
 
 
-def _turns(behavior: Behavior, mission: Mission, fleet: Fleet) -> Meeting:
+def _add_meeting(
+    findings: TaskFindings, behavior: Behavior, context: PlanningContext, fleet: Fleet
+) -> None:
     from m2pem.teams.columns import turns  # noqa: PLC0415  # loads NumPy
 
+    domains = (fleet.vehicles[each].domain for each in context.members)
+    least_m = max((fleet.surface_separation_m.get(each, 0.0) for each in domains), default=0.0)
+    said, remedy, place = turns(context, behavior.name, least_m)
+    if said:
+        findings.add(
+            "members-meet",
+            said,
+            remedy,
+            line=behavior.line,
+            severity=Severity.WARNING,
+            place=place,
+        )
+
+
+def _add_breaches(
+    findings: TaskFindings, behavior: Behavior, context: PlanningContext, fleet: Fleet
+) -> None:
+    from m2pem.teams.columns import lanes  # noqa: PLC0415  # loads NumPy
+
+    route = context.parameters.route
+    fences = {each: fence_of(fleet, fleet.vehicles[each].domain) for each in context.members}
+    if route is None or not any(fences.values()):
+        return
+    way = [each[:2] for each in route.waypoints]
+    for member, lane in lanes(context, behavior.name).items():
+        fence = fences[member]
+        if fence is None or fence.find_breach(way) is not None:
+            continue
+        breach = fence.find_breach(lane, None, lambda index: f"corner {index + 1} of its lane")
+        if breach is not None:
+            findings.add(
+                "outside-fence",
+                f"{member}, in its place beside the route: {breach}",
+                "move the route away from there, take a smaller `spacing` or another `shape`, or "
+                "widen the fleet's `fence`",
+                line=behavior.line,
+                place=breach.place,
+            )
+
+
+def _context(behavior: Behavior, mission: Mission, fleet: Fleet) -> PlanningContext | None:
+    """Return what is known of a behavior's plan before it begins; None: too little."""
     given = {each.name: each.value for each in behavior.parameters}
     spec = SHARED[behavior.name, BehaviorType.TEAM]
     geometry = {**fleet.geometries, **mission.geometries}.get
@@ -49,16 +95,11 @@ def _turns(behavior: Behavior, mission: Mission, fleet: Fleet) -> Meeting:
     members = [fleet.vehicles.get(each) for role in roles for each in resources_of(role, fleet)]
     vehicles = [each for each in members if each is not None]
     if problems or not known or not isinstance(route, Route):
-        return NO_MEETING
-    context = PlanningContext(
+        return None
+    return PlanningContext(
         tuple(each.id for each in vehicles),
         {each.id: each.domain.value for each in vehicles},
         {each.id: {} for each in vehicles},
         BehaviorParameters(values),
         LocalFrame(route.waypoints[0][:2]),
     )
-    least_m = (fleet.surface_separation_m.get(each.domain, 0.0) for each in vehicles)
-    try:
-        return turns(context, behavior.name, max(least_m, default=0.0))
-    except (TeamRefusedError, KeyError):  # it is refused for another reason
-        return NO_MEETING
