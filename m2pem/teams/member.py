@@ -177,10 +177,6 @@ class Member:
             return ""
         return await self._turn(f"resume {self.id}", self._arbiter.resume(self.id))
 
-    async def query(self, part: str, native_ref: str | None) -> BehaviorReport:
-        """Query its arbiter for a part."""
-        return await self._arbiter.query(part, native_ref)
-
     def close(self) -> None:
         """Command nothing more."""
         for task in self._tasks:
