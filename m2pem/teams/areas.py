@@ -14,7 +14,6 @@ from m2pem.geo.polyline import Polyline
 from m2pem.geo.survey_tracks import SurveyTracks
 from m2pem.geo.work_shares import owners, reach_m, split
 from m2pem.mission.geometry import Area, Route, VehiclePosition
-from m2pem.teams.division import SURVEY_SPACING_M
 from m2pem.teams.paths import SPACING_M
 from m2pem.teams.plan import Leg, Plan, PlanningContext, TeamRefusedError
 
