@@ -44,17 +44,15 @@ class Clearance:
             ahead = np.isin(zone, zone[early])
             if in_order:
                 ahead |= ~np.isin(zone, zone[np.isin(to_m, pair.ends_m[-1:])])
-            self._add(second, first, own_m[ahead], to_m[ahead])
-            # Nor does one pass the other before that has set off.
-            waits = ahead & (own_m == 0.0) & (from_m > 0.0)
-            enters = from_m[waits & ~np.isin(from_m, pair.ends_m)]
-            self._add(first, second, enters, 0 * enters)
-            enters = own_m[~ahead & (from_m == 0.0) & (own_m > 0.0)]
-            self._add(second, first, enters, 0 * enters)
-            if not ahead.all():
-                zone_too, own_m, _, to_m = pair.rows(swapped=True)
-                behind = ~np.isin(zone_too, zone[ahead])
-                self._add(first, second, own_m[behind], to_m[behind])
+            # Nor does one pass the place where the other begins, before that is far enough; but
+            # where both begin too near to each other.
+            near = ((from_m == 0.0) & (own_m == 0.0)).any()
+            begins = ahead | ((from_m == 0.0) & ~near)
+            self._add(second, first, own_m[begins], to_m[begins])
+            zone_too, own_m, from_m, to_m = pair.rows(swapped=True)
+            behind = ~np.isin(zone_too, zone[ahead])
+            begins = behind | ((from_m == 0.0) & ~near)
+            self._add(first, second, own_m[begins], to_m[begins])
 
     def _add(self, member: int, other: int, own_m: _Floats, others_m: _Floats) -> None:
         """Note that a member waits at each of these places until the other one has gone so far."""

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from itertools import combinations
 
@@ -255,12 +256,20 @@ def _ways(
     spacing_m: float,
 ) -> tuple[list[_Way], bool]:
     """Return the members' ways, and whether they set off in their order: where they are in each
-    other's ways else."""
+    other's ways else.
+
+    Raises:
+        TeamRefusedError: there are none, because of the route, or of where they begin.
+    """
     ways = _drawn(context, route, offsets)
     try:
         _keep_ends_apart(context, ways, spacing_m, in_order=False)
-    except _InTheWayError:
-        return _ways_in_order(context, route, offsets, spacing_m), True
+    except _StuckError as stuck:
+        with suppress(_StuckError):
+            return _ways_in_order(context, route, offsets, spacing_m), True
+        formed_up = _formed_up(context, route, offsets)
+        _keep_ends_apart(formed_up, _drawn(formed_up, route, offsets), spacing_m, in_order=False)
+        raise TeamRefusedError(f"{stuck.member} {_NO_WAY}", stuck.place) from None
     return ways, False
 
 
@@ -302,8 +311,12 @@ _NO_WAY = (
 )
 
 
-class _InTheWayError(TeamRefusedError):
-    """Members are in each other's ways to the route."""
+class _StuckError(TeamRefusedError):
+    """A member cannot get to its end."""
+
+    def __init__(self, text: str, place: LatLon, member: ResourceId) -> None:
+        super().__init__(text, place)
+        self.member = member
 
 
 def _keep_ends_apart(
@@ -312,7 +325,7 @@ def _keep_ends_apart(
     """Let members end earlier that would come too near to those at their ends.
 
     Raises:
-        TeamRefusedError: one of them would not get to the end of the route, or near it.
+        _StuckError: one of them would not get to the end of the route, or near it.
     """
     short_m = max(context.motion(way.member).short_m(context.speed()) for way in ways)
     farther_m = [0.0 for _ in ways]
@@ -329,13 +342,7 @@ def _keep_ends_apart(
             if not context.begun and too_far:
                 _, place, text = _meeting(context, ways)
                 text = f"{text}, and {way.member} cannot wait until it is free: {_REMEDY}"
-                alone = [each.marcher(context.motion(each.member), begins=False) for each in ways]
-                ends_m = [each.path.line.length_m for each in alone]
-                begins_m = [0.0] * len(ways)
-                clearance = Clearance(alone, NEAREST_SHARE * spacing_m)
-                if [*clearance.reached_m(begins_m, ends_m, short_m)] == ends_m:
-                    raise _InTheWayError(f"{way.member} {_NO_WAY}", place)
-                raise TeamRefusedError(text, place)
+                raise _StuckError(text, place, way.member)
             if by_m and not too_far:
                 way.shorten(by_m)
                 shorter = True
