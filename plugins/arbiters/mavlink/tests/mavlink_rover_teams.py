@@ -88,10 +88,10 @@ def _write(file: Path, kind: str, coordinates: object) -> None:
     file.write_text(json.dumps({"type": kind, "coordinates": coordinates}), encoding="utf-8")
 
 
-def drives(team: str) -> bytes:
+def drives(team: str, speed: str = SPEED) -> bytes:
     """Return a mission of one task: the team drives along its route."""
     behavior, spacing_m, _ = TEAMS[team]
-    given = {"route": team, "spacing": f"{spacing_m} m", "speed": SPEED}
+    given = {"route": team, "spacing": f"{spacing_m} m", "speed": speed}
     return mission(sequence(team_task("Task", behavior, **given)))
 
 

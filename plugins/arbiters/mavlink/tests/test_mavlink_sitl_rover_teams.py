@@ -132,7 +132,8 @@ async def done(control: MissionControl, mission: bytes) -> BehaviorEnded:
 def test_members_keep_apart(tmp_path: Path, team: str) -> None:
     with running(tmp_path) as found:
         fleet = rovers.write_fleet(tmp_path, found.urls)
-        ended = commanded(fleet, lambda control: done(control, rovers.drives(team)))
+        drives = rovers.drives(team, "4 m/s")
+        ended = commanded(fleet, lambda control: done(control, drives))
         assert ended.state == "SUCCEEDED", ended
     rovers.check(team, found.tracks)
 
