@@ -32,7 +32,7 @@ def read_data(context: ReadingContext, element: etree._Element, container: Conta
     read_children(context, element, identifier)
     what = local(element.tag)
     if what in ("dataObject", "property"):
-        declared = DataObject(*context.head(element, identifier))
+        declared = DataObject(*context.head(element, identifier), _kind(element))
         if declared.key:
             context.declared.append((container, declared))
         if identifier:
@@ -43,6 +43,29 @@ def read_data(context: ReadingContext, element: etree._Element, container: Conta
         target = element.get("dataObjectRef") or element.get("dataStoreRef") or ""
         key = element.get("name") or identifier
         context.data.setdefault(identifier, DataEnd(key, [element], refers_to=reference(target)))
+
+
+_KINDS = {
+    **dict.fromkeys(("string", "anyuri", "date", "time", "datetime", "duration"), "text"),
+    **dict.fromkeys(("integer", "int", "long", "short", "byte", "float"), "number"),
+    **dict.fromkeys(("double", "decimal", "nonnegativeinteger", "positiveinteger"), "number"),
+    "boolean": "boolean",
+}
+"""Of types of XML Schema, which is BPMN's own type language (8.1.3), and of Java's."""
+
+
+def _kind(element: etree._Element) -> str:
+    """The kind of what a data object holds, by the structure of its item definition."""
+    if element.get("isCollection") == "true":
+        return "list"
+    item = reference(element.get("itemSubjectRef", ""))
+    root = element.getroottree().getroot()
+    found = (each for each in root.iterchildren(f"{BPMN}itemDefinition") if each.get("id") == item)
+    definition = next(found, None) if item else None
+    if definition is None or definition.get("isCollection") == "true":
+        return "" if definition is None else "list"
+    structure = definition.get("structureRef", "").replace(".", ":").rpartition(":")[2]
+    return _KINDS.get(structure.lower(), "")
 
 
 def resolve_data(context: ReadingContext) -> None:

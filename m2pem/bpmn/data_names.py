@@ -134,6 +134,8 @@ def unwritten(
     }
     for store in stores.values():
         store.write(shared)
+    for container, store in within.items():
+        store.kinds |= {each.key: frozenset({each.kind}) for each in container.data if each.kind}
     for process, store in stores.items():
         yield from _findings(mission, process, store)
         for read in store.reads:

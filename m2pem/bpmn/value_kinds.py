@@ -40,7 +40,7 @@ def doubts(expression: Expression, of: Of) -> Iterator[tuple[Rule, str, str]]:
         if not isinstance(node, Compare | Arithmetic):
             continue
         left, right = kinds_of(node.left), kinds_of(node.right)
-        if not left or not right or DATA in (left, right):
+        if not left or not right or left >= DATA or right >= DATA:
             continue
         sign = node.operator
         said = f"in '{expression.text.strip()}', '{sign}' of {_named(left)} and {_named(right)}"

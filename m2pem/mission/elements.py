@@ -92,7 +92,12 @@ class FlowNode(Element):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DataObject(Element):
-    """A data object or property: declares the key `name or id` in its container's scope."""
+    """A data object or property: declares the key `name or id` in its container's scope.
+
+    `kind`: of its values besides null, as `operators.kind` calls them; "": any.
+    """
+
+    kind: str = ""
 
     @property
     def key(self) -> str:

@@ -2,6 +2,7 @@
 
 import random
 from collections.abc import Mapping
+from xml.sax.saxutils import escape
 
 import pytest
 
@@ -100,6 +101,34 @@ def test_check_knows_what_scripts_loops_and_operators_write() -> None:
     assert "'==' of a text and a number" in lint_of("user.decision == 1")["mixed-kinds"]
     assert "other-value" in lint_of("${note == 1}")
     assert not lint_of("lap == 1 and note == 'x'")
+
+
+@pytest.mark.parametrize(
+    ("structure", "condition", "said"),
+    [
+        ("xsd:int", "level == 'x'", "'==' of a number and a text"),
+        ("java.lang.String", "level > 3", "'>' of a text and a number"),
+        ("xsd:boolean", "${level == 'true'}", "'==' of a boolean and a text"),
+        ("tns:Level", "level == 'x'", ""),
+    ],
+)
+def test_check_knows_what_data_objects_hold(structure: str, condition: str, said: str) -> None:
+    mission = parse_mission(
+        definitions(
+            f'<itemDefinition id="item" structureRef="{structure}"/>'
+            '<process id="P"><dataObject id="d" name="level" itemSubjectRef="item"/>'
+            '<startEvent id="S"/><sequenceFlow id="f" sourceRef="S" targetRef="G"/>'
+            '<exclusiveGateway id="G" default="j"/>'
+            '<sequenceFlow id="i" sourceRef="G" targetRef="E"><conditionExpression>'
+            f"{escape(condition)}</conditionExpression></sequenceFlow>"
+            '<sequenceFlow id="j" sourceRef="G" targetRef="E"/><endEvent id="E"/></process>'
+        ),
+        "m.bpmn",
+    )
+    rules = ("mixed-kinds", "other-value")
+    found = [each.message for each in lint(mission) if each.rule in rules]
+    assert len(found) == bool(said)
+    assert all(said in each for each in found)
 
 
 VALUES = {
