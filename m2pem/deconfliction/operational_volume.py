@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from m2pem.geo.local_frame import EastNorth
-from m2pem.geo.polygon import Hull, buffered_hull, edge_distance_m, hull_distance_m
+from m2pem.geo.polygon import Hull, buffered_hull, hull_distance_m
 
 NOTHING_M = 0.01
 """Two computations of one place may differ by this."""
@@ -87,7 +87,10 @@ class Volume:
         while leg + 2 < len(self.route):
             begin, end, then = self.route[leg : leg + 3]
             ahead = _dot(end, begin, end, place) >= 0
-            nearer = edge_distance_m(place, (end, then)) < edge_distance_m(place, (begin, end))
+            past_m, before_m = (
+                hull_distance_m((place,), way) for way in ((end, then), (begin, end))
+            )
+            nearer = past_m < before_m
             if math.dist(place, end) > REACHED_M and not (ahead and nearer):
                 break
             leg += 1

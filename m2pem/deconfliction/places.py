@@ -1,13 +1,11 @@
 """Says where something is: coordinates in the fleet's local frame, and the nearest named place."""
 
-import math
-from itertools import pairwise
+from functools import cached_property
 
 from m2pem.fleet.fleet import Fleet
 from m2pem.geo.local_frame import EastNorth, LocalFrame
-from m2pem.geo.polygon import Edge, edge_distance_m, edges_enclose
+from m2pem.geo.polygon import Region, region_of
 from m2pem.geo.positions import NO_ORIGIN
-from m2pem.mission.geometry import Area, Geometry, Point, Route
 
 NEAR_M = 1_000.0
 """A named place that is farther away says nothing."""
@@ -18,10 +16,12 @@ class PlaceNames:
 
     def __init__(self, fleet: Fleet) -> None:
         self._frame = None if fleet.origin == NO_ORIGIN else LocalFrame(fleet.origin)
-        self._edges: dict[str, tuple[Geometry, list[Edge]]] = {}
-        if self._frame is not None:
-            for name, geometry in fleet.geometries.items():
-                self._edges[name] = geometry, _edges(geometry, self._frame)
+        self._geometries = {} if self._frame is None else fleet.geometries
+
+    @cached_property
+    def _regions(self) -> dict[str, Region]:
+        frame = self._frame or LocalFrame(NO_ORIGIN)
+        return {name: region_of(each, None, frame) for name, each in self._geometries.items()}
 
     def at(self, place: EastNorth, frame: LocalFrame) -> str:
         """Return `at enu [12, -3] (5 m from 'gate')`, or latitude and longitude if the fleet has no
@@ -34,30 +34,8 @@ class PlaceNames:
         return f"at enu [{east}, {north}]{self._near(here)}"
 
     def _near(self, here: EastNorth) -> str:
-        found = min(
-            ((self._distance_m(name, here), name) for name in self._edges),
-            default=(math.inf, ""),
-        )
-        if found[0] > NEAR_M:
+        distances = ((each.distance_m((here,)), name) for name, each in self._regions.items())
+        away_m, name = min(distances, default=(NEAR_M + 1.0, ""))
+        if away_m > NEAR_M:
             return ""
-        return (
-            f" (in '{found[1]}')" if found[0] == 0.0 else f" ({found[0]:.0f} m from '{found[1]}')"
-        )
-
-    def _distance_m(self, name: str, here: EastNorth) -> float:
-        geometry, edges = self._edges[name]
-        if isinstance(geometry, Area) and edges_enclose(edges, here):
-            return 0.0
-        return min((edge_distance_m(here, edge) for edge in edges), default=math.inf)
-
-
-def _edges(geometry: Geometry, frame: LocalFrame) -> list[Edge]:
-    if isinstance(geometry, Point):
-        place = frame.to_local(geometry.position[:2])
-        return [(place, place)]
-    lines = []
-    if isinstance(geometry, Route):
-        lines = [geometry.waypoints]
-    elif isinstance(geometry, Area):
-        lines = list(geometry.rings)
-    return [edge for line in lines for edge in pairwise(frame.to_local(each[:2]) for each in line)]
+        return f" (in '{name}')" if away_m == 0.0 else f" ({away_m:.0f} m from '{name}')"

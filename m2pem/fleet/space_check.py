@@ -1,7 +1,6 @@
 """The static check of shared space: a team that needs more places than there are can never go."""
 
-from collections.abc import Mapping
-from itertools import pairwise
+from collections.abc import Iterator, Mapping
 
 from m2pem.findings import Severity
 from m2pem.fleet.allocation import resources_of
@@ -9,7 +8,7 @@ from m2pem.fleet.fleet import Fleet, SharedSpace
 from m2pem.fleet.space import ONE_BY_ONE
 from m2pem.fleet.task_findings import TaskFindings
 from m2pem.geo.local_frame import LocalFrame
-from m2pem.geo.polygon import convex_hull, region_of
+from m2pem.geo.polygon import region_of
 from m2pem.mission.behavior import Behavior, BehaviorType
 from m2pem.mission.geometry import Area, Geometry, Route
 
@@ -31,10 +30,11 @@ def check_space(
     """
     if behavior.type is not BehaviorType.TEAM or behavior.name in ONE_BY_ONE:
         return
-    if not fleet.shared_space or not (ways := _ways(behavior, {**fleet.geometries, **geometries})):
+    if not fleet.shared_space:
         return
     frame = LocalFrame(fleet.origin)
-    hulls = [convex_hull(frame.to_local(place) for place in way) for way in ways]
+    ways = _ways(behavior, {**fleet.geometries, **geometries})
+    hulls = [hull for way in ways for hull in region_of(way, None, frame).hulls()]
     for space in fleet.shared_space.values():
         needed = _needed(behavior, fleet, space)
         if needed <= space.capacity:
@@ -54,20 +54,13 @@ def check_space(
             )
 
 
-def _ways(
-    behavior: Behavior, geometries: Mapping[str, Geometry]
-) -> list[tuple[tuple[float, float], ...]]:
-    """Return the legs of its route, or its area, as (latitude, longitude); [] if not known."""
+def _ways(behavior: Behavior, geometries: Mapping[str, Geometry]) -> Iterator[Geometry]:
+    """Yield its route, or its area, if it is known."""
     for parameter in behavior.parameters:
-        if not isinstance(parameter.value, str):
-            continue
-        geometry = geometries.get(parameter.value)
-        if parameter.name == "route" and isinstance(geometry, Route):
-            places = [each[:2] for each in geometry.waypoints]
-            return list(pairwise(places)) if len(places) > 1 else [tuple(places)]
-        if parameter.name == "area" and isinstance(geometry, Area):
-            return [tuple(corner[:2] for corner in geometry.rings[0])]
-    return []
+        if parameter.name in ("route", "area") and isinstance(parameter.value, str):
+            geometry = geometries.get(parameter.value)
+            if isinstance(geometry, Route if parameter.name == "route" else Area):
+                yield geometry
 
 
 def _needed(behavior: Behavior, fleet: Fleet, space: SharedSpace) -> int:

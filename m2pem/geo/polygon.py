@@ -8,12 +8,16 @@ Rings of areas are in degrees: GeoJSON draws straight edges in the plane of long
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 from m2pem.geo.lazy_imports import shapely
 from m2pem.geo.local_frame import EastNorth, LatLon, LocalFrame
-from m2pem.mission.geometry import Area, Coordinate, Geometry, Route
+from m2pem.mission.geometry import Area, Coordinate, Geometry, Point, Route
+
+if TYPE_CHECKING:
+    from shapely.geometry.base import BaseGeometry
 
 Edge: TypeAlias = tuple[tuple[float, float], tuple[float, float]]
 """From a corner to the next: of degrees or metres, as the ring is."""
@@ -46,21 +50,6 @@ def edges_enclose(edges: Iterable[Edge], point: EastNorth) -> bool:
         if (an > north) != (bn > north) and east < (be - ae) * (north - an) / (bn - an) + ae:
             odd = not odd
     return odd
-
-
-def edge_distance_m(point: EastNorth, edge: Edge) -> float:
-    """Return the distance from a point to the nearest one of an edge."""
-    return math.dist(point, nearest_on(edge, point))
-
-
-def nearest_on(edge: Edge, point: EastNorth) -> EastNorth:
-    """Return the place on an edge that is nearest to a point."""
-    (ae, an), (be, bn) = edge
-    de, dn = be - ae, bn - an
-    length2 = de * de + dn * dn
-    part = ((point[0] - ae) * de + (point[1] - an) * dn) / length2 if length2 else 0.0
-    part = min(1.0, max(0.0, part))
-    return ae + de * part, an + dn * part
 
 
 def turned(point: EastNorth, angle_rad: float) -> EastNorth:
@@ -97,30 +86,16 @@ def buffered_hull(points: Iterable[EastNorth], distance_m: float) -> Hull:
     )
 
 
+@lru_cache(4096)
+def _shape(hull: Hull) -> "BaseGeometry":
+    if len(hull) > 2:
+        return shapely.Polygon(hull)
+    return shapely.LineString(hull) if len(hull) == 2 else shapely.Point(hull)
+
+
 def hull_distance_m(a: Hull | None, b: Hull | None) -> float:
     """Return the distance between two convex polygons; 0 if they touch. None is everywhere."""
-    if a is None or b is None or _holds(a, b[0]) or _holds(b, a[0]):
-        return 0.0
-    return min(_edges_distance_m(first, other) for first in _edges(a) for other in _edges(b))
-
-
-def hull_meets_edges(hull: Hull | None, edges: Sequence[Edge]) -> bool:
-    """Whether a convex polygon and an area have a place in common. None is everywhere.
-
-    `edges`: of the closed rings of the area, which need not be convex and may have holes.
-    """
-    if hull is None or edges_enclose(edges, hull[0]):
-        return True
-    own = _edges(hull)
-    west, east = min(corner[0] for corner in hull), max(corner[0] for corner in hull)
-    south, north = min(corner[1] for corner in hull), max(corner[1] for corner in hull)
-    for edge in edges:
-        (ae, an), (be, bn) = edge
-        if max(ae, be) < west or min(ae, be) > east or max(an, bn) < south or min(an, bn) > north:
-            continue  # it is outside of the bounding box, as most are
-        if _holds(hull, edge[0]) or any(_edges_distance_m(mine, edge) == 0.0 for mine in own):
-            return True
-    return False
+    return 0.0 if a is None or b is None else float(_shape(a).distance(_shape(b)))
 
 
 def meeting_place(a: Hull | None, b: Hull | None) -> EastNorth | None:
@@ -129,32 +104,16 @@ def meeting_place(a: Hull | None, b: Hull | None) -> EastNorth | None:
     if a is None or b is None:
         known = a or b
         return None if known is None else middle_of(known)
-    common = [corner for corner in a if _holds(b, corner)]
-    common += [corner for corner in b if _holds(a, corner)]
-    common += [
-        crossing
-        for mine in _edges(a)
-        for other in _edges(b)
-        if (crossing := _crossing(mine, other)) is not None
-    ]
-    return middle_of(common or _nearest(a, b))
+    return _middle_between(_shape(a), _shape(b))
 
 
-def _crossing(first: Edge, other: Edge) -> EastNorth | None:
-    """Return where two edges cross; None: they do not."""
-    (a, b), (c, d) = first, other
-    from_c, from_d = _turn(a, b, c), _turn(a, b, d)
-    if from_c * from_d >= 0 or _turn(c, d, a) * _turn(c, d, b) >= 0:
-        return None
-    part = from_c / (from_c - from_d)
-    return c[0] + (d[0] - c[0]) * part, c[1] + (d[1] - c[1]) * part
+def _middle_between(a: "BaseGeometry", b: "BaseGeometry") -> EastNorth:
+    common = a.intersection(b) or shapely.shortest_line(a, b)
+    return middle_of([*dict.fromkeys(_corners(common))])
 
 
-def _nearest(a: Hull, b: Hull) -> tuple[EastNorth, EastNorth]:
-    """Return the nearest places of two convex polygons that are apart: one is a corner."""
-    pairs = [(corner, nearest_on(edge, corner)) for corner in a for edge in _edges(b)]
-    pairs += [(corner, nearest_on(edge, corner)) for corner in b for edge in _edges(a)]
-    return min(pairs, key=lambda pair: math.dist(*pair))
+def _corners(shape: "BaseGeometry") -> list[EastNorth]:
+    return [(east, north) for east, north in shapely.get_coordinates(shape).tolist()]
 
 
 def _chain(points: Sequence[EastNorth]) -> list[EastNorth]:
@@ -171,71 +130,46 @@ def _turn(a: EastNorth, b: EastNorth, c: EastNorth) -> float:
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
-def _holds(polygon: Hull, point: EastNorth) -> bool:
-    return len(polygon) > 2 and all(_turn(a, b, point) >= 0 for a, b in _edges(polygon))
-
-
-def _edges(polygon: Hull) -> list[Edge]:
-    if len(polygon) == 1:
-        return [(polygon[0], polygon[0])]
-    if len(polygon) == 2:
-        return [(polygon[0], polygon[1])]
-    return [*pairwise(polygon), (polygon[-1], polygon[0])]
-
-
-def _edges_distance_m(first: Edge, other: Edge) -> float:
-    (a, b), (c, d) = first, other
-    if _turn(a, b, c) * _turn(a, b, d) < 0 and _turn(c, d, a) * _turn(c, d, b) < 0:
-        return 0.0
-    return min(
-        edge_distance_m(a, other),
-        edge_distance_m(b, other),
-        edge_distance_m(c, first),
-        edge_distance_m(d, first),
-    )
-
-
 # --- areas and corridors along routes, in a local frame -------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
 class Region:
-    """An area by the `edges` of its rings, or a corridor by its `legs`."""
+    """A point, an area, or a corridor by its legs."""
 
-    edges: tuple[Edge, ...] = ()
-    legs: tuple[Hull, ...] = ()
+    parts: "Sequence[BaseGeometry]"
+
+    def distance_m(self, hull: Hull | None) -> float:
+        """Return the distance to a convex polygon; 0 if they touch. None is everywhere."""
+        return 0.0 if hull is None else float(min(shapely.distance(self.parts, _shape(hull))))
 
     def meets(self, hull: Hull | None) -> bool:
         """Whether it and a convex polygon have a place in common. None is everywhere."""
-        if self.legs:
-            return any(hull_distance_m(leg, hull) == 0.0 for leg in self.legs)
-        return hull_meets_edges(hull, self.edges)
+        return self.distance_m(hull) == 0.0
+
+    def hulls(self) -> list[Hull]:
+        """Return the convex hull of each part."""
+        return [convex_hull(_corners(each)) for each in self.parts]
 
     def common_place(self, hull: Hull | None) -> EastNorth | None:
         """Return a place that it has in common with a convex polygon that meets it; None: any."""
         if hull is None:
             return None
-        if self.legs:
-            return meeting_place(min(self.legs, key=lambda leg: hull_distance_m(leg, hull)), hull)
-        crossed = [edge for edge in self.edges if hull_distance_m(edge, hull) == 0.0]
-        return middle_of([meeting_place(edge, hull) or edge[0] for edge in crossed] or [*hull])
+        return _middle_between(min(self.parts, key=_shape(hull).distance), _shape(hull))
 
 
 def region_of(geometry: Geometry, width_m: float | None, frame: LocalFrame) -> Region:
-    """Return an area, or the corridor of a width along a route."""
+    """Return a point, an area, or the corridor of a width along a route."""
+    if isinstance(geometry, Point):
+        return Region((_shape((frame.to_local(geometry.position[:2]),)),))
     if isinstance(geometry, Area):
-        return Region(
-            edges=tuple(
-                edge
-                for ring in geometry.rings
-                for edge in pairwise(frame.to_local(corner[:2]) for corner in ring)
-            )
-        )
+        outer, *holes = ([frame.to_local(each[:2]) for each in ring] for ring in geometry.rings)
+        return Region((shapely.Polygon(outer, holes),))
     if isinstance(geometry, Route):
         places = [frame.to_local(each[:2]) for each in geometry.waypoints]
         legs = pairwise(places) if len(places) > 1 else [(places[0],)]
-        return Region(legs=tuple(buffered_hull(leg, (width_m or 0.0) / 2) for leg in legs))
-    raise TypeError(f"{geometry!r} is neither an area nor a route")
+        return Region([_shape(buffered_hull(leg, (width_m or 0.0) / 2)) for leg in legs])
+    raise TypeError(f"{geometry!r} is not a point, an area or a route")
 
 
 # --- rings of areas, in degrees -------------------------------------------------------------------

@@ -1,6 +1,7 @@
 """Survey patterns: everything is covered, nothing that is kept out is entered."""
 
 import math
+from collections.abc import Sequence
 from itertools import pairwise
 
 import pytest
@@ -11,7 +12,7 @@ from hypothesis import strategies as st
 from m2pem.geo.cameras import SurveyCamera, image_plan
 from m2pem.geo.geojson import GeometryError
 from m2pem.geo.local_frame import EastNorth, LocalFrame
-from m2pem.geo.polygon import edge_distance_m, edges_enclose
+from m2pem.geo.polygon import edges_enclose
 from m2pem.geo.survey_pattern import Surveyor, SurveyPattern, SurveyRoute, survey_routes
 from m2pem.mission.geometry import Area
 
@@ -40,14 +41,17 @@ def enters(way: list[EastNorth], closed: tuple[EastNorth, ...]) -> bool:
         steps = max(1, math.ceil(math.dist(a, b)))
         for step in range(steps + 1):
             at = (a[0] + (b[0] - a[0]) * step / steps, a[1] + (b[1] - a[1]) * step / steps)
-            inside = edges_enclose(edges, at)
-            if inside and min(edge_distance_m(at, edge) for edge in edges) > 0.05:
+            if edges_enclose(edges, at) and distance_m(at, edges) > 0.05:
                 return True
     return False
 
 
 def uncovered(way: list[EastNorth], place: EastNorth) -> float:
-    return min(edge_distance_m(place, leg) for leg in pairwise(way))
+    return distance_m(place, [*pairwise(way)])
+
+
+def distance_m(place: EastNorth, edges: Sequence[tuple[EastNorth, EastNorth]]) -> float:
+    return float(shapely.MultiLineString(edges).distance(shapely.Point(place)))
 
 
 # --- one vehicle --------------------------------------------------------------------------------
