@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 from m2pem.geo.fence import Fence, polygons, valid
 from m2pem.geo.lazy_imports import shapely
 from m2pem.geo.local_frame import EastNorth
-from m2pem.geo.polygon import Edge, turned
+from m2pem.geo.polygon import turned
 
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
@@ -119,15 +119,17 @@ def rows(
     """
     level = [turned(corner, yaw_rad) for corner in ring]
     low, strips, width_m = _strips(level, spacing_m)
-    found: list[Row] = []
-    for strip in range(strips):
-        bottom = low + strip * width_m
-        spans = _passes(level, bottom, bottom + width_m)
+    region, found = valid(level), list[Row]()
+    shapely.prepare(region)
+    west, east = (extreme(x for x, _ in level) for extreme in (min, max))
+    for bottom in (low + strip * width_m for strip in range(strips)):
+        inside = region.intersection(shapely.box(west, bottom, east, bottom + width_m))
+        spans = merged((part.bounds[0], part.bounds[2]) for part in polygons(inside))
         found.append([(bottom + width_m / 2, span) for span in spans])
     if closed is None:
         return found
     obstacles = shapely.affinity.rotate(closed, -yaw_rad, (0, 0), use_radians=True)
-    region = valid(level).difference(obstacles)
+    region = region.difference(obstacles)
     if region.is_empty:
         return []
     return [
@@ -203,31 +205,6 @@ def _strips(ring: Ring, spacing_m: float) -> tuple[float, int, float]:
             f"wide; at most {MAX_STRIPS} are flown or driven"
         )
     return low, strips, height / strips
-
-
-def _passes(ring: Ring, bottom: float, top: float) -> list[Span]:
-    """The spans of x that the polygon takes between two y."""
-    corners = sorted({y for _, y in ring if bottom < y < top} | {bottom, top})
-    spans: list[Span] = []
-    for low, high in pairwise(corners):
-        middle = (low + high) / 2
-        # Between two corners' heights the edges do not cross, so their order in the middle holds.
-        across = [(a, b) for a, b in pairwise(ring) if (a[1] <= middle) != (b[1] <= middle)]
-        edges = sorted(across, key=lambda edge: _x(edge, middle))
-        for left, right in zip(edges[::2], edges[1::2], strict=False):
-            spans.append(
-                (
-                    min(_x(left, low), _x(left, high)),
-                    max(_x(right, low), _x(right, high)),
-                )
-            )
-    return merged(spans)
-
-
-def _x(edge: Edge, y: float) -> float:
-    (ax, ay), (bx, by) = edge
-    part = min(1.0, max(0.0, (y - ay) / (by - ay)))
-    return ax + (bx - ax) * part
 
 
 def merged(spans: Iterable[Span]) -> list[Span]:
