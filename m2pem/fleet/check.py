@@ -205,9 +205,8 @@ def _of_files(mission: Mission, fleet: Fleet) -> Iterator[Finding]:
     """What is doubtful of the files of the geometries that the mission names."""
     named = {
         each.value
-        for task in mission.activities()
-        if isinstance(task, ScriptTask | ServiceTask | SendTask) and task.behavior
-        for each in task.behavior.parameters
+        for _, behavior in mission.commands()
+        for each in behavior.parameters
         if isinstance(each.value, str) and each.value not in mission.geometries
     }
     for warning in fleet.warnings:
@@ -244,11 +243,10 @@ def _member_lacks(name: str, offered: Sequence[BehaviorSpec], allowed: Sequence[
 def check_named(mission: Mission) -> list[Finding]:
     """Behaviors that name nothing to perform them: wrong whatever the fleet."""
     found: list[Finding] = []
-    for task in mission.activities():
-        if isinstance(task, ScriptTask | ServiceTask | SendTask) and task.behavior:
-            findings = TaskFindings(mission.file_of(task), task)
-            _check_named(task.behavior, findings)
-            found += findings.found
+    for task, behavior in mission.commands():
+        findings = TaskFindings(mission.file_of(task), task)
+        _check_named(behavior, findings)
+        found += findings.found
     return found
 
 
@@ -321,20 +319,18 @@ class _Check:
         if len(named) == len(behavior.roles):
             self._check_role_kinds(behavior, filled, findings)
         takers: list[_Taker] = []
-        for role_name, resources in possible.items():
-            for resource in resources:
-                spec = self.graph.spec(resource, behavior.name, behavior.type)
-                if spec is not None and all(spec != taker.spec for taker in takers):
-                    takers.append(_Taker(spec, role_name, f"{place(self.fleet, resource)}: "))
-        for role in matching:
-            for resource in resources_of(role, self.fleet):
-                self._check_manned(role, resource, findings)
-                spec = self.graph.spec(resource, behavior.name, behavior.type)
-                if spec is None:
-                    message, remedy, rule = self._not_offered(behavior, resource)
-                    findings.add(rule, message, remedy, line=behavior.line, role=role.name)
-                elif all(spec != taker.spec for taker in takers):
-                    takers.append(_Taker(spec, role.name, f"{place(self.fleet, resource)}: "))
+        by_need = [(name, each) for name, found in possible.items() for each in found]
+        by_name = [(role, each) for role in matching for each in resources_of(role, self.fleet)]
+        acting = [*by_need, *((role.name, each) for role, each in by_name)]
+        for role_name, resource in acting:
+            spec = self.graph.spec(resource, behavior.name, behavior.type)
+            if spec is not None and all(spec != taker.spec for taker in takers):
+                takers.append(_Taker(spec, role_name, f"{place(self.fleet, resource)}: "))
+        for role, resource in by_name:
+            self._check_manned(role, resource, findings)
+            if self.graph.spec(resource, behavior.name, behavior.type) is None:
+                message, remedy, rule = self._not_offered(behavior, resource)
+                findings.add(rule, message, remedy, line=behavior.line, role=role.name)
         shared = SHARED.get((behavior.name, behavior.type))
         if not takers and shared:
             takers = [_Taker(shared, behavior.roles[0].name if behavior.roles else "")]
@@ -345,13 +341,10 @@ class _Check:
                 self._near_behavior(behavior, SHARED.values()),
                 line=behavior.line,
             )
-        acting = [each for resources in possible.values() for each in resources]
-        acting += [each for role in matching for each in resources_of(role, self.fleet)]
         for taker in takers:
-            self._check_parameters(behavior, taker, acting, findings)
-        for role in matching:
-            for resource in resources_of(role, self.fleet):
-                self._check_speed(behavior, role, resource, findings)
+            self._check_parameters(behavior, taker, [each for _, each in acting], findings)
+        for role, resource in by_name:
+            self._check_speed(behavior, role, resource, findings)
         return possible
 
     def _check_role_kinds(

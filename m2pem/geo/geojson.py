@@ -192,13 +192,19 @@ def with_frames(geometry: Point | Route | Area, value: object) -> Point | Route 
     """
     if value is None:
         return geometry
+    route, given = _of_waypoints(geometry, value, FRAMES, "them", "one a position")
+    return Route.of(route.waypoints, map(checked_frame, given), route.speeds_m_s)
+
+
+def _of_waypoints(
+    geometry: Point | Route | Area, value: object, key: str, what: str, each: str
+) -> tuple[Route, Sequence[object]]:
     if not isinstance(geometry, Route):
-        raise GeometryError(f"{FRAMES}: only a route has them, not {article(kind_of(geometry))}")
+        raise GeometryError(f"{key}: only a route has {what}, not {article(kind_of(geometry))}")
     count = len(geometry.waypoints)
     if not isinstance(value, list | tuple) or len(value) != count:
-        raise GeometryError(f"{FRAMES}: a list of {count} is expected, one a position")
-    frames = [checked_frame(each) for each in value]
-    return Route.of(geometry.waypoints, frames, geometry.speeds_m_s)
+        raise GeometryError(f"{key}: a list of {count} is expected, {each}")
+    return geometry, value
 
 
 def with_speeds(geometry: Point | Route | Area, value: object) -> Point | Route | Area:
@@ -209,20 +215,16 @@ def with_speeds(geometry: Point | Route | Area, value: object) -> Point | Route 
     """
     if value is None:
         return geometry
-    if not isinstance(geometry, Route):
-        raise GeometryError(f"{SPEEDS}: only a route has speeds, not {article(kind_of(geometry))}")
-    count = len(geometry.waypoints)
-    if not isinstance(value, list | tuple) or len(value) != count:
-        raise GeometryError(f"{SPEEDS}: a list of {count} is expected, a speed or null a position")
+    route, given = _of_waypoints(geometry, value, SPEEDS, "speeds", "a speed or null a position")
     speeds = tuple(
         None if each is None else _number(each, "speed", f"{SPEEDS}[{index}]")
-        for index, each in enumerate(value)
+        for index, each in enumerate(given)
     )
     for index, speed in enumerate(speeds):
         if speed is not None and speed <= 0:
             raise GeometryError(f"{SPEEDS}[{index}]: speed {speed:g} m/s is not above 0")
     is_given = any(speed is not None for speed in speeds)
-    return replace(geometry, speeds_m_s=speeds if is_given else ())
+    return replace(route, speeds_m_s=speeds if is_given else ())
 
 
 def stated_frame(properties: Mapping[Any, Any]) -> str:

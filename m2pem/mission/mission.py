@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Self
 
 from m2pem.findings import Finding
+from m2pem.mission.behavior import Behavior
 from m2pem.mission.elements import Activity, CallActivity, Element, FlowNode, Process, SequenceFlow
 from m2pem.mission.events import (
     CorrelationProperty,
@@ -126,8 +127,14 @@ class Mission:
     @property
     def chooses_resources(self) -> bool:
         """Whether a behavior gets its resources only when its task starts (docs/allocation.md)."""
-        behaviors = (getattr(task, "behavior", None) for task in self.activities())
-        return any(each is not None and each.allocated_at_start for each in behaviors)
+        return any(behavior.allocated_at_start for _, behavior in self.commands())
+
+    def commands(self) -> Iterator[tuple[Activity, Behavior]]:
+        """Yield the tasks that command a behavior, with it."""
+        for task in self.activities():
+            behavior: Behavior | None = getattr(task, "behavior", None)
+            if behavior is not None:
+                yield task, behavior
 
 
 def version_of_files(mission: bytes, library: Iterable[Source]) -> str:

@@ -88,9 +88,8 @@ class _Fenced:
         self._named: dict[Activity, list[ResourceId]] = {}
         self._values: dict[Activity, Mapping[str, ResolvedValue]] = {}
         geometry = {**fleet.geometries, **mission.geometries}.get
-        for task in mission.activities():
-            behavior: Behavior | None = getattr(task, "behavior", None)
-            if behavior is None or behavior.type is BehaviorType.PAYLOAD:
+        for task, behavior in mission.commands():
+            if behavior.type is BehaviorType.PAYLOAD:
                 continue
             self._tasks[task] = behavior
             named = chain.from_iterable(resources_of(role, fleet) for role in behavior.roles)

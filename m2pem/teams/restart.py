@@ -22,6 +22,10 @@ class Transfer:
     parameters: Mapping[str, Value]
 
 
+_ALWAYS = ("begun", "done", "lost", "version", "split")
+"""What the text of a `Reference` has though it is empty."""
+
+
 @dataclass(frozen=True, slots=True)
 class Reference:
     """`begun`: the arbiters' own references of parts that have begun. `done`: parts that have
@@ -42,20 +46,8 @@ class Reference:
 
     def text(self) -> str:
         """Return it as JSON, for the journal."""
-        moved = {key: asdict(transfer) for key, transfer in self.transfers.items()}
-        return json.dumps(
-            {
-                "begun": dict(self.begun),
-                "done": list(self.done),
-                "lost": dict(self.lost),
-                "version": self.version,
-                "split": list(self.split),
-                **({"transfers": moved} if moved else {}),
-                **({"given_up": list(self.given_up)} if self.given_up else {}),
-                **({"left": dict(self.left)} if self.left else {}),
-            },
-            separators=(",", ":"),
-        )
+        given = {name: value for name, value in asdict(self).items() if value or name in _ALWAYS}
+        return json.dumps(given, separators=(",", ":"))
 
 
 def read_reference(text: str | None) -> Reference:

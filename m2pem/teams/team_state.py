@@ -12,7 +12,7 @@ from m2pem.api.clock import Clock
 from m2pem.api.telemetry import VehicleState
 from m2pem.fleet.endurance import lasts_s
 from m2pem.fleet.fleet import Fleet
-from m2pem.geo.local_frame import LocalFrame
+from m2pem.geo.local_frame import LatLon, LocalFrame
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.geometry import Area
 from m2pem.teams.areas import escort, observe, survey
@@ -66,10 +66,8 @@ class TeamSituation:
         self._fleet = fleet
         self._capabilities = capabilities
         self._bus = bus
-        arbiters = {vehicle: arbiter_of(vehicle) for vehicle in fleet.vehicles}
-        self._sighted = {
-            vehicle: arbiter for vehicle, arbiter in arbiters.items() if sights(arbiter)
-        }
+        arbiters = ((vehicle, arbiter_of(vehicle)) for vehicle in fleet.vehicles)
+        self._sighted = {vehicle: arbiter for vehicle, arbiter in arbiters if sights(arbiter)}
 
     def scheme(
         self,
@@ -89,15 +87,13 @@ class TeamSituation:
             raise TeamRefusedError(f"{request.behavior} has no members")
         if request.behavior not in PLANS:
             return TeamPlan(alike(request), LocalFrame((0.0, 0.0)))
-        states = {member: self._state(member) for member in request.resources}
-        first = next((state for state in states.values() if state is not None), None)
-        for member, state in states.items():
-            if state is None and member not in lost:
-                raise TeamRefusedError(f"the position of {member} is not known")
-            states[member] = state or first
-        if first is None or first.position is None:
-            raise TeamRefusedError(f"the position of {request.resources[0]} is not known")
-        frame = LocalFrame(first.position.latlon)
+        known = {each: state for each in request.resources if (state := self._state(each))}
+        unknown = [each for each in request.resources if each not in known]
+        if missing := [each for each in unknown if not known or each not in lost]:
+            raise TeamRefusedError(f"the position of {missing[0]} is not known")
+        first = next(iter(known.values()))
+        states = {each: known.get(each, first) for each in request.resources}
+        frame = LocalFrame(position_of(first))
         parameters = BehaviorParameters(request.parameters)
         seen = None
         if parameters.target_vehicle is not None:
@@ -110,12 +106,12 @@ class TeamSituation:
             {each: self._capabilities.alone(each) for each in request.resources},
             parameters,
             frame,
-            {each: pose_of(frame, state) for each, state in states.items() if state is not None},
+            {each: pose_of(frame, state) for each, state in states.items()},
             seen,
             begun,
             {each: v.cruise_speed_m_s for each, v in vehicles.items() if v.cruise_speed_m_s},
             {
-                each: lasts_s(vehicle.endurance_s, _charge(states[each]))
+                each: lasts_s(vehicle.endurance_s, states[each].battery_fraction)
                 for each, vehicle in vehicles.items()
                 if vehicle.endurance_s
             },
@@ -139,30 +135,29 @@ class TeamSituation:
 
     def present(self, member: ResourceId, frame: LocalFrame) -> MemberPose | None:
         """Return the present pose of a member; None: nothing is received of it."""
-        sighted = self._sighted.get(member)
-        state = sighted.sight(member) if sighted is not None else self._state(member)
-        return pose_of(frame, state) if state is not None and state.position is not None else None
+        state = self._state(member, on_bus=member not in self._sighted)
+        return None if state is None else pose_of(frame, state)
 
-    def _state(self, vehicle: ResourceId) -> VehicleState | None:
+    def _state(self, vehicle: ResourceId, *, on_bus: bool = True) -> VehicleState | None:
+        """Return the last state with a position. `on_bus`: telemetry counts without a sight."""
         sighted = self._sighted.get(vehicle)
-        state = sighted.sight(vehicle) if sighted is not None else None
-        state = state or self._wait_for_state(vehicle)
-        return state if state is not None and state.position is not None else None
-
-    def _wait_for_state(self, vehicle: ResourceId) -> VehicleState | None:
-        state = self._bus.latest(vehicle)
-        return state if isinstance(state, VehicleState) else None
+        state = None if sighted is None else sighted.sight(vehicle)
+        latest = self._bus.latest(vehicle) if on_bus and state is None else state
+        if not isinstance(latest, VehicleState) or latest.position is None:
+            return None
+        return latest
 
 
-def _charge(state: VehicleState | None) -> float | None:
-    return state.battery_fraction if state is not None else None
+def position_of(state: VehicleState) -> LatLon:
+    """Return a vehicle's latitude and longitude, which must be known."""
+    if state.position is None:
+        raise ValueError(f"the position of {state.resource} is not known")
+    return state.position.latlon
 
 
 def pose_of(frame: LocalFrame, state: VehicleState) -> MemberPose:
     """Return a vehicle's pose in the local frame; its position must be known."""
-    if state.position is None:
-        raise ValueError(f"the position of {state.resource} is not known")
-    place = frame.to_local(state.position.latlon)
+    place = frame.to_local(position_of(state))
     east, north, _ = state.velocity_enu_m_s or (0.0, 0.0, 0.0)
     speed_m_s = math.hypot(east, north)
     course_rad = math.atan2(north, east) if speed_m_s > STANDS_M_S else None

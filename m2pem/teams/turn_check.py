@@ -13,7 +13,6 @@ from m2pem.fleet.parameters import examine_behavior
 from m2pem.fleet.task_findings import TaskFindings
 from m2pem.geo.local_frame import LocalFrame
 from m2pem.mission.behavior import Behavior, BehaviorType
-from m2pem.mission.elements import ScriptTask, SendTask, ServiceTask
 from m2pem.mission.geometry import Route
 from m2pem.mission.mission import Mission
 from m2pem.teams.paths import SHAPES
@@ -23,9 +22,8 @@ from m2pem.teams.plan import PlanningContext, TeamRefusedError
 def check_turns(mission: Mission, fleet: Fleet) -> Iterator[Finding]:
     """Yield a warning for each route that brings members of a team too near to each other, and an
     error for each member that leaves the fleet's fence beside a route that does not."""
-    for task in mission.activities():
-        behavior = task.behavior if isinstance(task, ScriptTask | ServiceTask | SendTask) else None
-        if behavior is not None and behavior.type is BehaviorType.TEAM and behavior.name in SHAPES:
+    for task, behavior in mission.commands():
+        if behavior.type is BehaviorType.TEAM and behavior.name in SHAPES:
             context = _context(behavior, mission, fleet)
             findings = TaskFindings(mission.file_of(task), task)
             try:

@@ -58,35 +58,31 @@ Zone = PolygonZone | CircleZone
 
 def is_whole(items: Sequence[Item]) -> bool:
     """Return whether every polygon has as many corners as its items say, and at least three."""
-    index = 0
-    while index < len(items):
-        first = items[index]
-        count = 1
-        if first.command in (POLYGON_IN, POLYGON_OUT):
-            count = int(first.param1) if math.isfinite(first.param1) else 0
-            corners = items[index : index + count]
-            said = {(each.command, each.param1) for each in corners}
-            if not len(corners) == count >= 3 or said != {(first.command, first.param1)}:
-                return False
-        index += count
-    return True
+    return all(
+        len(each) == count >= 3 and len({(item.command, item.param1) for item in each}) == 1
+        for each, count in _shapes(items)
+        if each[0].command in (POLYGON_IN, POLYGON_OUT)
+    )
 
 
 def zones_of(items: Sequence[Item], frame: LocalFrame) -> Iterator[Zone]:
     """Yield the zones. A polygon with missing corners (its upload was abandoned) is left out."""
+    for shape, count in _shapes(items):
+        item, points = shape[0], tuple(_point(each, frame) for each in shape)
+        if item.command in (CIRCLE_IN, CIRCLE_OUT):
+            yield CircleZone(points[0], item.param1, item.command == CIRCLE_IN)
+        elif len(shape) == count >= 3 and len({each.command for each in shape}) == 1:
+            yield PolygonZone(points, item.command == POLYGON_IN)
+
+
+def _shapes(items: Sequence[Item]) -> Iterator[tuple[Sequence[Item], int]]:
+    """Yield the items of each shape, and how many there should be."""
     index = 0
     while index < len(items):
-        item = items[index]
-        if item.command in (CIRCLE_IN, CIRCLE_OUT):
-            yield CircleZone(_point(item, frame), item.param1, item.command == CIRCLE_IN)
-        if item.command not in (POLYGON_IN, POLYGON_OUT):
-            index += 1
-            continue
-        count = max(1, int(item.param1)) if math.isfinite(item.param1) else 1
-        corners = items[index : index + count]
-        if len(corners) == count >= 3 and all(each.command == item.command for each in corners):
-            points = tuple(_point(each, frame) for each in corners)
-            yield PolygonZone(points, item.command == POLYGON_IN)
+        first, count = items[index], 1
+        if first.command in (POLYGON_IN, POLYGON_OUT) and math.isfinite(first.param1):
+            count = max(1, int(first.param1))
+        yield items[index : index + count], count
         index += count
 
 
