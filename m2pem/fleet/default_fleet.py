@@ -57,10 +57,8 @@ def fleet_for(mission: Mission) -> Fleet:
     for task in tasks:
         for role in task.roles:
             draft.add_role(role, task)
-    for activity in mission.activities():
-        behavior = getattr(activity, "behavior", None)
-        if isinstance(behavior, Behavior):
-            draft.add_instances(behavior, _at_once(activity))
+    for activity, behavior in mission.commands():
+        draft.add_instances(behavior, _at_once(activity))
     for task in tasks:
         if isinstance(task, Behavior):
             draft.add_targets(task)

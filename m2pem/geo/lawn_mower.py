@@ -8,9 +8,9 @@ enters a hole: where one has the middle of a strip, what is free beside it gets 
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
-from m2pem.geo.fence import Fence, polygons, valid
+from m2pem.geo.fence import polygons, valid
 from m2pem.geo.lazy_imports import shapely
 from m2pem.geo.local_frame import EastNorth
 from m2pem.geo.polygon import turned
@@ -48,17 +48,6 @@ _ALMOST = 0.95
 _ROUNDS = 40
 
 
-class Pass(NamedTuple):
-    """One pass, with how far it begins before the area and goes on beyond it, and how far it lies
-    to the left of the middle of its strip, in metres."""
-
-    start: EastNorth
-    end: EastNorth
-    before_m: float
-    after_m: float
-    left_m: float
-
-
 def longest_edge_yaw(ring: Ring) -> float:
     """Return the direction of the longest edge, along which there are the fewest turns.
 
@@ -69,42 +58,6 @@ def longest_edge_yaw(ring: Ring) -> float:
     longest_m = max(math.dist(*edge) for edge in edges)
     a, b = next(edge for edge in edges if math.dist(*edge) >= longest_m * (1 - _SAME_LENGTH))
     return math.atan2(b[1] - a[1], b[0] - a[0])
-
-
-def passes_over(
-    rings: Sequence[Ring], spacing_m: float, yaw_rad: float, overshoot_m: float = 0.0
-) -> list[Pass]:
-    """Return the passes over an area, in order. One that ends at a hole does not go on beyond it.
-
-    The way between two passes may lead over a hole: `SurveyTracks.over` has one that does not.
-
-    Args:
-        rings: the outer ring, then holes.
-        spacing_m: at most this between two passes.
-        yaw_rad: direction of the passes, from east, counter-clockwise.
-        overshoot_m: how far each pass goes on beyond the area at both ends.
-
-    Raises:
-        ValueError: it would take more than `MAX_STRIPS` passes.
-    """
-    found: list[Pass] = []
-    fence = Fence.around(rings[1:]) if len(rings) > 1 else None
-    closed = None if fence is None else fence.closed
-    low, _, width_m = _strips([turned(corner, yaw_rad) for corner in rings[0]], spacing_m)
-    for number, row in enumerate(rows(rings[0], spacing_m, yaw_rad, closed)):
-        backward = number % 2 == 1
-        for y, (west, east) in reversed(row) if backward else row:
-            level = (west - overshoot_m, y), (west, y), (east, y), (east + overshoot_m, y)
-            before, start, end, beyond = (turned(each, -yaw_rad) for each in level)
-            low_m = high_m = 0.0
-            if fence is None or fence.is_free(start, before):
-                start, low_m = before, overshoot_m
-            if fence is None or fence.is_free(end, beyond):
-                end, high_m = beyond, overshoot_m
-            left_m = y - (low + (number + 0.5) * width_m)
-            one = Pass(start, end, low_m, high_m, left_m)
-            found.append(Pass(end, start, high_m, low_m, -left_m) if backward else one)
-    return found
 
 
 def rows(
@@ -118,7 +71,7 @@ def rows(
         ValueError: it would take more than `MAX_STRIPS` passes.
     """
     level = [turned(corner, yaw_rad) for corner in ring]
-    low, strips, width_m = _strips(level, spacing_m)
+    low, strips, width_m = strips_of(level, spacing_m)
     region, found = valid(level), list[Row]()
     shapely.prepare(region)
     west, east = (extreme(x for x, _ in level) for extreme in (min, max))
@@ -189,13 +142,12 @@ def _cut(y: float, span: Span, closed: "BaseGeometry") -> Iterator[Span]:
             yield min(xs), max(xs)
 
 
-def strip_width_m(ring: Ring, spacing_m: float, yaw_rad: float) -> float:
-    """Return the width of each strip of `passes_over` an area with that outer ring."""
-    return _strips([turned(corner, yaw_rad) for corner in ring], spacing_m)[2]
+def strips_of(ring: Ring, spacing_m: float) -> tuple[float, int, float]:
+    """Return the least y of a turned ring, the number of strips over it and their width.
 
-
-def _strips(ring: Ring, spacing_m: float) -> tuple[float, int, float]:
-    """Return the least y of a turned ring, the number of strips over it and their width."""
+    Raises:
+        ValueError: there are more than `MAX_STRIPS`.
+    """
     low = min(y for _, y in ring)
     height = max(y for _, y in ring) - low
     strips = max(1, math.ceil(height / spacing_m - 1e-9))

@@ -11,14 +11,7 @@ from itertools import pairwise
 from typing import TypeAlias
 
 from m2pem.geo.fence import Fence, rings_of
-from m2pem.geo.lawn_mower import (
-    Ring,
-    Span,
-    longest_edge_yaw,
-    merged,
-    passes_over,
-    strip_width_m,
-)
+from m2pem.geo.lawn_mower import Ring, Span, longest_edge_yaw, merged, rows, strips_of
 from m2pem.geo.lazy_imports import shapely
 from m2pem.geo.local_frame import EastNorth
 from m2pem.geo.polygon import turned
@@ -85,8 +78,11 @@ class SurveyTracks:
         yaw_rad: float | None = None,
         overshoot_m: float = 0.0,
     ) -> "SurveyTracks":
-        """Return the tracks of `passes_over` an area, with the ways around its holes: by
-        themselves `SURVEY_SPACING_M` apart, and along the longest edge.
+        """Return tracks over an area: by themselves `SURVEY_SPACING_M` apart, and along the longest
+        edge.
+
+        A pass goes on by `overshoot_m` at both ends, but not into a hole. Between two passes, the
+        way leads around holes.
 
         Raises:
             ValueError: it would take too many passes, nothing of the area is left beside its holes,
@@ -94,21 +90,32 @@ class SurveyTracks:
         """
         spacing_m = spacing_m or SURVEY_SPACING_M
         yaw_rad = longest_edge_yaw(rings[0]) if yaw_rad is None else yaw_rad
-        found = passes_over(rings, spacing_m, yaw_rad, overshoot_m)
-        if not found:
-            raise ValueError("area: nothing is left beside its holes")
+        low, _, width_m = strips_of([turned(corner, yaw_rad) for corner in rings[0]], spacing_m)
         fence = Fence.around(rings[1:]) if len(rings) > 1 else None
+        closed = None if fence is None else fence.closed
         points: list[EastNorth] = []
         passes: list[PassAt] = []
-        for each in found:
-            if points and fence is not None:
-                way = fence.way(points[-1], each.start)
-                if way is None:
-                    raise ValueError("area: a part cannot be reached without crossing a hole")
-                points += way
-            passes.append((len(points), each.before_m, each.after_m, each.left_m))
-            points += (each.start, each.end)
-        width_m = strip_width_m(rings[0], spacing_m, yaw_rad)
+        for number, row in enumerate(rows(rings[0], spacing_m, yaw_rad, closed)):
+            along, middle = (-1 if number % 2 else 1), low + (number + 0.5) * width_m
+            for y, span in row[::along]:
+                (a, b), out_m = span[::along], along * overshoot_m
+                before, start, end, beyond = (
+                    turned((x, y), -yaw_rad) for x in (a - out_m, a, b, b + out_m)
+                )
+                before_m = after_m = 0.0
+                if fence is None or fence.is_free(start, before):
+                    start, before_m = before, overshoot_m
+                if fence is None or fence.is_free(end, beyond):
+                    end, after_m = beyond, overshoot_m
+                if points and fence is not None:
+                    way = fence.way(points[-1], start)
+                    if way is None:
+                        raise ValueError("area: a part cannot be reached without crossing a hole")
+                    points += way
+                passes.append((len(points), before_m, after_m, along * (y - middle)))
+                points += (start, end)
+        if not passes:
+            raise ValueError("area: nothing is left beside its holes")
         return cls(points, width_m, overshoot_m, passes, rings[1:])
 
     def reversed(self) -> "SurveyTracks":

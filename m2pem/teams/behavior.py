@@ -292,7 +292,7 @@ class TeamBehavior:
         if not self._running_reported:
             self._running_reported = True
             self._note()
-        elif self._unnoted():
+        elif self._parts() != self._reference.begun:
             self._note()
         if not active and not self._plan.stays and self._shares.all_over:
             self._end_well()
@@ -339,23 +339,13 @@ class TeamBehavior:
                 begun[member.part.removeprefix(f"{self.id}.")] = member.native_ref
         return {part: ref for part, ref in begun.items() if part not in self._withdrawn}
 
-    def _unnoted(self) -> bool:
-        return self._parts() != self._reference.begun
-
     def _note(self) -> None:
         """Report RUNNING, with the reference that the journal keeps."""
         if not self._running_reported or self._ending is not None:
             return
         lost = {member.id: member.lost for member in self.members.values() if member.lost}
-        self._reference = Reference(
-            self._parts(),
-            self._shares.done,
-            lost,
-            self._reference.version + 1,
-            self._plan.split,
-            self._shares.transfers,
-            self._shares.given_up if self._plan.shared else (),
-            self._shares.left,
+        self._reference = self._shares.noted(
+            Reference(self._parts(), lost=lost, version=self._reference.version + 1)
         )
         self._refer(self._reference)
         self._report_state(BehaviorState.RUNNING, "", "")

@@ -238,7 +238,7 @@ class FormationController:
     def _look(self, track: _Track, stand: MemberPose | None, arrived: bool) -> None:
         path = track.marcher.path
         if arrived:
-            track.arrived, track.mark_m = True, path.end_mark_m
+            track.arrived, track.mark_m = True, path.marks_m[-1]
             track.along_m = track.stops_m = path.line.length_m
         elif stand is None or (stand.speed_m_s > 0 and stand == track.pose):
             track.unseen_s += PERIOD_S
@@ -246,7 +246,7 @@ class FormationController:
             found_m = track.find(stand)
             track.pose, track.unseen_s = stand, 0.0
             track.along_m, track.mark_m = found_m, path.mark_m(found_m)
-            track.off_m = path.off_m(stand.place, found_m)
+            track.off_m = math.dist(stand.place, path.line.at(found_m))
             braking_m_s2 = _HARD_BRAKING * track.marcher.motion.braking_m_s2
             track.stops_m = found_m + stand.speed_m_s**2 / (2 * braking_m_s2)
 
@@ -312,4 +312,4 @@ def _lag_m(track: _Track, other: _Track) -> float:
     A place beyond the end of the member's path counts as the end.
     """
     place_m = other.mark_m + other.back_m - track.back_m
-    return min(place_m, track.marcher.path.end_mark_m) - track.mark_m
+    return min(place_m, track.marcher.path.marks_m[-1]) - track.mark_m

@@ -72,30 +72,27 @@ class Partition:
         """Members whose own share is done."""
         return [share.leg.member for key, share in self._shares.items() if share.done and _own(key)]
 
-    @property
-    def done(self) -> tuple[str, ...]:
-        """The parts that have succeeded."""
-        return tuple(each.part for each in self._shares.values() if each.done and each.part)
-
-    @property
-    def transfers(self) -> Mapping[str, Transfer]:
-        """The pieces of lost members' shares, for the journal."""
-        return {
-            key: Transfer(
-                share.leg.member, share.leg.behavior, raw_parameters(share.leg.parameters)
-            )
-            for key, share in self._shares.items()
-            if not _own(key)
-        }
-
-    @property
-    def left(self) -> Mapping[str, Mapping[str, Value]]:
-        """What is left of shares that go on, as last reported, for the journal."""
-        return {
-            key: share.left
-            for key, share in self._shares.items()
-            if share.left is not None and not share.over
-        }
+    def noted(self, reference: Reference) -> Reference:
+        """Return a reference with what the journal keeps of the shares."""
+        shares = self._shares.items()
+        return replace(
+            reference,
+            done=tuple(each.part for each in self._shares.values() if each.done and each.part),
+            split=self._plan.split,
+            transfers={
+                key: Transfer(
+                    share.leg.member, share.leg.behavior, raw_parameters(share.leg.parameters)
+                )
+                for key, share in shares
+                if not _own(key)
+            },
+            given_up=tuple(key for key, each in shares if each.given_up and self._plan.shared),
+            left={
+                key: share.left
+                for key, share in shares
+                if share.left is not None and not share.over
+            },
+        )
 
     def note_left(self, part: str, left: Mapping[str, Value]) -> bool:
         """Note what is left of a part. Return whether the journal must have it."""
@@ -165,11 +162,6 @@ class Partition:
         for share in self._shares.values():
             if share.by is None and not share.over:
                 share.leg = self._rest(share)
-
-    @property
-    def given_up(self) -> tuple[str, ...]:
-        """The shares that were given up, or given to others in pieces, for the journal."""
-        return tuple(key for key, share in self._shares.items() if share.given_up)
 
     def drop(
         self,

@@ -107,11 +107,6 @@ class MemberPath:
                 self.rows.append((self.line.marks_m[begin + index], *place, *arc[index]))
             self.corners_m.append(self.line.marks_m[begin + half])
 
-    @property
-    def end_mark_m(self) -> float:
-        """The mark of its end."""
-        return self.marks_m[-1]
-
     def rest(self, place: EastNorth, along_m: float) -> list[EastNorthUp]:
         """Return the places ahead of a member that is at `place`, which is the first."""
         index = bisect_left(self.corners_m, along_m, 1, len(self.corners_m) - 1)
@@ -150,10 +145,6 @@ class MemberPath:
     def along_m(self, mark_m: float) -> float:
         """How far along this path the place with that mark is."""
         return _interpolated(mark_m, self.marks_m, self.corners_m)
-
-    def off_m(self, place: EastNorth, along_m: float) -> float:
-        """How far a place is from that one of the path."""
-        return math.dist(place, self.line.at(along_m))
 
 
 def _seen(

@@ -16,7 +16,6 @@ from m2pem.api.remaining import (
 )
 from m2pem.fleet.behaviors import SHARED
 from m2pem.fleet.parameters import resolve
-from m2pem.geo.lawn_mower import strip_width_m
 from m2pem.geo.local_frame import LocalFrame
 from m2pem.geo.survey_tracks import SurveyTracks
 from m2pem.mission.behavior import BehaviorType
@@ -173,7 +172,7 @@ def test_angles_have_their_unit_and_vehicles_their_name() -> None:
 def test_what_is_left_of_a_survey_is_a_survey(up_m: float | None) -> None:
     places = [(0.0, 0.0), (100.0, 0.0), (100.0, 95.0), (0.0, 95.0), (0.0, 0.0)]
     area = Area((tuple((*FRAME.to_latlon(place), up_m) for place in places),), "amsl")
-    tracks = SurveyTracks(lawn_mower([places], 20.0, 0.0), strip_width_m(places, 20.0, 0.0))
+    tracks = SurveyTracks.over([places], 20.0, 0.0)
     parameters = raw_parameters({"area": area, "speed": 4.0})
     work: RemainingWork = RemainingSurvey(parameters, tracks, FRAME, up_m, "amsl")
     work.moved((40.0, 28.5), 3)

@@ -2,12 +2,13 @@
 
 from collections.abc import Sequence
 
-from m2pem.geo.lawn_mower import Ring, passes_over
+from m2pem.geo.lawn_mower import Ring
 from m2pem.geo.local_frame import EastNorth
+from m2pem.geo.survey_tracks import SurveyTracks
 
 
 def lawn_mower(
     rings: Sequence[Ring], spacing_m: float, yaw_rad: float, overshoot_m: float = 0.0
 ) -> list[EastNorth]:
-    passes = passes_over(rings, spacing_m, yaw_rad, overshoot_m)
-    return [point for each in passes for point in (each.start, each.end)]
+    tracks = SurveyTracks.over(rings, spacing_m, yaw_rad, overshoot_m)
+    return [tracks.line.points[index + end] for index, *_ in tracks.passes for end in (0, 1)]

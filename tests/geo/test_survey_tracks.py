@@ -8,7 +8,6 @@ import pytest
 from shapely import LineString, Polygon, union_all
 from shapely.geometry.base import BaseGeometry
 
-from m2pem.geo.lawn_mower import strip_width_m
 from m2pem.geo.local_frame import EastNorth, LocalFrame
 from m2pem.geo.survey_tracks import SurveyTracks
 from tests.geo.passes import lawn_mower
@@ -85,8 +84,7 @@ def test_two_pieces_that_do_not_meet_are_no_area() -> None:
     """The prongs of a U: what is left of it above its base are two areas."""
     prongs = [(0, 0), (100, 0), (100, 90), (70, 90), (70, 30), (30, 30), (30, 90), (0, 90), (0, 0)]
     rings = [[(float(east), float(north)) for east, north in prongs]]
-    points = lawn_mower(rings, 15.0, 0.0)
-    tracks = SurveyTracks(points, strip_width_m(rings[0], 15.0, 0.0))
+    tracks = SurveyTracks.over(rings, 15.0, 0.0)
     assert len(tracks.part(0.0)) == 1
     assert tracks.part(0.6 * tracks.line.length_m) == []
 
