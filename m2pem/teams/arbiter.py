@@ -3,6 +3,7 @@
 import logging
 from collections.abc import AsyncIterator, Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 from m2pem.api.arbiter import (
     Arbiter,
@@ -186,19 +187,11 @@ class Teams:
 
     async def hold(self, resource: ResourceId) -> None:
         """Hold a member for a run: the whole team waits."""
-        behavior = self._behavior_of(resource)
-        if behavior is None:
-            await self._arbiter_of(resource).hold(resource)
-        else:
-            await behavior.hold(resource)
+        await (self._behavior_of(resource) or self._arbiter_of(resource)).hold(resource)
 
     async def resume(self, resource: ResourceId) -> None:
         """Resume a member for a run; the team goes on when no member is held."""
-        behavior = self._behavior_of(resource)
-        if behavior is None:
-            await self._arbiter_of(resource).resume(resource)
-        else:
-            await behavior.resume(resource)
+        await (self._behavior_of(resource) or self._arbiter_of(resource)).resume(resource)
 
     def reports(self) -> AsyncIterator[BehaviorReport]:
         """Yield the reports of team behaviors."""
@@ -270,9 +263,7 @@ class Teams:
             state = TeamState(request.id, request.behavior, now_us, kept, spacing_m)
             self._states.put(state)
 
-        def superseded(newest: int) -> None:
-            self._ledger.superseded(request.id, newest)
-
+        superseded = partial(self._ledger.superseded, request.id)
         may_send = self._context.may_send
         members = {
             each: Member(each, self._arbiter_of(each), failed, superseded, may_send)

@@ -199,26 +199,20 @@ class FormationController:
 
     def kept(self) -> tuple[TeamMemberState, ...]:
         """Return the members' deviations from their places, by the last `step`."""
-        known = [track for track in self._tracks.values() if track.mark_m > -math.inf]
+        known: list[_Track] = []
         states = []
-        for track in self._tracks.values():
-            member = track.marcher.member
-            if track not in known:
+        for member, track in self._tracks.items():
+            if track.mark_m == -math.inf:
                 states.append(TeamMemberState(member))
                 continue
             gaps_m = (
                 other.mark_m - track.mark_m
-                for other in known[: known.index(track)]
+                for other in known
                 if lane_mates(other.marcher, track.marcher, self.spacing_m)
             )
-            states.append(
-                TeamMemberState(
-                    member,
-                    -_lag_m(track, known[0]),
-                    track.off_m,
-                    min(gaps_m, default=None),
-                )
-            )
+            gap_m = min(gaps_m, default=None)
+            known.append(track)
+            states.append(TeamMemberState(member, -_lag_m(track, known[0]), track.off_m, gap_m))
         return tuple(states)
 
     def stuck(self) -> ResourceId | None:

@@ -97,7 +97,8 @@ class TeamSituation:
         parameters = BehaviorParameters(request.parameters)
         seen = None
         if parameters.target_vehicle is not None:
-            seen = self.look(ResourceId(parameters.target_vehicle), frame)
+            target = self._state(ResourceId(parameters.target_vehicle))
+            seen = None if target is None else pose_of(frame, target)
         vehicles = {each: self._fleet.vehicles[each] for each in request.resources}
         fence = self._fleet.geometries.get(self._fleet.fence)
         context = PlanningContext(
@@ -127,11 +128,6 @@ class TeamSituation:
         while waited_s < SEEN_WITHIN_S and not all(self._state(each) for each in vehicles):
             await clock.sleep(LOOK_EVERY_S)
             waited_s += LOOK_EVERY_S
-
-    def look(self, vehicle: ResourceId, frame: LocalFrame) -> MemberPose | None:
-        """Return a vehicle's pose; None: it is not known."""
-        state = self._state(vehicle)
-        return None if state is None else pose_of(frame, state)
 
     def present(self, member: ResourceId, frame: LocalFrame) -> MemberPose | None:
         """Return the present pose of a member; None: nothing is received of it."""
