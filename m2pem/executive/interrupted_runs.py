@@ -17,10 +17,19 @@ class InterruptedRuns:
     def __init__(self, marks: StopMarks) -> None:
         self._marks = marks
         self._runs: tuple[RunId, ...] = ()
+        self._stopped: StopMark | None = None
+        self._are_taken_up = False
 
     def expect(self, runs: Iterable[RunId]) -> None:
-        """Say which are to be taken up; none: all are driven, or cannot be taken up."""
+        """Say which are to be taken up, as far as is known. What was stopped by a STOP of all that
+        came before is taken up to stop."""
         self._runs = tuple(runs)
+        if self._stopped is not None:
+            self.stop_all(self._stopped.by, self._stopped.reason)
+
+    def taken_up(self) -> None:
+        """Say that all are driven, or cannot be taken up."""
+        self._runs, self._stopped, self._are_taken_up = (), None, True
 
     def refuse_start(self) -> None:
         """Check that a run may begin.
@@ -53,5 +62,7 @@ class InterruptedRuns:
         return run in self._runs
 
     def stop_all(self, by: str, reason: str) -> list[RunId]:
-        """Stop all as soon as they are driven; returns them."""
+        """Stop all as soon as they are driven, also those that are found later; returns them."""
+        if not self._are_taken_up:
+            self._stopped = StopMark(by, reason)
         return [run for run in self._runs if self.stop(run, by, reason)]

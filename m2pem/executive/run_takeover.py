@@ -59,7 +59,7 @@ class RunTakeover:
                 except M2pemError as error:
                     refused[run] = error
         finally:
-            supervisor.interrupted.expect(())
+            supervisor.interrupted.taken_up()
             for runner, commands in taken_over:
                 # Only now is known what operators have: any of the runs may say so.
                 for resource in supervisor.handover.lent_to(runner.run.state):

@@ -74,6 +74,7 @@ class ScheduleEntries:
         """Set when something may start that could not before."""
         self._unwritten: Hold | None = None
         """The hold of the whole schedule that the journal does not have yet."""
+        self._writing: asyncio.Future[bool] | None = None
         self._stopped: set[EntryId] = set()
         """Entries that an operator cancels or holds, before the journal has it."""
         self.to_hold: dict[EntryId, Hold] = {}
@@ -87,25 +88,30 @@ class ScheduleEntries:
     async def load(self) -> None:
         """Read the schedule, and take back starts whose runs never began: they come again.
 
-        It comes before runs are taken up.
+        It comes before runs are taken up. A STOP of all that came before, or comes meanwhile,
+        holds what is read.
 
         Raises:
             JournalError: the journal cannot be read or written.
         """
-        journal, fleet = self._starter.journal, self._starter.fleet
-        mark = self._marks.get(MARK)
-        self.hold_of_all = await journal.schedule_hold(fleet.name)
-        if mark is not None and self.hold_of_all is None:
-            self.hold_of_all = Hold(mark.by, mark.reason, self._starter.clock.now_us())
-            await journal.hold_schedule(fleet.name, self.hold_of_all)
-        self._marks.remove(MARK)
-        lines = {line.run: line for line in await journal.runs()}
-        for entry in await journal.entries():
-            if self._belongs_here(entry.plan):
-                started = [each.run for each in entry.state.times[-1:] if each.run]
-                line = lines.get(started[0]) if started else None
-                never_began = line and not (line.gone or line.last_seq or line.driven)
-                self.add(await self.take_back(entry) if never_began else entry)
+        journal = self._starter.journal
+        async with self.lock:
+            self.hold_of_all = await self._hold_now()
+            mark = self._marks.get(MARK)
+            if self.hold_of_all is None and mark is not None:
+                self.hold_at_once(mark.by, mark.reason)
+            elif self._unwritten is None:
+                self._marks.remove(MARK)
+            lines = {line.run: line for line in await journal.runs()}
+            for entry in await journal.entries():
+                if self._belongs_here(entry.plan):
+                    started = [each.run for each in entry.state.times[-1:] if each.run]
+                    line = lines.get(started[0]) if started else None
+                    never_began = line and not (line.gone or line.last_seq or line.driven)
+                    self.add(await self.take_back(entry) if never_began else entry)
+                    line = lines.get(entry.state.run)
+                    if line and line.outcome is None and (stopped := self._marks.get(line.run)):
+                        self.run_stopping(line.run, stopped.by)
 
     def _belongs_here(self, plan: SchedulePlan) -> bool:
         # What was scheduled in a simulation must never start a real vehicle.
@@ -139,6 +145,8 @@ class ScheduleEntries:
         Raises:
             JournalError: the journal cannot be read.
         """
+        if self._unwritten is not None and self._writing is not None and self._writing.done():
+            self._begin_writing(self._unwritten)
         held = await self.read_hold()
         revisions = await self._starter.journal.schedule_revisions()
         known = {number: entry.state.revision for number, entry in self.by_id.items()}
@@ -297,38 +305,66 @@ class ScheduleEntries:
         finally:
             self._stopped.discard(number)
 
-    def hold_at_once(self, by: str, reason: str) -> Hold | None:
-        """Hold the whole schedule, if it has anything; the journal follows with `written`."""
+    def hold_at_once(self, by: str, reason: str) -> "asyncio.Future[bool]":
+        """Hold the whole schedule, whether or not its entries are known yet.
+
+        The future is done when the journal has the hold: whether there is anything to hold. If
+        nothing is scheduled, the hold is over then.
+        """
         self.holds += 1
-        if not self.active():
-            return None
-        self.hold_of_all = self._unwritten = Hold(by, reason, self._starter.clock.now_us())
+        hold = Hold(by, reason, self._starter.clock.now_us())
+        self.hold_of_all = self._unwritten = hold
         self._marks.put(MARK, StopMark(by, reason))
-        self.say_held()
-        return self.hold_of_all
+        if self.active():
+            self.say_held()
+        return self._begin_writing(hold)
+
+    def _begin_writing(self, hold: Hold) -> "asyncio.Future[bool]":
+        writing = self._writing = asyncio.ensure_future(self._write(hold))
+        writing.add_done_callback(_log_unwritten)
+        return writing
+
+    async def _write(self, hold: Hold) -> bool:
+        journal, fleet = self._starter.journal, self._starter.fleet.name
+        if not self.active():
+            async with self.lock:  # what is being read is known then
+                await self.refresh()
+            if self.active():
+                self.say_held()
+        if needed := bool(self.active()):
+            await journal.hold_schedule(fleet, hold)
+        found = hold if needed else await journal.schedule_hold(fleet)
+        if self._unwritten is hold:
+            self.hold_of_all, self._unwritten = found, None
+            self._marks.remove(MARK)
+        return needed
 
     def say_held(self) -> None:
         """Tell operators that the whole schedule is held."""
         text = f"the schedule is {self.hold_of_all}; nothing starts until it is released"
         self.say(text, NOT_STARTED)
 
-    async def written(self, hold: Hold) -> None:
-        """Write a hold of the whole schedule to the journal.
+    async def written(self, writing: "asyncio.Future[bool]") -> bool:
+        """Wait until the journal has a hold of the whole schedule; returns whether there is
+        anything to hold.
 
         Raises:
             OperatorError: it has not written it within `WRITTEN_WITHIN_S`; the hold stays in force.
         """
-        writing = self._starter.journal.hold_schedule(self._starter.fleet.name, hold)
         try:
-            await asyncio.wait_for(asyncio.shield(asyncio.ensure_future(writing)), WRITTEN_WITHIN_S)
+            return await asyncio.wait_for(asyncio.shield(writing), WRITTEN_WITHIN_S)
         except (TimeoutError, JournalError) as error:
             raise OperatorError(
                 "the schedule is held, but the journal does not write: it has not been recorded"
                 f"{f' ({error})' if str(error) else ''}"
             ) from error
-        self._marks.remove(MARK)
-        if self._unwritten is hold:
-            self._unwritten = None
+
+    async def _hold_now(self) -> Hold | None:
+        """Return the hold of the journal, unless this executive has or gets another one."""
+        before = self.hold_of_all
+        found = await self._starter.journal.schedule_hold(self._starter.fleet.name)
+        is_own = self._unwritten is not None or self.hold_of_all is not before
+        return self.hold_of_all if is_own else found
 
     async def read_hold(self) -> bool:
         """Take over that another executive on the journal has held or released all; returns
@@ -337,9 +373,8 @@ class ScheduleEntries:
         Raises:
             JournalError: the journal cannot be read.
         """
-        before = self.hold_of_all
-        found = await self._starter.journal.schedule_hold(self._starter.fleet.name)
-        if self.hold_of_all is not before or self._unwritten is not None or found == before:
+        found = await self._hold_now()
+        if found == self.hold_of_all:
             return False
         self.hold_of_all = found
         if found is None:
@@ -355,10 +390,8 @@ class ScheduleEntries:
             OperatorError: there is no such entry, it is over; or the journal does not write.
         """
         if number is None:
-            hold = self.hold_at_once(by, reason)
-            if hold is None:
+            if not await self.written(self.hold_at_once(by, reason)):
                 raise OperatorError("nothing is scheduled")
-            await self.written(hold)
             return
         await self.find(number)
         hold = Hold(by, reason, self._starter.clock.now_us())
@@ -417,3 +450,8 @@ class ScheduleEntries:
         if hold is not None:
             return str(hold)
         return "held" if entry.id in self._stopped else ""
+
+
+def _log_unwritten(writing: "asyncio.Future[bool]") -> None:
+    if not writing.cancelled() and (error := writing.exception()) is not None:
+        log.warning("the journal does not have the hold of the schedule yet: %s", error)

@@ -14,7 +14,7 @@ from m2pem.bpmn.one_task import PROCESS, one_task
 from m2pem.engine.inputs import BehaviorReported, ControlTaken, Input, StartRun
 from m2pem.engine.run import MissionRun
 from m2pem.errors import BusyError, NotDrivenError, OperatorError
-from m2pem.fleet.fleet import dump
+from m2pem.fleet.fleet import Fleet, dump
 from m2pem.journal import MemoryJournal
 from m2pem.journal.base import Entry, RunHeader
 from m2pem.mission.behavior import BehaviorType
@@ -36,10 +36,11 @@ async def leave(
     source: bytes,
     *inputs: Callable[[str], Input],
     start: StartRun = START,
+    of: Fleet = VEHICLES,
 ) -> str:
     """Leave a run behind that got `inputs`, each made with the run's number, a second apart."""
-    run = await journal.create(RunHeader("m.bpmn", source, start.process, dump(VEHICLES)))
-    mission_run = MissionRun(parse_mission(source, "m.bpmn", accepted=True), VEHICLES, run)
+    run = await journal.create(RunHeader("m.bpmn", source, start.process, dump(of)))
+    mission_run = MissionRun(parse_mission(source, "m.bpmn", accepted=True), of, run)
     for second, make in enumerate((lambda _: start, *inputs)):
         item, at_us = make(run), START_US + second * 1_000_000
         step = mission_run.receive(item, at_us)
@@ -156,6 +157,18 @@ def test_stop_counts_for_a_run_that_is_not_taken_up_yet(play, of_all):
         assert summary.status is RunStatus.STOPPED
         assert "smoke" in summary.detail
         assert world.fake.count("start") == 0
+
+    after_a_crash(play, story, (DRIVE, accepted, running))
+
+
+def test_stop_of_all_counts_for_a_run_that_is_found_to_be_interrupted_only_then(play):
+    async def story(world: World, runs):
+        world.executive.supervisor.interrupted.expect(())  # an executive still drove it
+        assert await world.executive.control.stop_all(by="anna", reason="smoke") == []
+        await world.executive.resume_all(runs)
+        await world.fake.until_called("cancel", "r1.b1")
+        world.fake.report("r1.b1", BehaviorState.CANCELLED)
+        assert (await world.executive.control.wait("r1")).status is RunStatus.STOPPED
 
     after_a_crash(play, story, (DRIVE, accepted, running))
 

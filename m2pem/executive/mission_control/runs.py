@@ -151,21 +151,28 @@ class RunOperations(ControlParts):
     async def stop(self, run: RunId, *, by: str = "", reason: str = "") -> None:
         """End every token, cancel every behavior."""
         emergency, interrupted = self._supervisor.emergency, self._supervisor.interrupted
-        if run not in self._supervisor.runners and interrupted.stop(run, by, reason):
+        is_taken_up_later = interrupted.stop(run, by, reason)
+        if is_taken_up_later and run not in self._supervisor.runners:
+            self._schedule.run_stopping(run, by)
             return
         async with self._explain_end("stop", run):
             asked = emergency.stop(self._supervisor.runner(run), by, reason)
             self._schedule.run_stopping(run, by)
-            await emergency.written("stop", {run: asked})
+            if not is_taken_up_later:
+                await emergency.written("stop", {run: asked})
 
     async def stop_all(self, *, by: str = "", reason: str = "") -> Sequence[RunId]:
         """Stop every run that has not ended, and hold the schedule."""
-        asked = self._supervisor.emergency.stop_all(self._supervisor.runners.values(), by, reason)
+        emergency, schedule = self._supervisor.emergency, self._schedule
+        asked = emergency.stop_all(self._supervisor.runners.values(), by, reason)
         interrupted = self._supervisor.interrupted.stop_all(by, reason)
-        hold = self._schedule.hold_at_once(by, f"STOP of all{f': {reason}' if reason else ''}")
-        await self._supervisor.emergency.written("stop", asked)
-        if hold is not None:
-            await self._schedule.written(hold)
+        hold = schedule.hold_at_once(by, f"STOP of all{f': {reason}' if reason else ''}")
+        # A run that is just taken up decides its stop only then.
+        driven = {run: each for run, each in asked.items() if run not in interrupted}
+        written = emergency.written("stop", driven), schedule.written(hold)
+        done = await asyncio.gather(*written, return_exceptions=True)
+        if failed := [each for each in done if isinstance(each, BaseException)]:
+            raise OperatorError("; ".join(map(str, failed))) from failed[0]
         return list(dict.fromkeys((*asked, *interrupted)))
 
 
