@@ -47,6 +47,23 @@ SqliteJournal.create, SqliteJournal.append = creating, appending
 """
 
 
+READS_LATE = """
+import asyncio, os
+
+from m2pem.executive.executive import Executive
+
+load = Executive.load_schedule
+
+async def late(self):
+    while not os.path.exists("read"):
+        await asyncio.sleep(0.01)
+    await load(self)
+
+Executive.load_schedule = late
+"""
+"""A plugin whose executive serves operators, and reads its schedule when a file is there."""
+
+
 def serving(
     m2pem: CommandLine,
     *more: str,
@@ -124,6 +141,45 @@ def test_two_entries_for_one_rover_run_one_after_the_other_by_priority(
     _, first, second = runs(m2pem)
     assert "started by s2, scheduled by ada" in m2pem.run("replay", "r2", *JOURNAL)[1]
     assert first["ended_us"] <= second["started_us"]
+
+
+@pytest.mark.parametrize("standby", [False, True], ids=["restart", "standby"])
+def test_stop_of_all_counts_before_the_schedule_is_read(
+    m2pem: CommandLine, tmp_path: Path, standby: bool
+) -> None:
+    reverse = tmp_path / "reverse.bpmn"
+    reverse.write_bytes(scenarios.in_sequence("reverse", "evsg1", {"distance": "20 m"}))
+    late, read = install_plugin(tmp_path, "late", READS_LATE), tmp_path / "read"
+    read.touch()
+    killed = serving(m2pem, environment=late)
+    until_served(tmp_path / "journal.db", killed)
+    words = ("serve", "--fleet", FLEET, "--ocu", "none", *JOURNAL)
+    if standby:
+        server = m2pem.start(*words, "--standby", **late)
+        server.until_said("standing by for")
+    assert m2pem.run("start", MISSION, *JOURNAL)[:2] == (0, "r1\n")
+    assert m2pem.run("start", reverse, *JOURNAL, "--when", "free")[:2] == (0, "s1\n")
+    read.unlink()
+    killed.kill()
+    if not standby:
+        server = m2pem.start(*words, **late)
+    server.until_said("serving")
+    stopped = m2pem.run("stop", "--all", *JOURNAL, "--by", "bob")[1]
+    assert stopped.startswith("stopped: r1\nthe schedule is held"), stopped
+    read.touch()
+    until_served(tmp_path / "journal.db", server)
+    while [each["status"] for each in runs(m2pem)] != ["stopped"]:
+        assert server.process.poll() is None
+    assert entry(m2pem, "s1")["status"] == "held"
+    server.kill()
+    again = serving(m2pem, environment=late)
+    until_served(tmp_path / "journal.db", again)
+    assert "held by bob: STOP of all" in m2pem.run("schedule", *JOURNAL)[1]
+    assert [each["status"] for each in runs(m2pem)] == ["stopped"]
+    assert m2pem.run("schedule", "release", *JOURNAL)[0] == 0
+    while len(runs(m2pem)) < 2:
+        assert again.process.poll() is None
+    assert entry(m2pem, "s1")["run"] == "r2"
 
 
 def until_served(journal: Path, program: Program) -> None:
