@@ -204,18 +204,18 @@ FLOWABLE: dict[str, Build] = {
     "isNotEmpty": lambda x: Not(_empty(x)),
     "contains": lambda x, *items: And(_contains(x, *items)),
     "containsAny": lambda x, *items: Or(_contains(x, *items)),
-    "equals": _comparing(Comparison.EQUAL),
-    "eq": _comparing(Comparison.EQUAL),
-    "notEquals": _comparing(Comparison.NOT_EQUAL),
-    "ne": _comparing(Comparison.NOT_EQUAL),
-    "lowerThan": _comparing(Comparison.LESS),
-    "lt": _comparing(Comparison.LESS),
-    "lowerThanOrEquals": _comparing(Comparison.LESS_EQUAL),
-    "lte": _comparing(Comparison.LESS_EQUAL),
-    "greaterThan": _comparing(Comparison.GREATER),
-    "gt": _comparing(Comparison.GREATER),
-    "greaterThanOrEquals": _comparing(Comparison.GREATER_EQUAL),
-    "gte": _comparing(Comparison.GREATER_EQUAL),
+    **{
+        name: _comparing(sign)
+        for sign, names in {
+            Comparison.EQUAL: ("equals", "eq"),
+            Comparison.NOT_EQUAL: ("notEquals", "ne"),
+            Comparison.LESS: ("lowerThan", "lt"),
+            Comparison.LESS_EQUAL: ("lowerThanOrEquals", "lte"),
+            Comparison.GREATER: ("greaterThan", "gt"),
+            Comparison.GREATER_EQUAL: ("greaterThanOrEquals", "gte"),
+        }.items()
+        for name in names
+    },
 }
 """What follows `var:`, `vars:` or `variables:`."""
 

@@ -3,8 +3,7 @@
 What the rules of a language decide is decided then, not at each evaluation.
 """
 
-import operator
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextvars import ContextVar
 from datetime import date, timedelta
 from typing import Any, TypeAlias
@@ -12,7 +11,15 @@ from typing import Any, TypeAlias
 from m2pem.errors import ExpressionError
 from m2pem.mission.expression import feel_values as feel
 from m2pem.mission.expression.functions import LISTED
-from m2pem.mission.expression.operators import bounded_list, contains, index, join, look_at
+from m2pem.mission.expression.operators import (
+    ORDERS,
+    SAME,
+    bounded_list,
+    contains,
+    index,
+    join,
+    look_at,
+)
 from m2pem.mission.expression.rules import Rules
 from m2pem.mission.expression.temporal import Computed
 from m2pem.mission.expression.tree import (
@@ -20,7 +27,6 @@ from m2pem.mission.expression.tree import (
     Arithmetic,
     Call,
     Compare,
-    Comparison,
     ContextOf,
     Every,
     Filter,
@@ -60,16 +66,6 @@ tracing = ContextVar[Callable[[Node, Evaluate], Evaluate] | None]("tracing", def
 _calls = ContextVar("_calls", default=0)
 _TYPES = {"string": "text"}
 
-_SAME: Mapping[Comparison, Callable[[Any, Any], bool]] = {
-    Comparison.EQUAL: operator.eq,
-    Comparison.NOT_EQUAL: operator.ne,
-}
-_ORDER: Mapping[Comparison, Callable[[Any, Any], bool]] = {
-    Comparison.LESS: operator.lt,
-    Comparison.LESS_EQUAL: operator.le,
-    Comparison.GREATER: operator.gt,
-    Comparison.GREATER_EQUAL: operator.ge,
-}
 _EXACT = 2**53
 """Whole numbers below are doubles, too, so that all languages compare others with them alike."""
 
@@ -193,9 +189,9 @@ def _compare(node: Compare, rules: Rules) -> Evaluate:
     other = node.right.value
     # What conditions mostly are: all languages compare them alike, and so does Python.
     whole = type(other) is int and abs(other) < _EXACT
-    if not (whole or (type(other) is str and sign in _SAME)):
+    if not (whole or (type(other) is str and sign in SAME)):
         return lambda read: test(left(read), other)
-    kind, direct = type(other), {**_ORDER, **_SAME}[sign]
+    kind, direct = type(other), {**ORDERS, **SAME}[sign]
 
     def compared(read: ReadValue) -> Computed:
         value = left(read)

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from datetime import UTC, date, datetime, time, timedelta
 from decimal import Decimal
 from functools import partial
-from typing import Any
+from typing import Any, TypeAlias
 
 from m2pem.mission.expression.feel_values import (
     DIGITS,
@@ -17,17 +17,12 @@ from m2pem.mission.expression.feel_values import (
     number,
     without_value,
 )
-from m2pem.mission.expression.operators import bounded_text
+from m2pem.mission.expression.operators import WHOLE, bounded_text
 from m2pem.mission.expression.temporal import DATE, DAYS, MOMENT, MONTHS, TIME, Months
 from m2pem.mission.expression.tree import Operation
 
-_WHOLE: Mapping[Operation, Callable[[int, int], int]] = {
-    Operation.ADD: operator.add,
-    Operation.SUBTRACT: operator.sub,
-    Operation.MULTIPLY: operator.mul,
-}
 _MOST_WHOLE = 10**18
-
+_Compute: TypeAlias = Callable[[Any, Any], FeelValue]
 
 _COMPUTE: Mapping[Operation, Callable[[Decimal, Decimal], Decimal]] = {
     Operation.ADD: DIGITS.add,
@@ -50,8 +45,8 @@ def arithmetic(symbol: Operation, left: FeelValue, right: FeelValue) -> FeelValu
     """`left symbol right`; null of null, and without a value otherwise."""
     if left is None or right is None:
         return None
-    if type(left) is int is type(right) and symbol in _WHOLE:
-        whole: int = _WHOLE[symbol](left, right)
+    if type(left) is int is type(right) and symbol in WHOLE:
+        whole: int = WHOLE[symbol](left, right)
         if -_MOST_WHOLE < whole < _MOST_WHOLE:
             return whole
     found: FeelValue = None
@@ -62,72 +57,32 @@ def arithmetic(symbol: Operation, left: FeelValue, right: FeelValue) -> FeelValu
         return bounded_text(left + right, "'+'")
     else:
         try:
-            found = _temporal(symbol, left, right, kinds)
-        except (ArithmeticError, ValueError):
+            found = _TEMPORAL[kinds[0], symbol, kinds[1]][1](left, right)
+        except (KeyError, ArithmeticError, ValueError):
             found = None
     if found is None:
         without_value(f"'{symbol}' of {describe(left)} and {describe(right)}")
     return found
 
 
-_LENGTHS, _WHENS = (DAYS, MONTHS), (DATE, MOMENT, TIME)
+def _size(value: timedelta | Months) -> Decimal:
+    """A duration in microseconds or months."""
+    return Decimal(
+        value.months if isinstance(value, Months) else value // timedelta(microseconds=1)
+    )
 
 
-def _temporal(
-    symbol: Operation, left: FeelValue, right: FeelValue, kinds: tuple[str, str]
-) -> FeelValue:
-    sign = {Operation.ADD: 1, Operation.SUBTRACT: -1}.get(symbol)
-    match kinds:
-        case (when, other) if (
-            when in (DAYS, MONTHS) and other in (DATE, MOMENT, TIME) and sign == 1
-        ):
-            return _temporal(symbol, right, left, (other, when))
-        case ("date" | "date and time", "years and months duration") if sign:
-            return _months_later(left, sign * right.months)
-        case ("date", "days and time duration") if sign:
-            return (datetime.combine(left, time()) + sign * right).date()
-        case ("date and time", "days and time duration") if sign:
-            return _later(left, sign * right)
-        case ("time", "days and time duration") if sign:
-            moved = datetime.combine(date(2000, 1, 2), left.replace(tzinfo=None)) + sign * right
-            return moved.time().replace(tzinfo=left.tzinfo)
-        case ("date" | "date and time", "date" | "date and time") if sign == -1:
-            return _between(left, right)
-        case ("time", "time") if sign == -1:
-            return instant(left) - instant(right)
-        case ("days and time duration", "days and time duration") if sign:
-            return left + sign * right
-        case ("years and months duration", "years and months duration") if sign:
-            return Months(left.months + sign * right.months)
-        case ("number", "days and time duration" | "years and months duration") if (
-            symbol is Operation.MULTIPLY
-        ):
-            return _scaled(right, number(left))
-        case ("days and time duration" | "years and months duration", "number"):
-            if symbol is Operation.MULTIPLY:
-                return _scaled(left, number(right))
-            if symbol is Operation.DIVIDE and right:
-                return _scaled(left, 1 / number(right))
-        case ("days and time duration", "days and time duration") if symbol is Operation.DIVIDE:
-            return _numbers(symbol, _microseconds(left), _microseconds(right))
-        case ("years and months duration", "years and months duration"):
-            if symbol is Operation.DIVIDE:
-                return _numbers(symbol, Decimal(left.months), Decimal(right.months))
-    return None
+def _quotient(left: Any, right: Any) -> Decimal | None:
+    return _numbers(Operation.DIVIDE, _size(left), _size(right))
 
 
-def _microseconds(value: timedelta) -> Decimal:
-    return Decimal(value // timedelta(microseconds=1))
+def _scaled(value: timedelta | Months, by: FeelValue) -> timedelta | Months:
+    size = int(_size(value) * number(by))
+    return Months(size) if isinstance(value, Months) else timedelta(microseconds=size)
 
 
-def _scaled(value: timedelta | Months, by: Decimal) -> timedelta | Months:
-    if isinstance(value, Months):
-        return Months(int(value.months * by))
-    return timedelta(microseconds=int(_microseconds(value) * by))
-
-
-def _months_later(value: Any, months: int) -> Any:
-    count = value.year * 12 + value.month - 1 + months
+def _months_later(value: Any, by: Months) -> Any:
+    count = value.year * 12 + value.month - 1 + by.months
     year, month = divmod(count, 12)
     day = value.day
     while True:
@@ -154,6 +109,50 @@ def _between(left: date, right: date) -> timedelta | None:
     if (ends[0].tzinfo is None) != (ends[1].tzinfo is None):
         return None
     return ends[0] - ends[1]
+
+
+def _clock_later(value: time, by: timedelta) -> time:
+    moved = datetime.combine(date(2000, 1, 2), value.replace(tzinfo=None)) + by
+    return moved.time().replace(tzinfo=value.tzinfo)
+
+
+def _swapped(compute: _Compute) -> _Compute:
+    return lambda left, right: compute(right, left)
+
+
+def _back(later: _Compute) -> _Compute:
+    return lambda value, by: later(value, negate(by))
+
+
+_LATER: Mapping[tuple[str, str], _Compute] = {
+    (DATE, DAYS): lambda day, by: (datetime.combine(day, time()) + by).date(),
+    (DATE, MONTHS): _months_later,
+    (MOMENT, DAYS): _later,
+    (MOMENT, MONTHS): _months_later,
+    (TIME, DAYS): _clock_later,
+    (DAYS, DAYS): operator.add,
+    (MONTHS, MONTHS): lambda left, right: Months(left.months + right.months),
+}
+_LENGTHS, _NUMBER = (DAYS, MONTHS), "number"
+_TEMPORAL: Mapping[tuple[str, Operation, str], tuple[str, _Compute]] = {
+    **{(by, Operation.ADD, to): (to, _swapped(later)) for (to, by), later in _LATER.items()},
+    **{(to, Operation.ADD, by): (to, later) for (to, by), later in _LATER.items()},
+    **{(to, Operation.SUBTRACT, by): (to, _back(later)) for (to, by), later in _LATER.items()},
+    **{(one, Operation.SUBTRACT, other): (DAYS, _between)
+       for one in (DATE, MOMENT) for other in (DATE, MOMENT)},
+    (TIME, Operation.SUBTRACT, TIME): (DAYS, lambda one, other: instant(one) - instant(other)),
+    **{(each, Operation.MULTIPLY, _NUMBER): (each, _scaled) for each in _LENGTHS},
+    **{(_NUMBER, Operation.MULTIPLY, each): (each, _swapped(_scaled)) for each in _LENGTHS},
+    **{(each, Operation.DIVIDE, _NUMBER): (each, lambda value, by: _scaled(value, 1 / number(by)))
+       for each in _LENGTHS},
+    **{(each, Operation.DIVIDE, each): (_NUMBER, _quotient) for each in _LENGTHS},
+}  # fmt: skip
+"""The kind of the result, and what computes it (DMN 1.5, tables 55 to 57)."""
+
+
+def result_kind(left: str, sign: Operation, right: str) -> str | None:
+    """The kind of `left sign right` with a date or duration; None: FEEL does not have it."""
+    return _TEMPORAL.get((left, sign, right), (None,))[0]
 
 
 ARITHMETIC: Mapping[Operation, Callable[[Any, Any], FeelValue]] = {

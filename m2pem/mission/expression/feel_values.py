@@ -4,18 +4,24 @@ Numbers are decimals of 34 digits, beside the integers and doubles of data. An o
 value gives null, and the first such cause of an evaluation is kept: see `without_value`.
 """
 
-import operator
 from collections.abc import Callable, Mapping
 from contextvars import ContextVar
 from dataclasses import dataclass
 from datetime import UTC, date, datetime, time, timedelta, timezone
 from decimal import Context, Decimal
+from functools import partial
 from typing import Any, TypeAlias
 
 from m2pem.errors import ExpressionError
 from m2pem.mission.expression import literals
 from m2pem.mission.expression.literals import MAX_INTEGER, MIN_INTEGER
-from m2pem.mission.expression.operators import MAX_VALUE_DEPTH, bounded, bounded_text, look_at
+from m2pem.mission.expression.operators import (
+    MAX_VALUE_DEPTH,
+    ORDERS,
+    bounded,
+    bounded_text,
+    look_at,
+)
 from m2pem.mission.expression.temporal import DATE, DAYS, MOMENT, MONTHS, TIME, Months, iso
 from m2pem.mission.expression.tree import Comparison, Node
 
@@ -249,16 +255,8 @@ def instant(value: FeelValue) -> FeelValue:
         offset = value.utcoffset()
         return value.replace(tzinfo=UTC) if offset is None else value.astimezone(UTC)
     if isinstance(value, time):
-        offset = value.utcoffset() or timedelta()
-        return (
-            timedelta(
-                hours=value.hour,
-                minutes=value.minute,
-                seconds=value.second,
-                microseconds=value.microsecond,
-            )
-            - offset
-        )
+        of_day = datetime.combine(date.min, value.replace(tzinfo=None)) - datetime.min
+        return of_day - (value.utcoffset() or timedelta())
     return value
 
 
@@ -284,10 +282,6 @@ def ordered(symbol: str, compare: Ordered, left: FeelValue, right: FeelValue) ->
     return compare(instant(left), instant(right))
 
 
-def _ordering(symbol: Comparison, compare: Ordered) -> Callable[[Any, Any], bool | None]:
-    return lambda left, right: ordered(symbol, compare, left, right)
-
-
 def _unequal(left: FeelValue, right: FeelValue) -> bool | None:
     same = equal(left, right)
     return None if same is None else not same
@@ -296,10 +290,7 @@ def _unequal(left: FeelValue, right: FeelValue) -> bool | None:
 COMPARISONS: Mapping[Comparison, Callable[[Any, Any], bool | None]] = {
     Comparison.EQUAL: equal,
     Comparison.NOT_EQUAL: _unequal,
-    Comparison.LESS: _ordering(Comparison.LESS, operator.lt),
-    Comparison.LESS_EQUAL: _ordering(Comparison.LESS_EQUAL, operator.le),
-    Comparison.GREATER: _ordering(Comparison.GREATER, operator.gt),
-    Comparison.GREATER_EQUAL: _ordering(Comparison.GREATER_EQUAL, operator.ge),
+    **{sign: partial(ordered, sign, compare) for sign, compare in ORDERS.items()},
 }
 
 

@@ -1,6 +1,7 @@
 """The functions that expressions may call; docs/conditions.md lists the same ones (a test)."""
 
 import math
+import operator
 from collections.abc import Callable
 from dataclasses import dataclass
 from decimal import ROUND_HALF_UP, Decimal
@@ -10,6 +11,7 @@ import m2pem.mission.timers as times  # imports this package too: only its name 
 from m2pem.errors import ExpressionError, ExpressionSyntaxError
 from m2pem.mission.expression import xpath
 from m2pem.mission.expression.feel_functions import ALTERNATIVES, FEEL_FUNCTIONS, FeelFunction
+from m2pem.mission.expression.feel_library import text_after, text_before
 from m2pem.mission.expression.literals import NUMBER, read_number
 from m2pem.mission.expression.operators import (
     TEXT_AS_VALUE,
@@ -242,25 +244,39 @@ FUNCTIONS: dict[str, Function] = {
     )
 }
 
+
+def _xpath(
+    signature: str,
+    converts: tuple[Callable[[Computed], Computed], ...],
+    compute: Callable[..., Computed],
+    gives: tuple[str, ...] = _NUMBER,
+    optional: int = 0,
+) -> Function:
+    """`converts`: what each argument is converted by."""
+    takes = (_ANY,) * len(converts)
+    made = xpath.converted(compute, *converts)
+    return Function(signature, takes, made, gives=gives, optional=optional)
+
+
 XPATH_FUNCTIONS: dict[str, Function] = {
     function.name: function
     for function in (
         Function("boolean(x)", (_ANY,), lambda x: xpath.truth(x, ""), gives=_BOOLEAN),
-        Function("ceiling(x)", (_ANY,), xpath.ceiling),
+        Function("ceiling(x)", (_ANY,), xpath.whole(math.ceil)),
         Function("concat(x, y, ...)", (_ANY, _ANY), xpath.concat, rest=True, gives=_TEXT),
-        Function("contains(x, y)", (_ANY, _ANY), xpath.contains, gives=_BOOLEAN),
-        Function("floor(x)", (_ANY,), xpath.floor),
-        Function("normalize-space(x)", (_ANY,), xpath.normalize_space, gives=_TEXT),
+        _xpath("contains(x, y)", (xpath.string,) * 2, operator.contains, _BOOLEAN),
+        Function("floor(x)", (_ANY,), xpath.whole(math.floor)),
+        _xpath("normalize-space(x)", (xpath.string,), xpath.normalize_space, _TEXT),
         Function("number(x)", (_ANY,), xpath.number),
         Function("round(x)", (_ANY,), xpath.rounded),
-        Function("starts-with(x, y)", (_ANY, _ANY), xpath.starts_with, gives=_BOOLEAN),
+        _xpath("starts-with(x, y)", (xpath.string,) * 2, str.startswith, _BOOLEAN),
         Function("string(x)", (_ANY,), xpath.string, gives=_TEXT),
-        Function("string-length(x)", (_ANY,), xpath.string_length),
-        Function("substring(x, start, length)", (_ANY, _ANY, _ANY), xpath.substring, gives=_TEXT,
-                 optional=1),
-        Function("substring-after(x, y)", (_ANY, _ANY), xpath.after, gives=_TEXT),
-        Function("substring-before(x, y)", (_ANY, _ANY), xpath.before, gives=_TEXT),
-        Function("translate(x, y, z)", (_ANY, _ANY, _ANY), xpath.translate, gives=_TEXT),
+        _xpath("string-length(x)", (xpath.string,), len),
+        _xpath("substring(x, start, length)", (xpath.string, *(xpath.rounded,) * 2),
+               xpath.substring, _TEXT, optional=1),
+        _xpath("substring-after(x, y)", (xpath.string,) * 2, text_after, _TEXT),
+        _xpath("substring-before(x, y)", (xpath.string,) * 2, text_before, _TEXT),
+        _xpath("translate(x, y, z)", (xpath.string,) * 3, xpath.translate, _TEXT),
     )
 }  # fmt: skip
 """XPath's own, which convert what they take (XPath 1.0, clause 4)."""

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from typing import Any
 
 from m2pem.errors import ExpressionError
-from m2pem.mission.expression.operators import Binary, Test, bounded, describe, equal
+from m2pem.mission.expression.operators import ORDERS, WHOLE, Binary, Test, bounded, describe, equal
 from m2pem.mission.expression.temporal import Computed
 from m2pem.mission.expression.tree import Comparison, Operation
 from m2pem.mission.values import Value
@@ -119,9 +119,7 @@ def _whole_remainder(left: int, right: int) -> int:
 
 
 ARITHMETIC: dict[Operation, Binary] = {
-    Operation.ADD: _arithmetic(Operation.ADD, operator.add, operator.add),
-    Operation.SUBTRACT: _arithmetic(Operation.SUBTRACT, operator.sub, operator.sub),
-    Operation.MULTIPLY: _arithmetic(Operation.MULTIPLY, operator.mul, operator.mul),
+    **{sign: _arithmetic(sign, compute, compute) for sign, compute in WHOLE.items()},
     Operation.DIVIDE: _arithmetic(Operation.DIVIDE, operator.truediv, divide),
     Operation.MODULO: _arithmetic(Operation.MODULO, _whole_remainder, remainder),
 }
@@ -172,7 +170,7 @@ def _equal(left: Computed, right: Computed) -> bool:
     return equal(one, other) if isinstance(one, list | dict) else bool(one == other)
 
 
-def _ordering(compare: Callable[[Any, Any], bool], *, or_equal: bool = False) -> Test:
+def _ordering(compare: Callable[[Any, Any], bool], *, or_equal: bool) -> Test:
     """An order. A boolean beside a text is ordered as a text, but where `==` holds it is equal."""
 
     def test(left: Computed, right: Computed) -> bool:
@@ -191,8 +189,5 @@ def _ordering(compare: Callable[[Any, Any], bool], *, or_equal: bool = False) ->
 COMPARISONS: dict[Comparison, Test] = {
     Comparison.EQUAL: _equal,
     Comparison.NOT_EQUAL: lambda left, right: not _equal(left, right),
-    Comparison.LESS: _ordering(operator.lt),
-    Comparison.LESS_EQUAL: _ordering(operator.le, or_equal=True),
-    Comparison.GREATER: _ordering(operator.gt),
-    Comparison.GREATER_EQUAL: _ordering(operator.ge, or_equal=True),
+    **{sign: _ordering(compare, or_equal=compare(0, 0)) for sign, compare in ORDERS.items()},
 }

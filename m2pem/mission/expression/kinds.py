@@ -4,10 +4,11 @@ from collections.abc import Callable, Sequence
 from itertools import chain, product, repeat
 from typing import TypeAlias
 
+from m2pem.mission.expression.feel_arithmetic import result_kind
 from m2pem.mission.expression.feel_functions import FeelFunction, Parameter
 from m2pem.mission.expression.functions import LISTED
 from m2pem.mission.expression.operators import kind
-from m2pem.mission.expression.temporal import DAYS, MONTHS, result_kind
+from m2pem.mission.expression.temporal import DAYS, MONTHS
 from m2pem.mission.expression.tree import (
     Arithmetic,
     Call,

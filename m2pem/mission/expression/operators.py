@@ -2,7 +2,7 @@
 
 import math
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextvars import ContextVar
 from typing import Any
 
@@ -44,6 +44,23 @@ def look_at(values: int) -> None:
 
 Binary = Callable[[Computed, Computed], Computed]
 Test = Callable[[Computed, Computed], bool]
+
+SAME: Mapping[Comparison, Callable[[Any, Any], bool]] = {
+    Comparison.EQUAL: operator.eq,
+    Comparison.NOT_EQUAL: operator.ne,
+}
+ORDERS: Mapping[Comparison, Callable[[Any, Any], bool]] = {
+    Comparison.LESS: operator.lt,
+    Comparison.LESS_EQUAL: operator.le,
+    Comparison.GREATER: operator.gt,
+    Comparison.GREATER_EQUAL: operator.ge,
+}
+WHOLE: Mapping[Operation, Callable[[Any, Any], Any]] = {
+    Operation.ADD: operator.add,
+    Operation.SUBTRACT: operator.sub,
+    Operation.MULTIPLY: operator.mul,
+}
+"""Those whose results of whole numbers are whole."""
 
 _NUMBERS = frozenset({int, float})
 
@@ -165,10 +182,7 @@ def _ordering(symbol: Comparison, compare: Callable[[Any, Any], bool]) -> Test:
 COMPARISONS: dict[Comparison, Test] = {
     Comparison.EQUAL: equal,
     Comparison.NOT_EQUAL: lambda left, right: not equal(left, right),
-    Comparison.LESS: _ordering(Comparison.LESS, operator.lt),
-    Comparison.LESS_EQUAL: _ordering(Comparison.LESS_EQUAL, operator.le),
-    Comparison.GREATER: _ordering(Comparison.GREATER, operator.gt),
-    Comparison.GREATER_EQUAL: _ordering(Comparison.GREATER_EQUAL, operator.ge),
+    **{sign: _ordering(sign, compare) for sign, compare in ORDERS.items()},
 }
 
 
@@ -240,10 +254,8 @@ def _arithmetic(
 
 
 ARITHMETIC: dict[Operation, Binary] = {
-    Operation.ADD: _arithmetic(Operation.ADD, operator.add),
-    Operation.SUBTRACT: _arithmetic(Operation.SUBTRACT, operator.sub),
-    Operation.MULTIPLY: _arithmetic(Operation.MULTIPLY, operator.mul),
-    Operation.DIVIDE: _arithmetic(Operation.DIVIDE, operator.truediv),
+    sign: _arithmetic(sign, compute)
+    for sign, compute in {**WHOLE, Operation.DIVIDE: operator.truediv}.items()
 }
 
 

@@ -13,8 +13,6 @@ from zoneinfo import ZoneInfo
 
 import isodate
 
-from m2pem.mission.expression.tree import Operation
-
 NOW = "now()"
 """The name under which an expression reads the time of the input that is decided, an ISO 8601 text.
 No data has it: to what only reads data, it is a name whose value is not known."""
@@ -78,33 +76,29 @@ def iso(value: Temporal) -> str:
 
 def read_date(text: str) -> date:
     """A date as written; raises ValueError."""
-    return date(*_numbers(DATE, text, "year", "month", "day"))
+    return _day(_matched(DATE, text))
 
 
 def read_time(text: str) -> time:
     """A time as written; raises ValueError."""
-    found = _PATTERNS[TIME].fullmatch(text)
-    if found is None:
-        raise ValueError(text)
-    return _clock(found)
+    return _clock(_matched(TIME, text))
 
 
 def read_moment(text: str) -> datetime:
     """A date and time as written, midnight where it has no time; raises ValueError."""
-    found = _PATTERNS[MOMENT].fullmatch(text)
-    if found is None:
-        raise ValueError(text)
-    day = date(int(found["year"]), int(found["month"]), int(found["day"]))
-    clock = _clock(found) if found["hour"] else time()
-    moment = datetime.combine(day, clock)
+    found = _matched(MOMENT, text)
+    moment = datetime.combine(_day(found), _clock(found) if found["hour"] else time())
     return moment + timedelta(days=1) if found["hour"] == "24" else moment
 
 
-def _numbers(kind: str, text: str, *groups: str) -> list[int]:
-    found = _PATTERNS[kind].fullmatch(text)
-    if found is None:
-        raise ValueError(text)
-    return [int(found[group]) for group in groups]
+def _matched(kind: str, text: str) -> re.Match[str]:
+    if found := _PATTERNS[kind].fullmatch(text):
+        return found
+    raise ValueError(text)
+
+
+def _day(found: re.Match[str]) -> date:
+    return date(int(found["year"]), int(found["month"]), int(found["day"]))
 
 
 def _clock(found: re.Match[str]) -> time:
@@ -160,29 +154,3 @@ def read_duration(text: str) -> timedelta | Months:
     except OverflowError:
         raise ValueError(text) from None
     return -length if found["sign"] else length
-
-
-# --- arithmetic (DMN 1.5, tables 55 to 57) --------------------------------------------------------
-
-_PLUS, _MINUS, _TIMES, _BY = (
-    Operation.ADD,
-    Operation.SUBTRACT,
-    Operation.MULTIPLY,
-    Operation.DIVIDE,
-)
-_NUMBER = "number"
-_RESULTS: dict[tuple[str, Operation, str], str] = {
-    **{(each, sign, each): each for each in (DAYS, MONTHS) for sign in (_PLUS, _MINUS)},
-    **{(when, sign, each): when for when in (DATE, MOMENT) for sign in (_PLUS, _MINUS)
-       for each in (DAYS, MONTHS)},
-    **{(each, _PLUS, when): when for when in (DATE, MOMENT) for each in (DAYS, MONTHS)},
-    **{(when, _MINUS, other): DAYS for when in (DATE, MOMENT) for other in (DATE, MOMENT)},
-    **{(each, sign, _NUMBER): each for each in (DAYS, MONTHS) for sign in (_TIMES, _BY)},
-    **{(_NUMBER, _TIMES, each): each for each in (DAYS, MONTHS)},
-    **{(each, _BY, each): _NUMBER for each in (DAYS, MONTHS)},
-}  # fmt: skip
-
-
-def result_kind(left: str, sign: Operation, right: str) -> str | None:
-    """The kind of `left sign right` with a date or duration; None: FEEL does not have it."""
-    return _RESULTS.get((left, sign, right))

@@ -6,9 +6,9 @@ does; compare `repr` where the type matters.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import StrEnum
-from typing import TypeAlias, Union
+from typing import TypeAlias, Union, get_args
 
 MAX_DEPTH = 100
 
@@ -265,47 +265,23 @@ Node: TypeAlias = Union[
 ]
 
 
+_BELOW = {
+    each: tuple(one.name for one in fields(each) if "Node" in str(one.type))
+    for each in get_args(Node)
+}
+"""The fields of each node that hold nodes: one, several, or several with names."""
+
+
 def children(node: Node) -> tuple[Node, ...]:
-    """The nodes directly below, in the order they are evaluated."""
-    match node:
-        case Compare() | Arithmetic():
-            return (node.left, node.right)
-        case Literal() | Name():
-            return ()
-        case Call():
-            return node.arguments
-        case And() | Or():
-            return node.operands
-        case Not() | Negate():
-            return (node.operand,)
-        case In():
-            return (node.item, node.container)
-        case Index():
-            return (node.container, node.key)
-        case ListOf():
-            return node.items
-        case If():
-            return (node.condition, node.then, node.otherwise)
-        case Some() | Every():
-            return (node.collection, node.condition)
-        case For():
-            return (*(each for _, each in node.iterators), node.result)
-        case Filter():
-            return (node.container, node.condition)
-        case Path():
-            return (node.container,)
-        case ContextOf():
-            return tuple(each for _, each in node.entries)
-        case RangeOf():
-            return tuple(each for each in (node.low, node.high) if each is not None)
-        case Lambda():
-            return (node.body,)
-        case Invoke():
-            return (node.function, *node.arguments)
-        case InstanceOf():
-            return (node.value,)
-        case Join():
-            return node.parts
+    """The nodes directly below, in the order they are evaluated: that of the fields."""
+    found: list[Node] = []
+    for name in _BELOW[type(node)]:
+        below = getattr(node, name)
+        if isinstance(below, tuple):
+            found += [each[1] if isinstance(each, tuple) else each for each in below]
+        elif below is not None:
+            found.append(below)
+    return tuple(found)
 
 
 def walk(node: Node) -> Iterator[tuple[Node, int]]:

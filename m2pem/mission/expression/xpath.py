@@ -5,14 +5,22 @@ to it, and unequal neither. Numbers are doubles: they may be infinite, or not a 
 """
 
 import math
-import operator
 import re
 from collections.abc import Callable
 from typing import Any
 
 from m2pem.errors import ExpressionError
 from m2pem.mission.expression.juel import divide, remainder
-from m2pem.mission.expression.operators import Binary, Test, bounded_text, describe, equal
+from m2pem.mission.expression.operators import (
+    ORDERS,
+    SAME,
+    WHOLE,
+    Binary,
+    Test,
+    bounded_text,
+    describe,
+    equal,
+)
 from m2pem.mission.expression.temporal import Computed
 from m2pem.mission.expression.tree import Comparison, Operation
 
@@ -77,11 +85,8 @@ def _double(value: Computed) -> int | float:
 
 
 ARITHMETIC: dict[Operation, Binary] = {
-    Operation.ADD: _arithmetic(operator.add),
-    Operation.SUBTRACT: _arithmetic(operator.sub),
-    Operation.MULTIPLY: _arithmetic(operator.mul),
-    Operation.DIVIDE: _arithmetic(divide),
-    Operation.MODULO: _arithmetic(remainder),
+    sign: _arithmetic(compute)
+    for sign, compute in {**WHOLE, Operation.DIVIDE: divide, Operation.MODULO: remainder}.items()
 }
 
 
@@ -111,36 +116,33 @@ def _ordering(compare: Callable[[Any, Any], bool]) -> Test:
 
 
 COMPARISONS: dict[Comparison, Test] = {
-    Comparison.EQUAL: _equality(operator.eq),
-    Comparison.NOT_EQUAL: _equality(operator.ne),
-    Comparison.LESS: _ordering(operator.lt),
-    Comparison.LESS_EQUAL: _ordering(operator.le),
-    Comparison.GREATER: _ordering(operator.gt),
-    Comparison.GREATER_EQUAL: _ordering(operator.ge),
+    **{sign: _equality(compare) for sign, compare in SAME.items()},
+    **{sign: _ordering(compare) for sign, compare in ORDERS.items()},
 }
 
 
 # --- functions ------------------------------------------------------------------------------------
 
 
-def rounded(value: Computed) -> Computed:
-    """`round(value)`: of two whole numbers that are as near, the larger one."""
-    return _whole(value, lambda found: math.floor(found + 0.5))
+def converted(
+    compute: Callable[..., Computed], *to: Callable[[Computed], Computed]
+) -> Callable[..., Computed]:
+    """A function whose arguments are converted first, as each of its parameters says."""
+    return lambda *values: compute(*(each(value) for each, value in zip(to, values, strict=False)))
 
 
-def floor(value: Computed) -> Computed:
-    """`floor(value)`."""
-    return _whole(value, math.floor)
+def whole(to_whole: Callable[[float], int]) -> Callable[[Computed], Computed]:
+    """A whole number near a value; what is infinite or not a number remains so."""
+
+    def compute(value: Computed) -> Computed:
+        found = number(value)
+        return to_whole(found) if math.isfinite(found) else found
+
+    return compute
 
 
-def ceiling(value: Computed) -> Computed:
-    """`ceiling(value)`."""
-    return _whole(value, math.ceil)
-
-
-def _whole(value: Computed, to_whole: Callable[[float], int]) -> Computed:
-    found = number(value)
-    return to_whole(found) if math.isfinite(found) else found
+rounded = whole(lambda found: math.floor(found + 0.5))
+"""`round(value)`: of two whole numbers that are as near, the larger one."""
 
 
 def concat(*values: Computed) -> Computed:
@@ -148,56 +150,20 @@ def concat(*values: Computed) -> Computed:
     return bounded_text("".join(map(string, values)), "concat()")
 
 
-def contains(value: Computed, part: Computed) -> Computed:
-    """`contains(value, part)`."""
-    return string(part) in string(value)
+def substring(text: str, first: float, size: float = math.inf) -> Computed:
+    """The characters, counted from 1, that lie within both, rounded; none where one is not a
+    number."""
+    return "".join(each for place, each in enumerate(text, 1) if first <= place < first + size)
 
 
-def starts_with(value: Computed, part: Computed) -> Computed:
-    """`starts-with(value, part)`."""
-    return string(value).startswith(string(part))
+def normalize_space(text: str) -> Computed:
+    """The text without spaces at its ends, and with single ones in it."""
+    return " ".join(re.split(f"[{_SPACE}]+", text.strip(_SPACE)))
 
 
-def before(value: Computed, mark: Computed) -> Computed:
-    """`substring-before(value, mark)`: "" if the mark is not in it."""
-    head, found, _ = _parted(value, mark)
-    return head if found else ""
-
-
-def after(value: Computed, mark: Computed) -> Computed:
-    """`substring-after(value, mark)`: "" if the mark is not in it."""
-    return _parted(value, mark)[2]
-
-
-def _parted(value: Computed, mark: Computed) -> tuple[str, str, str]:
-    text, wanted = string(value), string(mark)
-    return text.partition(wanted) if wanted else ("", "", text)
-
-
-def substring(value: Computed, start: Computed, length: Computed = math.inf) -> Computed:
-    """`substring(value, start, length)`: the characters, counted from 1, that lie within both,
-    rounded; none where one is not a number."""
-    first, size = rounded(start), rounded(length)
-    assert isinstance(first, int | float)
-    assert isinstance(size, int | float)
-    end = first + size
-    return "".join(each for place, each in enumerate(string(value), 1) if first <= place < end)
-
-
-def string_length(value: Computed) -> Computed:
-    """`string-length(value)`."""
-    return len(string(value))
-
-
-def normalize_space(value: Computed) -> Computed:
-    """`normalize-space(value)`."""
-    return " ".join(re.split(f"[{_SPACE}]+", string(value).strip(_SPACE)))
-
-
-def translate(value: Computed, wanted: Computed, by: Computed) -> Computed:
-    """`translate(value, wanted, by)`: the characters of `wanted` by those at their places."""
+def translate(text: str, wanted: str, by: str) -> Computed:
+    """The text with the characters of `wanted` by those at their places."""
     found: dict[int, str] = {}
-    texts = string(wanted), string(by)
-    for place, each in enumerate(texts[0]):
-        found.setdefault(ord(each), texts[1][place : place + 1])
-    return string(value).translate(found)
+    for place, each in enumerate(wanted):
+        found.setdefault(ord(each), by[place : place + 1])
+    return text.translate(found)
