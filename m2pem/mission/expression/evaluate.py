@@ -6,6 +6,7 @@ What the rules of a language decide is decided then, not at each evaluation.
 from collections.abc import Callable, Iterable, Sequence
 from contextvars import ContextVar
 from datetime import date, timedelta
+from functools import partial
 from typing import Any, TypeAlias
 
 from m2pem.errors import ExpressionError
@@ -146,17 +147,10 @@ def _not(node: Not, rules: Rules) -> Evaluate:
     return negated
 
 
-def _and(node: And, rules: Rules) -> Evaluate:
-    return _decided(False, "'and'", node.operands, rules)
-
-
-def _or(node: Or, rules: Rules) -> Evaluate:
-    return _decided(True, "'or'", node.operands, rules)
-
-
-def _decided(by: bool, what: str, nodes: Iterable[Node], rules: Rules) -> Evaluate:
+def _decided(by: bool, node: And | Or, rules: Rules) -> Evaluate:
     """`by` if one of them is, the rest is not evaluated; in FEEL null if one has no truth."""
-    runs, truth = _all(nodes, rules), rules.truth
+    runs, truth = _all(node.operands, rules), rules.truth
+    what = "'or'" if by else "'and'"
 
     def ternary(read: ReadValue) -> Computed:
         found: bool | None = not by
@@ -234,15 +228,7 @@ def _if(node: If, rules: Rules) -> Evaluate:
     return chosen
 
 
-def _some(node: Some, rules: Rules) -> Evaluate:
-    return _quantified(node, True, rules)
-
-
-def _every(node: Every, rules: Rules) -> Evaluate:
-    return _quantified(node, False, rules)
-
-
-def _quantified(node: Some | Every, by: bool, rules: Rules) -> Evaluate:
+def _quantified(by: bool, node: Some | Every, rules: Rules) -> Evaluate:
     collection, condition = _all((node.collection, node.condition), rules)
     holds, variable, size = _truth(condition), node.variable, _size(node.condition)
 
@@ -481,8 +467,8 @@ _MAKE: dict[type[Node], Callable[[Any, Rules], Evaluate]] = {
     Name: _name,
     ListOf: _list,
     Not: _not,
-    And: _and,
-    Or: _or,
+    And: partial(_decided, False),
+    Or: partial(_decided, True),
     Compare: _compare,
     In: _in,
     Negate: _negate,
@@ -490,8 +476,8 @@ _MAKE: dict[type[Node], Callable[[Any, Rules], Evaluate]] = {
     Call: _call,
     If: _if,
     Index: _index,
-    Some: _some,
-    Every: _every,
+    Some: partial(_quantified, True),
+    Every: partial(_quantified, False),
     For: _for,
     Filter: _filter,
     Path: _path,

@@ -297,8 +297,7 @@ class FeelParser:
         """A name that is defined here: all up to what follows it."""
         if self._token.kind != "name":
             self._fail(f"expected a name {why}, found {self._found}")
-        token = self._next()
-        return self._known(token.text)
+        return self._known(self._next().text)
 
     def _operators(self, minimum: int = 0) -> Node:
         """The longest expression whose operators bind more strongly than `minimum`."""
@@ -515,11 +514,7 @@ class FeelParser:
             return ListOf(())
         items = [self._item(opening)]
         if self._take(".."):
-            high = self._end()
-            closing = self._take("]", ")", "[")
-            if closing is None:
-                self._fail("expected ']' or ')' to close the range")
-            return RangeOf(items[0], high, opening.text == "[", closing.text == "]")
+            return self._to_end(items[0], opening.text == "[")
         if opening.text == "]":
             self._expect("..", "in a range")
         if opening.text == "(":
@@ -532,12 +527,15 @@ class FeelParser:
         self._expect("]", f"to close '[' at column {opening.start + 1}")
         return ListOf(tuple(items))
 
-    def _end(self) -> Node:
-        """The high end of a range; a [ after a number closes it."""
+    def _to_end(self, low: Node, included: bool) -> RangeOf:
+        """The range with its high end; a [ after a number closes it."""
         outer, self._in_range = self._in_range, True
-        node = self._expression()
+        high = self._expression()
         self._in_range = outer
-        return node
+        closing = self._take("]", ")", "[")
+        if closing is None:
+            self._fail("expected ']' or ')' to close the range")
+        return RangeOf(low, high, included, closing.text == "]")
 
     def _item(self, opening: _Token) -> Node:
         if opening.text == "[" and self._is("<", "<=", ">", ">=", "!="):
@@ -566,12 +564,7 @@ class FeelParser:
         opening = self._next()
         tests = [self._test(left, alone=False)]
         if self._take(".."):
-            low = self._low
-            high = self._end()
-            closing = self._take("]", ")", "[")
-            if closing is None:
-                self._fail("expected ']' or ')' to close the range")
-            return _within(left, RangeOf(low, high, False, closing.text == "]"))
+            return _within(left, self._to_end(self._low, False))
         while self._take(","):
             tests.append(self._test(left, alone=False))
         self._expect(")", f"to close '(' at column {opening.start + 1}")

@@ -164,10 +164,8 @@ def negate(value: FeelValue) -> FeelValue:
     """`-value`."""
     if is_number(value):
         return number(value).copy_negate()
-    if isinstance(value, timedelta):
+    if isinstance(value, timedelta | Months):
         return -value
-    if isinstance(value, Months):
-        return Months(-value.months)
     if value is not None:
         without_value(f"'-' of {describe(value)}")
     return None

@@ -23,7 +23,6 @@ from decimal import (
 
 from m2pem.mission.expression import feel_library as lib
 from m2pem.mission.expression import feel_values as v
-from m2pem.mission.expression.feel_arithmetic import negate
 from m2pem.mission.expression.feel_library import NoValueError
 from m2pem.mission.expression.feel_values import DIGITS, FeelValue, number
 from m2pem.mission.expression.operators import bounded_list, bounded_text, look_at
@@ -208,8 +207,7 @@ FEEL_FUNCTIONS: dict[str, FeelFunction] = {
         _f("round down", "n,scale", [NUMBER, NUMBER], lib.rounded(ROUND_DOWN), NUMBER),
         _f("round half up", "n,scale", [NUMBER, NUMBER], lib.rounded(ROUND_HALF_UP), NUMBER),
         _f("round half down", "n,scale", [NUMBER, NUMBER], lib.rounded(ROUND_HALF_DOWN), NUMBER),
-        _f("abs", "n", [("number", DAYS, MONTHS)],
-           lambda n: negate(n) if n < lib.zero(n) else n),
+        _f("abs", "n", [("number", DAYS, MONTHS)], abs),
         _f("modulo", "dividend,divisor", [NUMBER, NUMBER], lib.modulo, NUMBER),
         _f("sqrt", "number", [NUMBER], lib.root, NUMBER),
         _f("log", "number", [NUMBER], lib.logarithm, NUMBER),

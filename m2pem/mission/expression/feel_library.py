@@ -3,7 +3,6 @@
 Each raises NoValueError, ValueError or ArithmeticError where there is no value.
 """
 
-import operator
 import re
 from calendar import monthrange
 from collections import Counter
@@ -25,8 +24,10 @@ from m2pem.mission.expression.temporal import (
     read_moment,
     read_time,
 )
+from m2pem.mission.expression.tree import Comparison
 
 _SCALES = -6111, 6176
+_below = v.COMPARISONS[Comparison.LESS]
 
 
 class NoValueError(Exception):
@@ -137,7 +138,9 @@ def as_range(text: str) -> Range:
     if (low is None and (high is None or included[0])) or (high is None and included[1]):
         raise NoValueError("a range without an end does not include it")
     both = low is not None and high is not None
-    if both and not (v.kind(low) == v.kind(high) and v.ordered("<=", operator.le, low, high)):
+    if both and not (
+        v.kind(low) == v.kind(high) and v.COMPARISONS[Comparison.LESS_EQUAL](low, high)
+    ):
         raise NoValueError("its ends are in no order")
     return Range(low, high, *included, open_low=low is None, open_high=high is None)
 
@@ -275,8 +278,7 @@ def joined(
     texts = [each for each in values if each is not None]
     if not all(isinstance(each, str) for each in texts):
         raise NoValueError("not all items are texts")
-    whole = (prefix or "") + (delimiter or "").join(texts) + (suffix or "")
-    return whole
+    return (prefix or "") + (delimiter or "").join(texts) + (suffix or "")
 
 
 # --- numbers --------------------------------------------------------------------------------------
@@ -335,9 +337,7 @@ def extreme(sign: int) -> Callable[[list[FeelValue]], FeelValue]:
             return None
         best = values[0]
         for each in values:
-            lower = v.ordered(
-                "<", lambda a, b: a < b, *((each, best) if sign < 0 else (best, each))
-            )
+            lower = _below(*((each, best) if sign < 0 else (best, each)))
             if lower is None:
                 raise NoValueError("not all items can be compared")
             best = each if lower else best
@@ -456,10 +456,8 @@ def flat(values: list[FeelValue]) -> list[FeelValue]:
 def in_order(values: list[FeelValue], precedes: FeelValue = None) -> list[FeelValue]:
     def compare(a: FeelValue, b: FeelValue) -> int:
         look_at(1)
-        if isinstance(precedes, Closure):
-            first = precedes.call(precedes, [a, b])
-        else:
-            first = v.ordered("<", operator.lt, a, b)
+        given = isinstance(precedes, Closure)
+        first = precedes.call(precedes, [a, b]) if given else _below(a, b)
         if first is None:
             raise NoValueError("not all items can be compared")
         return -1 if first else 1
@@ -544,7 +542,7 @@ def _as_span(value: FeelValue) -> Range:
 
 def _order(a: FeelValue, b: FeelValue) -> int:
     """-1, 0 or 1: which of two values is the smaller one."""
-    below, same = v.ordered("<", operator.lt, a, b), v.equal(a, b)
+    below, same = _below(a, b), v.equal(a, b)
     if below is None or same is None:
         raise NoValueError("the values cannot be compared")
     return 0 if same else -1 if below else 1
@@ -598,16 +596,6 @@ RELATIONS: dict[str, Callable[[Range, Range], bool]] = {
     "started by": lambda a, b: _low(a, b) == 0 and _high(a, b) >= 0,
     "coincides": lambda a, b: _low(a, b) == 0 == _high(a, b),
 }
-
-
-def zero(value: FeelValue) -> FeelValue:
-    return (
-        Months(0)
-        if isinstance(value, Months)
-        else timedelta()
-        if isinstance(value, timedelta)
-        else 0
-    )
 
 
 def asserted(value: FeelValue, condition: bool, why: str | None = None) -> FeelValue:

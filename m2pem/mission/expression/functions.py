@@ -78,42 +78,32 @@ class Function:
         return None if null else self.compute(*arguments)
 
 
-def _finite(name: str, value: int | float) -> int | float:
-    return bounded(value, f"{name}()", value)
+def _of_numbers(name: str, compute: Callable[..., int | float]) -> Callable[..., int | float]:
+    def bounded_result(*operands: int | float) -> int | float:
+        try:
+            result = compute(*operands)
+        except (OverflowError, ValueError):  # of what is infinite, or not a number
+            result = math.inf
+        return bounded(result, f"{name}()", *operands)
+
+    return bounded_result
 
 
-def _abs(x: int | float) -> Computed:
-    return bounded(abs(x), "abs()", x)
-
-
-def _floor(x: int | float) -> Computed:
-    return bounded(math.floor(_finite("floor", x)), "floor()", x)
-
-
-def _ceil(x: int | float) -> Computed:
-    return bounded(math.ceil(_finite("ceil", x)), "ceil()", x)
-
-
-def _round(x: int | float) -> Computed:
+def _round(x: int | float) -> int:
     # Python's round() takes halves to the even number, which surprises people.
-    whole = int(Decimal(_finite("round", x)).to_integral_value(ROUND_HALF_UP))
-    return bounded(whole, "round()", x)
+    return int(Decimal(x).to_integral_value(ROUND_HALF_UP))
 
 
-def _sqrt(x: int | float) -> Computed:
+def _sqrt(x: int | float) -> float:
     if x < 0:
         raise ExpressionError(f"sqrt() takes a number from 0 on, not {describe(x)}")
-    return math.sqrt(_finite("sqrt", x))
+    return math.sqrt(bounded(x, "sqrt()", x))
 
 
-def _mod(x: int | float, y: int | float) -> Computed:
+def _mod(x: int | float, y: int | float) -> int | float:
     if y == 0:
         raise ExpressionError(f"mod() divides {describe(x)} by zero")
-    try:
-        result = x % y
-    except OverflowError:
-        result = math.inf
-    return bounded(result, "mod()", x, y)
+    return x % y
 
 
 def _extreme(name: str, pick: Callable[[Any], Any]) -> Callable[..., Computed]:
@@ -219,14 +209,14 @@ _BOOLEAN = ("boolean",)
 FUNCTIONS: dict[str, Function] = {
     function.name: function
     for function in (
-        Function("abs(x)", (_NUMBER,), _abs),
+        Function("abs(x)", (_NUMBER,), _of_numbers("abs", abs)),
         Function("min(x, ...)", (("number", "list"),), _extreme("min", min), rest=True),
         Function("max(x, ...)", (("number", "list"),), _extreme("max", max), rest=True),
-        Function("round(x)", (_NUMBER,), _round),
-        Function("floor(x)", (_NUMBER,), _floor),
-        Function("ceil(x)", (_NUMBER,), _ceil),
-        Function("sqrt(x)", (_NUMBER,), _sqrt),
-        Function("mod(x, y)", (_NUMBER, _NUMBER), _mod),
+        Function("round(x)", (_NUMBER,), _of_numbers("round", _round)),
+        Function("floor(x)", (_NUMBER,), _of_numbers("floor", math.floor)),
+        Function("ceil(x)", (_NUMBER,), _of_numbers("ceil", math.ceil)),
+        Function("sqrt(x)", (_NUMBER,), _of_numbers("sqrt", _sqrt)),
+        Function("mod(x, y)", (_NUMBER, _NUMBER), _of_numbers("mod", _mod)),
         Function("number(x)", (("number", "text"),), _number),
         Function("text(x)", (("boolean", "number", "text"),), text_of, gives=_TEXT),
         Function("length(x)", (("text", "list", "map"),), len),

@@ -142,25 +142,19 @@ class _Closely:
             start += 1
         name_end = scan_name(self._text, start, self._end)
         if name_end > start:
-            return "name", start, self._word(name_end)
+            if self._text.startswith(".", name_end) and name_end < self._end:
+                self._fail("a part of the name is missing after '.'", name_end)
+            return "name", start, name_end
         if number := NUMBER.match(self._text, start, self._end):
-            return "number", start, self._number(number.end())
+            following = self._text[number.end() : self._end][:1]
+            if following and (_continues_name(following) or following == "."):
+                self._fail(f"a number cannot be followed by {following!r}", number.end())
+            return "number", start, number.end()
         character = self._text[start]
         if character in "'\"":
             self._quoted(start)
         hint = _HINTS.get(character)
         self._fail(f"unexpected {character!r}" + (f": {hint}" if hint else ""), start)
-
-    def _word(self, end: int) -> int:
-        if self._text.startswith(".", end) and end < self._end:
-            self._fail("a part of the name is missing after '.'", end)
-        return end
-
-    def _number(self, end: int) -> int:
-        following = self._text[end] if end < self._end else ""
-        if following and (_continues_name(following) or following == "."):
-            self._fail(f"a number cannot be followed by {following!r}", end)
-        return end
 
     def _quoted(self, start: int) -> None:
         """Says what is wrong with a text."""

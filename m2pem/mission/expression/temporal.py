@@ -24,6 +24,12 @@ class Months:
 
     months: int
 
+    def __neg__(self) -> "Months":
+        return Months(-self.months)
+
+    def __abs__(self) -> "Months":
+        return Months(abs(self.months))
+
 
 Temporal: TypeAlias = date | datetime | time | timedelta | Months
 Computed: TypeAlias = Any
