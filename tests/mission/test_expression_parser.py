@@ -4,7 +4,7 @@ import pytest
 
 from m2pem.errors import ExpressionSyntaxError
 from m2pem.mission.expression import Dialect, parse, template
-from m2pem.mission.expression.parser import MAX_PARTS
+from m2pem.mission.expression.descent import MAX_PARTS
 from m2pem.mission.expression.tree import (
     MAX_DEPTH,
     And,

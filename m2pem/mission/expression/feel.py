@@ -6,10 +6,10 @@ written; of other names, words that follow each other are one name.
 
 import re
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple, NoReturn
+from typing import NoReturn
 
-from m2pem.errors import ExpressionSyntaxError
 from m2pem.mission.expression.calls import CallError, feel_call
+from m2pem.mission.expression.descent import MAX_ITEMS, Descent, Token
 from m2pem.mission.expression.dialect import Span
 from m2pem.mission.expression.feel_functions import FEEL_FUNCTIONS, NAME_HEADS, NAMES
 from m2pem.mission.expression.literals import read_number
@@ -41,11 +41,7 @@ from m2pem.mission.expression.tree import (
     RangeOf,
     Some,
     TypeName,
-    walk,
 )
-
-MAX_ITEMS = 1_000
-MAX_PARTS = 20_000
 
 _BETWEEN = r"(?:\s|//[^\n]*(?:\n|\Z)|/\*.*?\*/)*"
 _WORD_TEXT = r"(?:[^\W\d]|[\U00010000-\U000EFFFF])[\w\U00010000-\U000EFFFF]*"
@@ -65,7 +61,6 @@ _NAMED = re.compile(r"([^\W\d]\w*(?:\s+\w+)*)\s*:(?!=)")
 _PART = re.compile(r"[\w\U00010000-\U000EFFFF]+|[^\s\w]")
 _ESCAPE = re.compile(r"\\(?:u([0-9A-Fa-f]{4})|U([0-9A-Fa-f]{6})|(.))", re.DOTALL)
 _ESCAPED = {"n": "\n", "t": "\t", "r": "\r", "b": "\b", "f": "\f", "\\": "\\", '"': '"', "'": "'"}
-_SPELLED = ("sign", "word")
 KEYWORDS = frozenset(
     {
         *("and", "between", "else", "every", "false", "for", "function", "if", "in", "instance"),
@@ -93,56 +88,23 @@ _TYPES = (
 )
 
 
-class _Token(NamedTuple):
-    """`kind`: "number", "text", "name", "word" (a keyword), "sign" or "end"."""
-
-    kind: str
-    text: str
-    start: int
-    stop: int
-
-
 _new = tuple.__new__  # takes half as long as calling the class
 
 
-class FeelParser:
-    """Reads one expression in FEEL, which is in `text` at `span`.
-
-    Raises:
-        ExpressionSyntaxError: it is none, or is beyond the limits.
-    """
+class FeelParser(Descent):
+    """Reads one expression in FEEL, which is in `text` at `span`."""
 
     def __init__(self, text: str, span: Span) -> None:
         self._text = text
         self._stop = span.stop
         self._names: dict[str, re.Pattern[str]] = {}
         self._locals: list[str] = []
-        self._nesting = 0
         self._in_range = False
         self._token = self._read(span.start)
 
-    def parse(self) -> Node:
-        """Parse the whole text, and return its tree."""
-        start = self._token.start
-        if self._token.kind == "end":
-            self._fail("an expression is missing")
-        node = self._expression()
-        if self._token.kind != "end":
-            self._fail(f"expected an operator or the end, found {self._found}")
-        if self._stop - start <= MAX_DEPTH:  # each level takes a character at least
-            return node
-        for parts, (_, depth) in enumerate(walk(node)):
-            if depth > MAX_DEPTH:
-                self._fail(
-                    f"nested deeper than {MAX_DEPTH} levels; use parentheses or fewer operators"
-                )
-            if parts > MAX_PARTS:
-                self._fail("too large, written out; use fewer ranges in each other")
-        return node
-
     # --- tokens -----------------------------------------------------------------------------------
 
-    def _read(self, position: int) -> _Token:
+    def _read(self, position: int) -> Token:
         if self._names and (named := self._written(position)):
             return named
         found = _NEXT.match(self._text, position, self._stop)
@@ -153,23 +115,24 @@ class FeelParser:
             return self._name(found["word"], found.start("word"), found.end())
         if kind == "number":
             self._alone(found)
-        return _new(_Token, (kind, found[kind], found.start(kind), found.end()))
+        strength = _STRENGTHS.get(found[kind], 0) if kind == "sign" else 0
+        return _new(Token, (kind, found[kind], found.start(kind), found.end(), strength))
 
-    def _end_of_text(self, position: int) -> _Token:
+    def _end_of_text(self, position: int) -> Token:
         space = _SPACE.match(self._text, position, self._stop)
         start = space.end() if space else position
         if start < self._stop:
             self._refuse(start)
-        return _new(_Token, ("end", "the end", self._stop, self._stop))
+        return _new(Token, ("end", "the end", self._stop, self._stop, 0))
 
-    def _written(self, position: int) -> _Token | None:
+    def _written(self, position: int) -> Token | None:
         """A name that was defined and holds spaces or signs, if it is next."""
         space = _SPACE.match(self._text, position, self._stop)
         start = space.end() if space else position
         for key, pattern in self._names.items():
             named = pattern.match(self._text, start, self._stop)
             if named and not self._goes_on(named):
-                return _new(_Token, ("name", key, start, named.end()))
+                return _new(Token, ("name", key, start, named.end(), 0))
         return None
 
     def _goes_on(self, found: re.Match[str]) -> bool:
@@ -177,16 +140,16 @@ class FeelParser:
             _INSIDE.match(self._text, found.end(), self._stop) and _INSIDE.match(found[0][-1])
         )
 
-    def _name(self, word: str, start: int, stop: int) -> _Token:
+    def _name(self, word: str, start: int, stop: int) -> Token:
         if word in NAME_HEADS:
             for pattern, name in NAMES:
                 if found := pattern.match(self._text, start, self._stop):
-                    return _new(_Token, ("name", name, start, found.end(1)))
+                    return _new(Token, ("name", name, start, found.end(1), 0))
         if word == "not":
             after = _SPACE.match(self._text, stop, self._stop)
             self._fail("expected '(' after FEEL's 'not'", after.end() if after else stop)
         if word in KEYWORDS:
-            return _new(_Token, ("word", word, start, stop))
+            return _new(Token, ("word", word, start, stop, _STRENGTHS.get(word, 0)))
         text = word
         while text not in self._locals and text not in FEEL_FUNCTIONS:
             following = _NEXT.match(self._text, stop, self._stop)
@@ -195,7 +158,7 @@ class FeelParser:
             if following["word"] in KEYWORDS:
                 break
             text, stop = f"{text} {following['word']}", following.end()
-        return _new(_Token, ("name", text, start, stop))
+        return _new(Token, ("name", text, start, stop, 0))
 
     def _alone(self, number: re.Match[str]) -> None:
         following = self._text[number.end() : number.end() + 1]
@@ -214,31 +177,14 @@ class FeelParser:
         hint = hints.get(character)
         self._fail(f"unexpected {character!r}" + (f": {hint}" if hint else ""), start)
 
-    @property
-    def _found(self) -> str:
-        return self._token.text if self._token.kind == "end" else repr(self._token.text)
-
-    def _next(self) -> _Token:
+    def _next(self) -> Token:
         token = self._token
         self._token = self._read(token.stop)
         return token
 
     def _is(self, *texts: str) -> bool:
         token = self._token
-        return token.text in texts and token.kind in _SPELLED
-
-    def _take(self, *texts: str) -> _Token | None:
-        token = self._token
-        return self._next() if token.text in texts and token.kind in _SPELLED else None
-
-    def _expect(self, text: str, why: str) -> _Token:
-        if token := self._take(text):
-            return token
-        self._fail(f"expected '{text}' {why}, found {self._found}")
-
-    def _fail(self, message: str, position: int | None = None) -> NoReturn:
-        at = self._token.start if position is None else position
-        raise ExpressionSyntaxError(message, self._text, at)
+        return token.text in texts and token.kind in ("sign", "word")
 
     def _known(self, name: str) -> str:
         """Note a name that may hold spaces and signs, and return it without more spaces."""
@@ -252,9 +198,7 @@ class FeelParser:
     # --- expressions ------------------------------------------------------------------------------
 
     def _expression(self) -> Node:
-        self._nesting += 1
-        if self._nesting > MAX_DEPTH:
-            self._fail(f"nested deeper than {MAX_DEPTH} levels")
+        self._nest()
         if self._take("if"):
             node = self._if()
         elif self._is("for", "some", "every"):
@@ -302,20 +246,14 @@ class FeelParser:
     def _operators(self, minimum: int = 0) -> Node:
         """The longest expression whose operators bind more strongly than `minimum`."""
         node = self._signed()
-        while self._token.kind in ("sign", "word"):
-            strength = _STRENGTHS.get(self._token.text, 0)
-            if strength <= minimum:
-                break
+        while (strength := self._token.strength) > minimum:
             node = self._binary(node, strength)
         return node
 
     def _binary(self, left: Node, strength: int) -> Node:
         word = self._token.text
         if strength <= _AND:
-            operands = [left]
-            while self._take(word):
-                operands.append(self._operators(strength))
-            return Or(tuple(operands)) if word == "or" else And(tuple(operands))
+            return self._joined(left, self._operators)
         self._next()
         if strength > _COMPARISON:
             return Arithmetic(Operation(word), left, self._operators(strength))
@@ -364,7 +302,7 @@ class FeelParser:
             elif self._take("instance"):
                 if self._token.text.split()[0] != "of":
                     self._fail(f"expected 'of' after 'instance', found {self._found}")
-                self._token = self._read(self._token.start + len("of"))
+                self._token = self._read(self._token.position + len("of"))
                 node = InstanceOf(node, self._type())
             else:
                 return node
@@ -373,7 +311,7 @@ class FeelParser:
         token = self._token
         for name in _PROPERTIES:
             pattern = re.compile(name.replace(" ", r"\s+") + r"\b")
-            if found := pattern.match(self._text, token.start, self._stop):
+            if found := pattern.match(self._text, token.position, self._stop):
                 self._token = self._read(found.end())
                 return Path(node, name)
         if token.kind not in ("name", "word"):
@@ -415,7 +353,7 @@ class FeelParser:
                 return self._bracketed()
         self._fail(f"expected a value, found {self._found}")
 
-    def _named(self, token: _Token) -> Node:
+    def _named(self, token: Token) -> Node:
         if not self._is("("):
             return Name(token.text)
         if token.text == "not":
@@ -429,7 +367,7 @@ class FeelParser:
         try:
             return feel_call(token.text, arguments, names)
         except CallError as error:
-            self._fail(str(error), token.start)
+            self._fail(str(error), token.position)
 
     def _arguments(self) -> tuple[tuple[Node, ...], tuple[str, ...]]:
         self._expect("(", "before arguments")
@@ -439,7 +377,7 @@ class FeelParser:
                 break
             if len(arguments) == MAX_ITEMS:
                 self._fail(f"more than {MAX_ITEMS} items")
-            if named := _NAMED.match(self._text, self._token.start, self._stop):
+            if named := _NAMED.match(self._text, self._token.position, self._stop):
                 names.append(re.sub(r"\s+", " ", named[1]))
                 self._token = self._read(named.end())
             elif names:
@@ -483,13 +421,13 @@ class FeelParser:
             self._locals.append(self._known(key))
             if len(entries) > MAX_ITEMS:
                 self._fail(f"more than {MAX_ITEMS} items")
-            self._token = self._read(self._token.start)  # with the key as a name
-        self._expect("}", f"to close '{{' at column {opening.start + 1}")
+            self._token = self._read(self._token.position)  # with the key as a name
+        self._expect("}", "to close '{'", opening)
         del self._locals[known:]
         return ContextOf(tuple(entries))
 
     def _key(self) -> str:
-        start = self._token.start
+        start = self._token.position
         if self._token.kind == "text":
             key = _unescaped(self._next().text[1:-1])
             self._expect(":", "after a key")
@@ -518,13 +456,13 @@ class FeelParser:
         if opening.text == "]":
             self._expect("..", "in a range")
         if opening.text == "(":
-            self._expect(")", f"to close '(' at column {opening.start + 1}")
+            self._expect(")", "to close '('", opening)
             return items[0]
         while self._take(","):
             if len(items) == MAX_ITEMS:
                 self._fail(f"more than {MAX_ITEMS} items")
             items.append(self._item(opening))
-        self._expect("]", f"to close '[' at column {opening.start + 1}")
+        self._expect("]", "to close '['", opening)
         return ListOf(tuple(items))
 
     def _to_end(self, low: Node, included: bool) -> RangeOf:
@@ -537,7 +475,7 @@ class FeelParser:
             self._fail("expected ']' or ')' to close the range")
         return RangeOf(low, high, included, closing.text == "]")
 
-    def _item(self, opening: _Token) -> Node:
+    def _item(self, opening: Token) -> Node:
         if opening.text == "[" and self._is("<", "<=", ">", ">=", "!="):
             return self._open_range()
         return self._expression()
@@ -567,7 +505,7 @@ class FeelParser:
             return _within(left, self._to_end(self._low, False))
         while self._take(","):
             tests.append(self._test(left, alone=False))
-        self._expect(")", f"to close '(' at column {opening.start + 1}")
+        self._expect(")", "to close '('", opening)
         if all(isinstance(each, In) and isinstance(each.container, Literal) for each in tests):
             return In(left, ListOf(tuple(each.container for each in tests)))  # type: ignore[union-attr]
         return Or(tuple(tests)) if len(tests) > 1 else tests[0]
@@ -584,7 +522,7 @@ class FeelParser:
     def _type(self) -> TypeName:
         for name in _TYPES:
             pattern = re.compile(name.replace(" ", r"\s+") + r"(?!\w)")
-            if found := pattern.match(self._text, self._token.start, self._stop):
+            if found := pattern.match(self._text, self._token.position, self._stop):
                 self._token = self._read(found.end())
                 return name, tuple(self._parts(name))
         self._fail(f"expected a type such as number or list<string>, found {self._found}")

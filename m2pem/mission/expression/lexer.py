@@ -1,27 +1,13 @@
 """Splits an expression into tokens."""
 
 import re
-from typing import NamedTuple, NoReturn
+from typing import NoReturn
 
 from m2pem.errors import ExpressionSyntaxError
+from m2pem.mission.expression.descent import Token
 from m2pem.mission.expression.dialect import Dialect, Span
 from m2pem.mission.expression.literals import NUMBER, unescape
 from m2pem.mission.expression.vocabulary import LOWEST, MEANINGS, SYMBOLS
-
-
-class Token(NamedTuple):
-    """A "number", "constant", "name", "operator" or the "end".
-
-    An "operator" may also be a bracket, a comma or one of the words `and or not in`. `text` is
-    its name in the bare dialect; of others, what was written. `position` is the offset in the
-    whole text. `strength`: how strongly it binds as an operator after a value.
-    """
-
-    kind: str
-    text: str
-    position: int
-    strength: int
-
 
 _new = tuple.__new__  # takes half as long as calling the class
 
@@ -123,8 +109,8 @@ def tokenize(text: str, span: Span, dialect: Dialect) -> list[Token]:
             kind = "name"
         elif written in meanings:
             kind, written, strength = meanings[written]
-        tokens.append(_new(Token, (kind, written, start, strength)))
-    tokens.append(_new(Token, ("end", "the end", span.stop, LOWEST)))
+        tokens.append(_new(Token, (kind, written, start, position, strength)))
+    tokens.append(_new(Token, ("end", "the end", span.stop, span.stop, LOWEST)))
     return tokens
 
 

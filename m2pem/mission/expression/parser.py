@@ -7,16 +7,13 @@ comparisons chain, and `==` binds more weakly than `<`. What people read otherwi
 
 import re
 from collections.abc import Callable
-from typing import NoReturn
 
-from m2pem.errors import ExpressionSyntaxError
 from m2pem.mission.expression.calls import CallError, meaning, method_call
+from m2pem.mission.expression.descent import MAX_ITEMS, Descent, Token
 from m2pem.mission.expression.dialect import Dialect, Span
-from m2pem.mission.expression.lexer import Token, tokenize
+from m2pem.mission.expression.lexer import tokenize
 from m2pem.mission.expression.literals import read_number, unescape
 from m2pem.mission.expression.tree import (
-    MAX_DEPTH,
-    And,
     Arithmetic,
     Call,
     Compare,
@@ -31,8 +28,6 @@ from m2pem.mission.expression.tree import (
     Node,
     Not,
     Operation,
-    Or,
-    walk,
 )
 from m2pem.mission.expression.vocabulary import (
     AND,
@@ -45,65 +40,25 @@ from m2pem.mission.expression.vocabulary import (
     UNARY,
 )
 
-MAX_ITEMS = 1_000
-"""Items of a list as written, and arguments of a call."""
-
-MAX_PARTS = 20_000
-"""Nodes of a tree. A value in a range is there twice, so ranges in each other double it."""
-
 _IDENTIFIER = re.compile(r"[^\W\d]\w*")
 _COMPARISONS = {each.value: each for each in Comparison}
 _OPERATIONS = {each.value: each for each in Operation}
 
 
-class Parser:
-    """Reads one expression, which is in `text` at `span`.
+class Parser(Descent):
+    """Reads one expression, which is in `text` at `span`."""
 
-    Raises:
-        ExpressionSyntaxError: it is none, or is beyond the limits.
-    """
+    _before_name = "; a name has no spaces (in FEEL it may: begin with '=')"
 
     def __init__(self, text: str, span: Span, dialect: Dialect) -> None:
         self._text = text
-        self._length = span.stop - span.start
         self._coming = iter(tokenize(text, span, dialect))
         self._token = next(self._coming)
         self._dialect = dialect
-        self._nesting = 0
 
-    def parse(self) -> Node:
-        """Parse the whole text, and return its tree."""
-        if self._token.kind == "end":
-            self._fail("an expression is missing")
-        node = self._expression(LOWEST)
-        if self._token.kind != "end":
-            spaces = "; a name has no spaces (in FEEL it may: begin with '=')"
-            hint = spaces if self._token.kind == "name" else ""
-            self._fail(f"expected an operator or the end, found {self._found}{hint}")
-        # Each level takes a character at least, and what doubles the parts takes ten.
-        if self._length > MAX_DEPTH:
-            self._limit(node)
-        return node
-
-    def _limit(self, node: Node) -> None:
-        for parts, (_, depth) in enumerate(walk(node)):
-            if depth > MAX_DEPTH:
-                self._fail(
-                    f"nested deeper than {MAX_DEPTH} levels; use parentheses or fewer operators"
-                )
-            if parts > MAX_PARTS:
-                self._fail("too large, written out; use fewer ranges in each other")
-
-    @property
-    def _found(self) -> str:
-        token = self._token
-        return token.text if token.kind == "end" else repr(token.text)
-
-    def _expression(self, minimum: int) -> Node:
+    def _expression(self, minimum: int = LOWEST) -> Node:
         """The longest expression whose operators bind more strongly than `minimum`."""
-        self._nesting += 1
-        if self._nesting > MAX_DEPTH:
-            self._fail(f"nested deeper than {MAX_DEPTH} levels")
+        self._nest()
         node = self._prefix(minimum)
         while (strength := self._token.strength) > minimum:
             node = self._binary(node, strength)
@@ -116,11 +71,7 @@ class Parser:
 
     def _binary(self, left: Node, strength: int) -> Node:
         if strength <= AND:
-            word = self._token.text
-            operands = [left]
-            while self._take(word):
-                operands.append(self._expression(strength))
-            return Or(tuple(operands)) if word == "or" else And(tuple(operands))
+            return self._joined(left, self._expression)
         operator = self._next().text
         negated = operator == "not"
         if negated:
@@ -209,15 +160,12 @@ class Parser:
         while self._token.text in ("[", "."):
             opening = self._next()
             if opening.text == "[":
-                key = self._key(opening)
+                key = self._expression()
                 self._expect("]", "to close '['", opening)
                 node = _taken(node, key)
             else:
                 node = self._member(node)
         return node
-
-    def _key(self, opening: Token) -> Node:
-        return self._expression(LOWEST)
 
     def _member(self, node: Node) -> Node:
         token = self._next()
@@ -247,19 +195,6 @@ class Parser:
         token = self._token
         self._token = next(self._coming, token)
         return token
-
-    def _take(self, operator: str) -> Token | None:
-        token = self._token
-        return self._next() if token.text == operator and token.kind == "operator" else None
-
-    def _expect(self, operator: str, why: str, opening: Token | None = None) -> Token:
-        if token := self._take(operator):
-            return token
-        at = f" at column {opening.position + 1}" if opening else ""
-        self._fail(f"expected '{operator}' {why}{at}, found {self._found}")
-
-    def _fail(self, message: str, token: Token | None = None) -> NoReturn:
-        raise ExpressionSyntaxError(message, self._text, (token or self._token).position)
 
 
 def _constant(written: str) -> bool | str | None:
