@@ -140,9 +140,14 @@ def unwritten(
         yield from _findings(mission, process, store)
         for read in store.reads:
             for rule, said, remedy in doubts(read.expression, store.kinds_of):
-                reader = mission.elements.get(read.element)
-                file = mission.file_of(reader if isinstance(reader, FlowNode) else process)
+                file = _file(mission, process, read)
                 yield rule.finding(file, read.line, read.element, said, remedy)
+
+
+def _file(mission: Mission, process: Process, read: Read) -> str:
+    """The file of what reads: a call reads what another file's process has."""
+    reader = mission.elements.get(read.element)
+    return mission.file_of(reader if isinstance(reader, FlowNode) else process)
 
 
 def _findings(mission: Mission, process: Process, store: _Store) -> Iterator[Finding]:
@@ -155,10 +160,8 @@ def _findings(mission: Mission, process: Process, store: _Store) -> Iterator[Fin
             if (read.element, name) in said:
                 continue
             said.add((read.element, name))
-            # A call reads what another file's process has.
-            reader = mission.elements.get(read.element)
             yield UNWRITTEN_NAME.finding(
-                mission.file_of(reader if isinstance(reader, FlowNode) else process),
+                _file(mission, process, read),
                 read.line,
                 read.element,
                 f"'{name}' is read, but nothing in process '{process.id}' writes it; unless "
@@ -201,11 +204,9 @@ def _reads(node: FlowNode) -> Iterator[Read]:
     if isinstance(node, ScriptTask | ServiceTask | SendTask) and node.behavior is not None:
         yield from _parameters(node, node.behavior.parameters)
         yield from _needs(node, node.behavior.roles)
-    if isinstance(node, ScriptTask) and node.script is not None:
-        for statement in node.script.statements:
-            if isinstance(statement, Assignment):
-                yield Read(statement.expression, node.id, statement.line)
-    elif isinstance(node, ServiceTask) and node.call is not None:
+    for statement in _assignments(node):
+        yield Read(statement.expression, node.id, statement.line)
+    if isinstance(node, ServiceTask) and node.call is not None:
         yield from _parameters(node, node.call.properties)
     elif isinstance(node, UserTask) and node.prompt is not None and node.prompt.timeout is not None:
         yield Read(node.prompt.timeout, node.id, node.line)
@@ -213,6 +214,11 @@ def _reads(node: FlowNode) -> Iterator[Read]:
         for definition in node.definitions:
             if isinstance(definition, TimerEventDefinition):
                 yield Read(definition.expression, node.id, definition.line)
+
+
+def _assignments(node: FlowNode) -> Iterator[Assignment]:
+    if isinstance(node, ScriptTask) and node.script is not None:
+        yield from (each for each in node.script.statements if isinstance(each, Assignment))
 
 
 def _conditions(node: Event) -> Iterator[Read]:
@@ -263,11 +269,8 @@ def written_by(node: FlowNode) -> set[str]:
         if isinstance(node.loop, MultiInstance):
             written |= {*INSTANCE_COUNTS, node.loop.item, node.loop.output_item}
             written.add(node.loop.output_collection)
-    if isinstance(node, ScriptTask) and node.script is not None:
-        for statement in node.script.statements:
-            if isinstance(statement, Assignment):
-                written.add(statement.key)
-    elif isinstance(node, UserTask) and node.prompt is not None:
+    written.update(each.key for each in _assignments(node))
+    if isinstance(node, UserTask) and node.prompt is not None:
         written.add(node.prompt.store)
     elif isinstance(node, ComplexGateway):
         written |= {"activationCount", "waitingForStart"}
@@ -287,12 +290,9 @@ def _kinds_written_by(node: FlowNode) -> dict[str, frozenset[str]]:
     found: dict[str, frozenset[str]] = {}
     if isinstance(node, Activity) and node.loop is not None:
         found |= dict.fromkeys((LOOP_COUNTER, *INSTANCE_COUNTS), frozenset({"number"}))
-    if isinstance(node, ScriptTask) and node.script is not None:
-        for statement in node.script.statements:
-            if isinstance(statement, Assignment):
-                key, made = statement.key, kinds(statement.expression.tree)
-                found[key] = found.get(key, frozenset()) | made
-    elif isinstance(node, UserTask) and node.prompt is not None:
+    for each in _assignments(node):
+        found[each.key] = found.get(each.key, frozenset()) | kinds(each.expression.tree)
+    if isinstance(node, UserTask) and node.prompt is not None:
         found[node.prompt.store] = frozenset({"text"})
     return found
 

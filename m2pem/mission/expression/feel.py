@@ -119,16 +119,18 @@ class FeelParser(Descent):
         return _new(Token, (kind, found[kind], found.start(kind), found.end(), strength))
 
     def _end_of_text(self, position: int) -> Token:
-        space = _SPACE.match(self._text, position, self._stop)
-        start = space.end() if space else position
+        start = self._after_space(position)
         if start < self._stop:
             self._refuse(start)
         return _new(Token, ("end", "the end", self._stop, self._stop, 0))
 
+    def _after_space(self, position: int) -> int:
+        space = _SPACE.match(self._text, position, self._stop)
+        return space.end() if space else position
+
     def _written(self, position: int) -> Token | None:
         """A name that was defined and holds spaces or signs, if it is next."""
-        space = _SPACE.match(self._text, position, self._stop)
-        start = space.end() if space else position
+        start = self._after_space(position)
         for key, pattern in self._names.items():
             named = pattern.match(self._text, start, self._stop)
             if named and not self._goes_on(named):
@@ -146,8 +148,7 @@ class FeelParser(Descent):
                 if found := pattern.match(self._text, start, self._stop):
                     return _new(Token, ("name", name, start, found.end(1), 0))
         if word == "not":
-            after = _SPACE.match(self._text, stop, self._stop)
-            self._fail("expected '(' after FEEL's 'not'", after.end() if after else stop)
+            self._fail("expected '(' after FEEL's 'not'", self._after_space(stop))
         if word in KEYWORDS:
             return _new(Token, ("word", word, start, stop, _STRENGTHS.get(word, 0)))
         text = word

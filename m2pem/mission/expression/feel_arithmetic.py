@@ -1,6 +1,7 @@
 """Arithmetic of FEEL: numbers, texts, dates, times and durations (DMN 1.5, tables 55 to 57)."""
 
 import operator
+from calendar import monthrange
 from collections.abc import Callable, Mapping
 from datetime import UTC, date, datetime, time, timedelta
 from decimal import Decimal
@@ -82,16 +83,9 @@ def _scaled(value: timedelta | Months, by: FeelValue) -> timedelta | Months:
 
 
 def _months_later(value: Any, by: Months) -> Any:
-    count = value.year * 12 + value.month - 1 + by.months
-    year, month = divmod(count, 12)
-    day = value.day
-    while True:
-        try:
-            return value.replace(year=year, month=month + 1, day=day)
-        except ValueError:
-            if day <= 28:
-                raise
-            day -= 1
+    year, month = divmod(value.year * 12 + value.month - 1 + by.months, 12)
+    day = min(value.day, monthrange(year, month + 1)[1])
+    return value.replace(year=year, month=month + 1, day=day)
 
 
 def _later(value: datetime, by: timedelta) -> datetime:

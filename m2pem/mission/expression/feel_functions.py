@@ -6,6 +6,7 @@ item, and a value for a list of it, where the other is wanted (clause 10.3.2.9.4
 
 import math
 import re
+import statistics
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import (
@@ -33,6 +34,7 @@ from m2pem.mission.expression.temporal import (
     MONTHS,
     TIME,
     iso,
+    read_duration,
 )
 
 NUMBER, TEXT, BOOLEAN, LIST, CONTEXT = ("number",), ("text",), ("boolean",), ("list",), ("context",)
@@ -177,7 +179,8 @@ FEEL_FUNCTIONS: dict[str, FeelFunction] = {
            _f("date and time", "date,time", [_WHEN, (TIME,)], lib.moment_of)),
         _f("time", "from", [("text", TIME, *_WHEN)], lib.as_time, (TIME,),
            _f("time", "hour,minute,second,offset?", [*[NUMBER] * 3, (DAYS,)], lib.time_of)),
-        _f("duration", "from", [("text", DAYS, MONTHS)], lib.as_duration, (DAYS, MONTHS)),
+        _f("duration", "from", [("text", DAYS, MONTHS)],
+           lambda value: read_duration(value) if isinstance(value, str) else value, (DAYS, MONTHS)),
         _f("years and months duration", "from,to", [_WHEN, _WHEN], lib.months_between, (MONTHS,)),
         _f("number", "from,grouping separator?,decimal separator?",
            [("text", "number"), TEXT, TEXT], lib.as_number, NUMBER),
@@ -225,9 +228,10 @@ FEEL_FUNCTIONS: dict[str, FeelFunction] = {
            NUMBER, rest=True),
         _f("mean", "list", [LIST], lib.of_numbers(lambda n: sum(n, Decimal()) / len(n)), NUMBER,
            rest=True),
-        _f("median", "list", [LIST], lib.of_numbers(lib.median), NUMBER, rest=True),
+        _f("median", "list", [LIST], lib.of_numbers(statistics.median), NUMBER, rest=True),
         _f("stddev", "list", [LIST], lib.of_numbers(lib.deviation), NUMBER, rest=True),
-        _f("mode", "list", [LIST], lib.mode, LIST, rest=True),
+        _f("mode", "list", [LIST],
+           lambda values: sorted(statistics.multimode(lib.numbers(values))), LIST, rest=True),
         _f("all", "list", [LIST], lib.truths(False), BOOLEAN, rest=True),
         _f("any", "list", [LIST], lib.truths(True), BOOLEAN, rest=True),
         _f("sublist", "list,start position,length?", [LIST, NUMBER, NUMBER], lib.sublist, LIST),

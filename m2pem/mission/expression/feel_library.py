@@ -5,7 +5,6 @@ Each raises NoValueError, ValueError or ArithmeticError where there is no value.
 
 import re
 from calendar import monthrange
-from collections import Counter
 from collections.abc import Callable
 from datetime import date, datetime, time, timedelta
 from decimal import ROUND_FLOOR, Decimal, localcontext
@@ -78,10 +77,6 @@ def time_of(
     seconds, part = divmod(number(second), 1)
     zone = None if offset is None else offset_zone(offset)
     return time(whole(hour), whole(minute), int(seconds), int(part * 1_000_000), zone)
-
-
-def as_duration(value: FeelValue) -> FeelValue:
-    return read_duration(value) if isinstance(value, str) else value
 
 
 def months_between(begin: FeelValue, end: FeelValue) -> Months:
@@ -325,7 +320,7 @@ def root(value: FeelValue) -> Decimal:
 # --- lists ----------------------------------------------------------------------------------------
 
 
-def _numbers(values: list[FeelValue]) -> list[Decimal]:
+def numbers(values: list[FeelValue]) -> list[Decimal]:
     if not all(map(v.is_number, values)):
         raise NoValueError("not all items are numbers")
     return [number(each) for each in values]
@@ -348,15 +343,10 @@ def extreme(sign: int) -> Callable[[list[FeelValue]], FeelValue]:
 
 def of_numbers(compute: Callable[[list[Decimal]], FeelValue]) -> Callable[..., FeelValue]:
     def of(values: list[FeelValue]) -> FeelValue:
-        found = _numbers(values)
+        found = numbers(values)
         return compute(found) if found else None
 
     return of
-
-
-def median(values: list[Decimal]) -> Decimal:
-    ordered, middle = sorted(values), len(values) // 2
-    return ordered[middle] if len(values) % 2 else (ordered[middle - 1] + ordered[middle]) / 2
 
 
 def deviation(values: list[Decimal]) -> Decimal:
@@ -365,12 +355,6 @@ def deviation(values: list[Decimal]) -> Decimal:
     mean = sum(values, Decimal()) / len(values)
     total = sum(((each - mean) ** 2 for each in values), Decimal())
     return (total / (len(values) - 1)).sqrt()
-
-
-def mode(values: list[FeelValue]) -> list[FeelValue]:
-    counts = Counter(_numbers(values))
-    most = max(counts.values(), default=0)
-    return sorted(each for each, count in counts.items() if count == most)
 
 
 def truths(decisive: bool) -> Callable[[list[FeelValue]], bool | None]:

@@ -21,6 +21,8 @@ _SYMBOLS = {
     s: s for s in ("!=", "<=", ">=", "<", ">", "+", "-", "*", "/", "(", ")", "[", "]", ",", ".")
 }
 _TERNARY = {"?": "?", ":": ":"}
+_COMPARING = {"eq": "==", "ne": "!=", "lt": "<", "le": "<=", "gt": ">", "ge": ">="}
+_DIVIDING = {"div": "/", "mod": "%"}
 _WORDS = {"and": "and", "or": "or", "not": "not", "in": "in"}
 
 SYMBOLS = {
@@ -40,17 +42,11 @@ WORDS = {
     Dialect.BARE: _WORDS,
     Dialect.JUEL: {
         **_WORDS,
-        "eq": "==",
-        "ne": "!=",
-        "lt": "<",
-        "le": "<=",
-        "gt": ">",
-        "ge": ">=",
-        "div": "/",
-        "mod": "%",
+        **_COMPARING,
+        **_DIVIDING,
         "empty": "empty",
     },
-    Dialect.XPATH: {"and": "and", "or": "or", "div": "/", "mod": "%"},
+    Dialect.XPATH: {"and": "and", "or": "or", **_DIVIDING},
 }
 
 

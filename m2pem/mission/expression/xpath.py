@@ -11,6 +11,7 @@ from typing import Any
 
 from m2pem.errors import ExpressionError
 from m2pem.mission.expression.juel import divide, remainder
+from m2pem.mission.expression.literals import show_scalar
 from m2pem.mission.expression.operators import (
     ORDERS,
     SAME,
@@ -52,10 +53,8 @@ def string(value: Computed) -> str:
         return value
     if value is None:
         return ""
-    if isinstance(value, bool):
-        return "true" if value else "false"
     if isinstance(value, int):
-        return str(value)
+        return show_scalar(value)
     if not isinstance(value, float):
         raise ExpressionError(f"{describe(value)} is not converted to a text")
     if math.isnan(value):
