@@ -11,6 +11,7 @@ from typing import Any
 
 from m2pem.errors import ExpressionError, ExpressionSyntaxError
 from m2pem.mission.expression import feel_values as feel
+from m2pem.mission.expression.descent import Descent
 from m2pem.mission.expression.dialect import Dialect, Span, locate, split
 from m2pem.mission.expression.evaluate import Evaluate, evaluator, tracing
 from m2pem.mission.expression.feel import FeelParser
@@ -149,8 +150,7 @@ def place(text: str, dialect: Dialect, tree: Node) -> tuple[Node, Spans]:
 def _parse(text: str, span: Span, dialect: Dialect, spans: Spans) -> Node:
     """Parse, and note where nodes are. They are kept: the identity of one that is gone could be
     that of another."""
-    parser: Any = FeelParser(text, span) if dialect is Dialect.FEEL else None
-    parser = parser or Parser(text, span, dialect)
+    parser: Any = parser_of(text, span, dialect)
 
     def noting(method: Callable[..., Node]) -> Callable[..., Node]:
         def read(*given: Any) -> Node:
@@ -169,6 +169,11 @@ def _parse(text: str, span: Span, dialect: Dialect, spans: Spans) -> Node:
             setattr(parser, name, noting(method))
     tree: Node = parser.parse()
     return tree
+
+
+def parser_of(text: str, span: Span, dialect: Dialect) -> Descent:
+    """The parser of an expression, which is in `text` at `span`."""
+    return FeelParser(text, span) if dialect is Dialect.FEEL else Parser(text, span, dialect)
 
 
 def _span(spans: Spans, node: Node) -> "Span | None":

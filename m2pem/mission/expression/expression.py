@@ -9,9 +9,8 @@ from typing import NoReturn
 
 from m2pem.errors import ExpressionError
 from m2pem.mission.expression import cause, feel_values, operators
-from m2pem.mission.expression.dialect import Dialect, Span, locate, split
+from m2pem.mission.expression.dialect import Dialect, locate, split
 from m2pem.mission.expression.evaluate import evaluator
-from m2pem.mission.expression.feel import FeelParser
 from m2pem.mission.expression.literals import shorten, show_scalar
 from m2pem.mission.expression.operators import begin_work
 from m2pem.mission.expression.parser import Parser
@@ -159,13 +158,7 @@ def parse(text: str, language: str | None = None) -> Expression:
     if language in _BARE and _INTEGER.fullmatch(text):  # what scripts assign most
         return Expression(text, Dialect.BARE, Literal(int(text)))
     dialect, span = locate(text, language)
-    return Expression(text, dialect, _tree(text, span, dialect))
-
-
-def _tree(text: str, span: Span, dialect: Dialect) -> Node:
-    if dialect is Dialect.FEEL:
-        return FeelParser(text, span).parse()
-    return Parser(text, span, dialect).parse()
+    return Expression(text, dialect, cause.parser_of(text, span, dialect).parse())
 
 
 def template(text: str) -> Expression:
@@ -185,8 +178,8 @@ def template(text: str) -> Expression:
     if len(spans) == 1 and text[spans[0].start - 2 : spans[0].stop + 1] == stripped:
         return parse(text)
     nodes = tuple(
-        _tree(text, part, Dialect.JUEL) if isinstance(part, slice) else Literal(part)
-        for part in parts
+        Literal(each) if isinstance(each, str) else Parser(text, each, Dialect.JUEL).parse()
+        for each in parts
     )
     return Expression(text, Dialect.TEMPLATE, Join(nodes))
 

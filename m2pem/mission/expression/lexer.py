@@ -99,7 +99,7 @@ def tokenize(text: str, span: Span, dialect: Dialect) -> list[Token]:
     while position < end:
         found = match(text, position, end)
         if found is None:
-            kind, start, position = _Closely(text, end, dialect).read(position)
+            kind, start, position = _Closely(text, end).read(position)
         else:
             kind = found.lastgroup or ""
             start, position = found.span(kind)
@@ -117,10 +117,9 @@ def tokenize(text: str, span: Span, dialect: Dialect) -> list[Token]:
 class _Closely:
     """Read a token that resembles a mistake, or raise with what the mistake is."""
 
-    def __init__(self, text: str, end: int, dialect: Dialect) -> None:
+    def __init__(self, text: str, end: int) -> None:
         self._text = text
         self._end = end
-        self._dialect = dialect
 
     def read(self, start: int) -> tuple[str, int, int]:
         """The kind of the token after the space at `start`, its start and its end."""
