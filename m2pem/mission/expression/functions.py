@@ -78,15 +78,19 @@ class Function:
         return None if null else self.compute(*arguments)
 
 
-def _of_numbers(name: str, compute: Callable[..., int | float]) -> Callable[..., int | float]:
-    def bounded_result(*operands: int | float) -> int | float:
+def _to_whole(
+    name: str, compute: Callable[[int | float], int]
+) -> Callable[[int | float], int | float]:
+    what = f"{name}()"
+
+    def whole(x: int | float) -> int | float:
         try:
-            result = compute(*operands)
+            result: int | float = compute(x)
         except (OverflowError, ValueError):  # of what is infinite, or not a number
             result = math.inf
-        return bounded(result, f"{name}()", *operands)
+        return bounded(result, what, x)
 
-    return bounded_result
+    return whole
 
 
 def _round(x: int | float) -> int:
@@ -103,7 +107,11 @@ def _sqrt(x: int | float) -> float:
 def _mod(x: int | float, y: int | float) -> int | float:
     if y == 0:
         raise ExpressionError(f"mod() divides {describe(x)} by zero")
-    return x % y
+    try:
+        result = x % y
+    except OverflowError:
+        result = math.inf
+    return bounded(result, "mod()", x, y)
 
 
 def _extreme(name: str, pick: Callable[[Any], Any]) -> Callable[..., Computed]:
@@ -209,14 +217,14 @@ _BOOLEAN = ("boolean",)
 FUNCTIONS: dict[str, Function] = {
     function.name: function
     for function in (
-        Function("abs(x)", (_NUMBER,), _of_numbers("abs", abs)),
+        Function("abs(x)", (_NUMBER,), lambda x: bounded(abs(x), "abs()", x)),
         Function("min(x, ...)", (("number", "list"),), _extreme("min", min), rest=True),
         Function("max(x, ...)", (("number", "list"),), _extreme("max", max), rest=True),
-        Function("round(x)", (_NUMBER,), _of_numbers("round", _round)),
-        Function("floor(x)", (_NUMBER,), _of_numbers("floor", math.floor)),
-        Function("ceil(x)", (_NUMBER,), _of_numbers("ceil", math.ceil)),
-        Function("sqrt(x)", (_NUMBER,), _of_numbers("sqrt", _sqrt)),
-        Function("mod(x, y)", (_NUMBER, _NUMBER), _of_numbers("mod", _mod)),
+        Function("round(x)", (_NUMBER,), _to_whole("round", _round)),
+        Function("floor(x)", (_NUMBER,), _to_whole("floor", math.floor)),
+        Function("ceil(x)", (_NUMBER,), _to_whole("ceil", math.ceil)),
+        Function("sqrt(x)", (_NUMBER,), _sqrt),
+        Function("mod(x, y)", (_NUMBER, _NUMBER), _mod),
         Function("number(x)", (("number", "text"),), _number),
         Function("text(x)", (("boolean", "number", "text"),), text_of, gives=_TEXT),
         Function("length(x)", (("text", "list", "map"),), len),
