@@ -3,10 +3,12 @@
 import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from typing import Any
 
 import pytest
 from m2pem_plugin_mavlink.link.routed_link import open_link
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
+from m2pem_plugin_mavlink.microservices.missions import ReadMissionItem
 from m2pem_plugin_mavlink.protocol.messages import Address
 from m2pem_plugin_mavlink.protocol.transaction import RefusedError
 from m2pem_plugin_mavlink.simulator.simulator import SimulatedVehicle, Simulator
@@ -218,6 +220,33 @@ async def test_another_mission_by_another_ground_station_is_noticed(
         await other.close()
         await link.close()
         await watch.close()
+
+
+def test_a_late_answer_about_an_earlier_mission_is_no_takeover(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    late = [waypoint(47.0)]
+
+    @on_loopback
+    async def story() -> None:
+        async with flying() as (_, vehicle):
+            perform = vehicle.link.perform
+
+            async def answered(exchange: Any) -> Any:
+                found = await perform(exchange)
+                return late.pop() if late and isinstance(exchange, ReadMissionItem) else found
+
+            monkeypatch.setattr(vehicle.link, "perform", answered)
+            watch = TakeoverMonitor(vehicle, OWN.system)
+            watch.open()
+            await vehicle.driver.upload(ROUTE)
+            await vehicle.driver.start_mission()
+            assert await vehicle.until(lambda: not late, AMPLE_S)
+            assert await vehicle.until(lambda: vehicle.driver.current_item == 2, AMPLE_S)
+            assert watch.takeover({FlightMode.MISSION}) is None
+            await watch.close()
+
+    story()
 
 
 @on_loopback

@@ -298,14 +298,19 @@ class TakeoverMonitor:
         return identity is not None and identity.firmware is Firmware.ARDUPILOT
 
     async def _compare_item(self, item: int, mission: tuple[MissionItem, ...]) -> None:
-        """Read the current item: it must be the one that was uploaded."""
+        """Read the current item: it must be the one that was uploaded.
+
+        It is read again if it is another one: the answer to an earlier request may come late.
+        """
         link = self.vehicle.link
-        try:
-            found = await link.perform(ReadMissionItem(link.address, item + 1))
-        except ExchangeError:
-            return  # a missing answer proves nothing
-        if self.vehicle.commanded.mission is mission and not _same(found, mission[item]):
-            self._replaced = f"replaced the mission: its item {item + 1} was not uploaded here"
+        for _ in range(2):
+            try:
+                found = await link.perform(ReadMissionItem(link.address, item + 1))
+            except ExchangeError:
+                return  # a missing answer proves nothing
+            if self.vehicle.commanded.mission is not mission or _same(found, mission[item]):
+                return
+        self._replaced = f"replaced the mission: its item {item + 1} was not uploaded here"
 
     def _receive_from_mission_protocol(self, message: Message, sender: Address) -> None:
         """Receive the vehicle's messages about missions to another ground station. Not all links
