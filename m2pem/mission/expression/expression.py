@@ -26,8 +26,15 @@ _BARE = (None, Dialect.BARE.value)
 _INTEGER = re.compile(r"-?[0-9]{1,18}")
 
 
+class _Prepared:
+    """What evaluates an expression, once that is made: nothing that distinguishes two of them."""
+
+    __slots__ = ("_run",)
+    _run: Callable[[ReadValue], Value] | None
+
+
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Expression:
+class Expression(_Prepared):
     """A parsed expression; never changes. Equal to another of the same text and dialect.
 
     `text` is what was written, `tree` what it means, `names` the dotted names that it reads,
@@ -39,11 +46,11 @@ class Expression:
     tree: Node
     names: frozenset[str] = field(init=False)
     rules: Rules = field(init=False)
-    _run: Callable[[ReadValue], Value] | None = field(init=False, default=None)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "names", names(self.tree))
         object.__setattr__(self, "rules", RULES[self.dialect])
+        object.__setattr__(self, "_run", None)
 
     def __reduce__(self) -> tuple[type["Expression"], tuple[str, Dialect, Node]]:
         return Expression, (self.text, self.dialect, self.tree)
