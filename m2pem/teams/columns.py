@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from itertools import combinations
 
@@ -265,11 +264,12 @@ def _ways(
     try:
         _keep_ends_apart(context, ways, spacing_m, in_order=False)
     except _StuckError as stuck:
-        with suppress(_StuckError):
-            return _ways_in_order(context, route, offsets, spacing_m), True
         formed_up = _formed_up(context, route, offsets)
         _keep_ends_apart(formed_up, _drawn(formed_up, route, offsets), spacing_m, in_order=False)
-        raise TeamRefusedError(f"{stuck.member} {_NO_WAY}", stuck.place) from None
+        try:
+            return _ways_in_order(context, route, offsets, spacing_m), True
+        except _StuckError:
+            raise TeamRefusedError(f"{stuck.member} {_NO_WAY}", stuck.place) from None
     return ways, False
 
 

@@ -38,7 +38,7 @@ _SILENT_S = 1.0
 """A member of which nothing new is received for so long is not waited for: it may go on."""
 
 _SOON_S = REACTION_S * REACTION_SHARE
-_HARD_BRAKING = 4.0
+_HARD_BRAKING = 2.0
 """Vehicles brake at most so many times as hard as they do at least."""
 
 _LOOK_AHEAD_M = 50.0

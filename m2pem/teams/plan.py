@@ -50,12 +50,12 @@ class Motion:
 
 
 MOTIONS: Mapping[str, Motion] = {
-    "ground": Motion(5.0, 1.0),
+    "ground": Motion(5.0, 2.0),
     "air": Motion(10.0, 2.0),
     "surface": Motion(4.0, 0.4),
     "subsurface": Motion(1.5, 0.25),
 }
-"""By domain. Real ArduRovers brake with 1 m/s²."""
+"""By domain."""
 
 
 MAX_RANGE_M = 100_000.0

@@ -132,7 +132,7 @@ async def done(control: MissionControl, mission: bytes) -> BehaviorEnded:
 def test_members_keep_apart(tmp_path: Path, team: str) -> None:
     with running(tmp_path) as found:
         fleet = rovers.write_fleet(tmp_path, found.urls)
-        drives = rovers.drives(team, "4 m/s")
+        drives = rovers.drives(team)
         ended = commanded(fleet, lambda control: done(control, drives))
         assert ended.state == "SUCCEEDED", ended
     rovers.check(team, found.tracks)
