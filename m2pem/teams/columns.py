@@ -194,7 +194,12 @@ class _Way:
             nearest_m = min(math.dist(place, end) for end in ends)
             radius_m = min(_AROUND_SHARE * spacing_m, nearest_m - _SAME_PLACE_M)
             discs.append(shapely.Point(place).buffer(radius_m))
-        self._around = keep_out(discs, context.fence, context.frame)
+        within = context.fence
+        # A route that leaves the fence is refused by the arbiters, and not led around its holes.
+        if within is not None:
+            track = [each[:2] for each in self.lane.places]
+            within = None if Fence(within, frame=context.frame).leaves(track) else within
+        self._around = keep_out(discs, within, context.frame)
         self._end_at(self._mark_m)
 
     def marcher(self, motion: Motion, *, begins: bool = True) -> Marcher:

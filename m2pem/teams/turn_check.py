@@ -20,8 +20,8 @@ from m2pem.teams.plan import PlanningContext, TeamRefusedError
 
 
 def check_turns(mission: Mission, fleet: Fleet) -> Iterator[Finding]:
-    """Yield a warning for each route that brings members of a team too near to each other, and an
-    error for each member that leaves the fleet's fence beside a route that does not."""
+    """Yield a warning for each route that brings members of a team too near to each other, and for
+    each member that would leave the fleet's fence beside a route that does not."""
     for task, behavior in mission.commands():
         if behavior.type is BehaviorType.TEAM and behavior.name in SHAPES:
             context = _context(behavior, mission, fleet)
@@ -76,6 +76,7 @@ def _add_breaches(
                 "move the route away from there, take a smaller `spacing` or another `shape`, or "
                 "widen the fleet's `fence`",
                 line=behavior.line,
+                severity=Severity.WARNING,  # where the members will begin is not known
                 place=breach.place,
             )
 

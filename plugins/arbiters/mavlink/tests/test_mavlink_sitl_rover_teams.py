@@ -1,4 +1,4 @@
-"""Teams of three real ArduRovers, each in a program of its own, and one within a fence with a hole:
+"""Teams of three real ArduRovers, each in its own program, and one within a fence with a hole:
 judged by what the rovers say of themselves to another ground station, which commands nothing."""
 
 import asyncio
