@@ -111,7 +111,9 @@ def test_an_executive_that_is_killed_as_it_starts_a_mission_starts_it_once(
 ) -> None:
     dying = install_plugin(tmp_path, "dying", DYING)
     server = serving(m2pem, "--speed", SPEED, environment={"DIE_AT": place, **dying})
-    assert m2pem.run("start", MISSION, *JOURNAL, "--when", "free")[:2] == (0, "s1\n")
+    # The executive may be killed before its answer is sent.
+    answered = m2pem.run("start", MISSION, *JOURNAL, "--when", "free")[:2]
+    assert answered in ((0, "s1\n"), (1, ""))
     assert server.process.wait() == -9
     again = serving(m2pem, "--speed", SPEED)
     while "asks" not in m2pem.run("replay", run, *JOURNAL)[1]:

@@ -139,12 +139,15 @@ class TcpServer:
         self.ends: list[FarEnd] = []
 
     async def open(self, port: int = 0) -> int:
-        def make() -> FarEnd:
-            self.ends.append(FarEnd())
-            return self.ends[-1]
+        ends = self.ends
+
+        class Accepted(FarEnd):
+            def connection_made(self, transport: Any) -> None:
+                super().connection_made(transport)
+                ends.append(self)
 
         loop = asyncio.get_running_loop()
-        self._server = await loop.create_server(make, "127.0.0.1", port)
+        self._server = await loop.create_server(Accepted, "127.0.0.1", port)
         opened: int = self._server.sockets[0].getsockname()[1]
         return opened
 

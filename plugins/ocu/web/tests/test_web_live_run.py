@@ -88,6 +88,7 @@ def test_a_stop_says_in_which_instance_it_is_and_which_vehicles_are_next() -> No
             "condition": "",
             "process": P,
             "element": "Drive",
+            "token": 4,
             "scope": 3,
             "instance": None,
             "within": [{"process": P, "element": "Each", "instance": 1}],
