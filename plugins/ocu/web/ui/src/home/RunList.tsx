@@ -170,7 +170,7 @@ interface FiltersProps {
 function Filters({ query, change }: FiltersProps) {
   const typing = useRef<ReturnType<typeof setTimeout>>();
   return (
-    <div class="home-filters" role="search">
+    <div class="home-filters" role="search" aria-label={texts.find}>
       <input
         type="search"
         aria-label={texts.find}

@@ -36,7 +36,7 @@ export function ScheduleList() {
       <div class="home-head">
         <h1 id="schedule-head">{words.title}</h1>
         {entries.length > FEW && (
-          <div class="home-filters" role="search">
+          <div class="home-filters" role="search" aria-label={words.find}>
             <input
               type="search"
               aria-label={words.find}
