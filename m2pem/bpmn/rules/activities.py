@@ -2,146 +2,120 @@
 
 from lxml import etree
 
-from m2pem.bpmn.rules.rule import Rule, error, warning
+from m2pem.bpmn.rules.rule import Rule, family
 from m2pem.bpmn.rules.tree import Check, Checks, Tree, children, has, is_true, names, texts
+
+error, warning = family("10.3.1")
 
 BAD_SCRIPT = error(
     202,
-    "bad-script",
     "a script is neither statements nor a behavior",
     "see missions.md",
 )
 SCRIPT_LANGUAGE = error(
     203,
-    "script-language",
     "a script is in a language that m2pem does not run",
     "write statements",
 )
 MAPPING_SOURCE = error(
     215,
-    "mapping-source",
     "a mapping of a call activity has no source",
     'write a name or an expression, for example source="mission.speed"',
 )
 PASSES_EVERYTHING = error(
     216,
-    "passes-everything",
     "a call activity passes all its data",
     "list each value",
 )
 FOREIGN_FORM = warning(
     316,
-    "foreign-form",
     "a form of Camunda's is not shown to operators",
     "write the question as m2pem:prompt and m2pem:decision",
 )
 DECISION_VALUE = error(
     217,
-    "decision-value",
     "a decision has no value, or that of another",
     "give each its own value",
 )
 AMBIGUOUS_CALL = error(
     223,
-    "ambiguous-call",
     "several files have the process that a call activity names",
     "name the file's namespace in calledElement, or take one out of the search path",
 )
 EMPTY_SCRIPT = warning(
     302,
-    "empty-script",
     "a script task has no script",
     "give it a behavior, or make it a plain task",
 )
 CALL_RECURSION = warning(
     310,
-    "call-recursion",
     "a process can call itself",
     "make sure that a decision before the call can end it",
 )
 START_QUANTITY = error(
     10301,
-    "start-quantity",
     "startQuantity is no whole number from 1",
     "write how many tokens begin the activity, or delete it",
-    "10.3",
+    clause="10.3",
 )
 COMPLETION_QUANTITY = error(
     10302,
-    "completion-quantity",
     "completionQuantity is no whole number from 1",
     "write how many tokens leave the activity, or delete it",
-    "10.3",
+    clause="10.3",
 )
 NO_CALLED_ELEMENT = error(
     10321,
-    "no-called-element",
     "a call activity does not say what it calls",
     "name a process in calledElement",
-    "10.3.6",
+    clause="10.3.6",
 )
 
 RESOURCE_NAME = warning(
     8461,
-    "resource-name",
     "the resource has no name",
     "give it the name by which it is known",
-    "8.4.12",
+    clause="8.4.12",
 )
 RESOURCE_PARAMETER_NAME = warning(
     8462,
-    "resource-parameter-name",
     "the resource's parameter has no name",
     "give the resourceParameter a name",
-    "8.4.12",
+    clause="8.4.12",
 )
-INTERFACE_NAME = warning(
-    8501, "interface-name", "the interface has no name", "give it a name", "8.5.1"
-)
+INTERFACE_NAME = warning(8501, "the interface has no name", "give it a name", clause="8.5.1")
 INTERFACE_OPERATIONS = warning(
     8502,
-    "interface-operations",
     "the interface has no operation",
     "add an operation, or delete the interface",
-    "8.5.1",
+    clause="8.5.1",
 )
-OPERATION_NAME = warning(
-    8503, "operation-name", "the operation has no name", "give it a name", "8.5.3"
-)
+OPERATION_NAME = warning(8503, "the operation has no name", "give it a name", clause="8.5.3")
 OPERATION_IN_MESSAGE = warning(
     8504,
-    "operation-in-message",
     "the operation's inMessageRef names no message",
     "name the message that the operation takes",
-    "8.5.3",
+    clause="8.5.3",
 )
 ROLE_NAMED_TWICE = warning(
     10304,
-    "role-named-twice",
     "the role has both a resourceRef and a resourceAssignmentExpression",
     "keep one of the two",
-    "10.3.1",
 )
 ROLE_BINDINGS = warning(
     10305,
-    "role-bindings",
     "the role binds parameters of a resource but names no resource",
     "add resourceRef, or delete the resourceParameterBinding",
-    "10.3.1",
 )
 ROLE_PARAMETER = warning(
     10306,
-    "role-parameter",
     "the role's parameterRef names no parameter of a resource",
     "name a resourceParameter",
-    "10.3.1",
 )
 ROLE_EXPRESSION = warning(
     10307,
-    "role-expression",
     "the role's resourceAssignmentExpression has no expression",
     "write the expression that says who it is",
-    "10.3.1",
 )
 
 
@@ -205,31 +179,27 @@ SERVICES = Checks(
 
 SERVICE_DATA = warning(
     10312,
-    "service-data",
     "a service task must not have several input sets or output sets",
     "keep one inputSet and one outputSet",
-    "10.3.3",
+    clause="10.3.3",
 )
 SEND_DATA = warning(
     10313,
-    "send-data",
     "a send task must not have several data inputs or input sets",
     "keep the dataInput that the message is made of",
-    "10.3.3",
+    clause="10.3.3",
 )
 RECEIVE_DATA = warning(
     10314,
-    "receive-data",
     "a receive task must not have several data outputs or output sets",
     "keep the dataOutput that takes the message",
-    "10.3.3",
+    clause="10.3.3",
 )
 RECEIVE_BEGINS = error(
     10315,
-    "receive-begins",
     "a receive task that begins a process must not have an incoming flow",
     'delete the flow, or instantiate="true"',
-    "10.3.3",
+    clause="10.3.3",
 )
 
 

@@ -5,88 +5,72 @@ from collections.abc import Collection
 from lxml import etree
 
 from m2pem.bpmn.extensions import ATTRIBUTES
-from m2pem.bpmn.rules.rule import Rule, error, warning
+from m2pem.bpmn.rules.rule import Rule, family
 from m2pem.bpmn.rules.tree import Check, Checks, Tree, is_true, name_of, parent
 from m2pem.bpmn.schema import Shape, shape
 from m2pem.bpmn.xml import BPMN, a, attribute_names, kind, local
 from m2pem.suggestions import nearest, suggest_or
 
+error, warning = family("15.3")
+
 BAD_EXPRESSION = error(
     201,
-    "bad-expression",
     "a text is no expression of the condition language",
     "see conditions.md",
 )
 ELEMENT_ORDER = warning(
     15302,
-    "element-order",
     "an element comes after one that BPMN's schema has behind it",
     "move it up; some editors refuse the file",
-    "15.3",
 )
 UNKNOWN_ATTRIBUTE = warning(
     15303,
-    "unknown-attribute",
     "BPMN has no such attribute there",
     "delete it, or give it its namespace",
-    "15.3",
 )
 UNKNOWN_ELEMENT = warning(
     15304,
-    "unknown-element",
     "BPMN has no such element there (an error in a process, where it might be part of the flow)",
     "delete it, or give it its namespace",
-    "15.3",
 )
 BAD_VALUE = error(
     15308,
-    "bad-value",
     "the value of an attribute is none that it can have",
     "write one of its values",
-    "15.3",
 )
 MISSPELLED_ATTRIBUTE = warning(
     15309,
-    "misspelled-attribute",
     "BPMN has no such attribute there, but one with a name like it",
     "correct the name; until then the attribute has no effect",
-    "15.3",
 )
 
 ITEM_KIND = warning(
     8441,
-    "item-kind",
     "the item definition's itemKind is none that BPMN has",
     "write Information or Physical",
-    "8.4.10",
+    clause="8.4.10",
 )
 PROCESS_TYPE = warning(
     10101,
-    "process-type",
     "the process's type is none that BPMN has",
     "write None, Public or Private",
-    "10.1",
+    clause="10.1",
 )
 PUBLIC_EXECUTABLE = warning(
     10102,
-    "public-executable",
     "a public process must not be executable",
     'write processType="Private", or isExecutable="false"',
-    "10.1",
+    clause="10.1",
 )
 BAD_TRUTH = warning(
     15305,
-    "bad-truth",
     "an attribute without an effect on execution is neither true nor false",
     "write true or false",
-    "15.3",
 )
 REPEATED_ELEMENT = warning(
     15307,
-    "repeated-element",
     "the element appears here a second time",
     "keep one",
-    "15.3",
 )
 _TRUTHS = {
     "process": "isClosed isExecutable",

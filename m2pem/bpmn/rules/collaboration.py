@@ -5,7 +5,7 @@ BPMN 2.0.2, 7.6.3, 8.4.2, 9.3 to 9.5, 10.5 and 10.8.
 
 from lxml import etree
 
-from m2pem.bpmn.rules.rule import Rule, error, warning
+from m2pem.bpmn.rules.rule import Rule, family
 from m2pem.bpmn.rules.tree import (
     ACTIVITIES,
     CATCHING,
@@ -26,62 +26,48 @@ from m2pem.bpmn.rules.tree import (
 )
 from m2pem.bpmn.xml import BPMN, a, kind
 
+error, warning = family("8.4.2")
+
 RETRIEVAL_MESSAGE = error(
     8412,
-    "retrieval-message",
     "the retrieval expression's messageRef names no message",
     "name the message from which the value is read",
-    "8.4.2",
 )
 RETRIEVAL_PATH = error(
     8413,
-    "retrieval-path",
     "the retrieval expression has no messagePath",
     "write the expression that gives the value",
-    "8.4.2",
 )
 BINDING_PROPERTY = error(
     8417,
-    "binding-property",
     "the correlation binding's correlationPropertyRef names no correlation property",
     "name a correlationProperty in definitions",
-    "8.4.2",
 )
 BINDING_PATH = error(
     8418,
-    "binding-path",
     "the correlation binding has no dataPath",
     "write the expression that gives the value in the process",
-    "8.4.2",
 )
 
 CORRELATION_RETRIEVAL = warning(
     8411,
-    "correlation-retrieval",
     "the correlation property does not say where messages have its value",
     "add a correlationPropertyRetrievalExpression for each message",
-    "8.4.2",
 )
 CORRELATION_KEY_PROPERTIES = warning(
     8414,
-    "correlation-key-properties",
     "the correlation key has no properties",
     "add a correlationPropertyRef for each part of the key",
-    "8.4.2",
 )
 CORRELATION_KEY_PROPERTY = warning(
     8415,
-    "correlation-key-property",
     "the correlation key's correlationPropertyRef names no correlation property",
     "name a correlationProperty in definitions",
-    "8.4.2",
 )
 SUBSCRIPTION_KEY = warning(
     8416,
-    "subscription-key",
     "the correlation subscription's correlationKeyRef names no correlation key",
     "name a correlationKey of a collaboration or conversation",
-    "8.4.2",
 )
 _PROPERTY = names("correlationProperty")
 
@@ -117,59 +103,51 @@ CORRELATION = Checks(
 
 POOL_MINIMUM = warning(
     9301,
-    "pool-minimum",
     "the least number of participants must be a whole number from 0",
     "correct minimum; it has no effect on execution",
-    "9.3.1",
+    clause="9.3.1",
 )
 POOL_MAXIMUM = warning(
     9302,
-    "pool-maximum",
     "the greatest number of participants must be a whole number from 1, and not below the least",
     "correct maximum; it has no effect on execution",
-    "9.3.1",
+    clause="9.3.1",
 )
 PARTICIPANT_ASSOCIATION = warning(
     9306,
-    "participant-association",
     "a participant association must join two pools",
     "name a participant in innerParticipantRef and in outerParticipantRef",
-    "9.3.1",
+    clause="9.3.1",
 )
 MESSAGE_FLOW_ASSOCIATION = warning(
     9406,
-    "message-flow-association",
     "a message flow association must join two message flows",
     "name a messageFlow in innerMessageFlowRef and in outerMessageFlowRef",
-    "9.4.2",
+    clause="9.4.2",
 )
 CONVERSATION_PARTICIPANTS = warning(
     9501,
-    "conversation-participants",
     "a conversation must have two or more participants",
     "add a participantRef for each",
-    "9.5.1",
+    clause="9.5.1",
 )
 CONVERSATION_PARTICIPANT = warning(
     9502,
-    "conversation-participant",
     "the conversation's participantRef names no pool",
     "name a participant of the collaboration",
-    "9.5.1",
+    clause="9.5.1",
 )
 CONVERSATION_LINK_ENDS = warning(
     9503,
-    "conversation-link-ends",
     "a conversation link must join a conversation and a pool, activity or event",
     "name both in sourceRef and targetRef",
-    "9.5.6",
+    clause="9.5.6",
 )
 CONVERSATION_ASSOCIATION = warning(
     9504,
-    "conversation-association",
     "a conversation association must join two conversations",
     "name a conversation in innerConversationNodeRef and in outerConversationNodeRef",
-    "9.5.7",
+    clause="9.5.7",
 )
 _PARTICIPANT = names("participant")
 _CONVERSATIONS = names("conversation subConversation callConversation")
@@ -237,52 +215,45 @@ CHECKS = Checks(
 
 MESSAGE_FLOW_END = warning(
     9401,
-    "message-flow-end",
     "a message flow can join only pools, activities and events",
     "lead it to the activity or event that sends or receives",
-    "9.4",
+    clause="9.4",
 )
 MESSAGE_FLOW_INSIDE = warning(
     9402,
-    "message-flow-inside",
     "a message flow must not join two elements of one pool",
     "draw a sequence flow, or send the message from another pool",
-    "9.4",
+    clause="9.4",
 )
 MESSAGE_FLOW_FROM_CATCH = warning(
     7611,
-    "message-flow-from-catch",
     "a message flow must not lead out of an event that catches",
     "turn the flow round, or make the event one that throws",
-    "7.6.3",
+    clause="7.6.3",
 )
 MESSAGE_FLOW_INTO_THROW = warning(
     7612,
-    "message-flow-into-throw",
     "a message flow must not lead into an event that throws",
     "turn the flow round, or make the event one that catches",
-    "7.6.3",
+    clause="7.6.3",
 )
 MESSAGE_FLOW_INTO_OTHER = warning(
     10560,
-    "message-flow-into-other",
     "a message flow leads into an event that does not wait for a message",
     "give the event a messageEventDefinition, or delete the flow",
-    "10.5.2",
+    clause="10.5.2",
 )
 MESSAGE_FLOW_FROM_OTHER = warning(
     10561,
-    "message-flow-from-other",
     "a message flow leads out of an event that does not send a message",
     "give the event a messageEventDefinition, or delete the flow",
-    "10.5.3",
+    clause="10.5.3",
 )
 MESSAGE_FLOW_MESSAGE = warning(
     9403,
-    "message-flow-message",
     "the message flow carries another message than its end sends or receives",
     "name the same message in both",
-    "9.4",
+    clause="9.4",
 )
 _ENDS = ACTIVITIES | EVENTS | names("participant conversation subConversation callConversation")
 
@@ -338,24 +309,21 @@ MESSAGE_FLOWS = Checks({"messageFlow": _flow})
 
 LANE_NODE_TWICE = warning(
     10801,
-    "lane-node-twice",
     "an element is in two lanes of one lane set",
     "keep it in one",
-    "10.8",
+    clause="10.8",
 )
 LANE_OTHER_PROCESS = warning(
     10802,
-    "lane-other-process",
     "the lane lists an element of another process",
     "list elements of its own process only",
-    "10.8",
+    clause="10.8",
 )
 LANE_NO_NODE = warning(
     10803,
-    "lane-no-node",
     "the lane lists what is no activity, gateway or event",
     "delete the flowNodeRef",
-    "10.8",
+    clause="10.8",
 )
 
 

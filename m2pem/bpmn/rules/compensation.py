@@ -3,7 +3,7 @@
 from lxml import etree
 
 from m2pem.bpmn.rules.references import DANGLING_REFERENCE
-from m2pem.bpmn.rules.rule import error, warning
+from m2pem.bpmn.rules.rule import family
 from m2pem.bpmn.rules.tree import (
     ACTIVITIES,
     CATCHING,
@@ -22,103 +22,83 @@ from m2pem.bpmn.rules.tree import (
 )
 from m2pem.bpmn.xml import BPMN
 
+error, warning = family("10.7.1")
+
 COMPENSATED_ACTIVITY = error(
     10535,
-    "compensated-activity",
     "activityRef names no activity",
     "name the activity that is to be compensated, or delete it to compensate all",
-    "10.5.5",
+    clause="10.5.5",
 )
 COMPENSATED_ELSEWHERE = error(
     10708,
-    "compensated-elsewhere",
     "the activity to be compensated is not in the scope of the event",
     "throw it in the scope of the activity, or in an event subprocess there",
-    "10.7.2",
+    clause="10.7.2",
 )
 COMPENSATED_WITHOUT_HANDLER = warning(
     10537,
-    "compensated-without-handler",
     "the activity to be compensated has nothing that compensates it",
     "attach a compensation boundary event with a handler to it",
-    "10.5.4",
+    clause="10.5.4",
 )
 COMPENSATION_CATCH_ACTIVITY = warning(
     10538,
-    "compensation-catch-activity",
     "an event that catches compensation must not name an activity: its place determines it",
     "delete activityRef",
-    "10.5.5",
+    clause="10.5.5",
 )
 COMPENSATION_BOUNDARY_FLOW = error(
     10518,
-    "compensation-boundary-flow",
     "a compensation boundary event must not have an outgoing sequence flow",
     "draw an association to the activity that compensates",
-    "10.5.4",
+    clause="10.5.4",
 )
 COMPENSATION_BOUNDARY_NOT_INTERRUPTING = warning(
     10522,
-    "compensation-boundary-not-interrupting",
     "cancelActivity has no meaning on a compensation boundary event: its activity has completed",
     'delete cancelActivity="false"',
-    "10.5.4",
+    clause="10.5.4",
 )
 HANDLER_INCOMING = error(
     10701,
-    "handler-incoming",
     "a compensation activity must not have an incoming flow",
     "delete the flow; an association from a compensation boundary event leads to it",
-    "10.7.1",
 )
 HANDLER_OUTGOING = error(
     10702,
-    "handler-outgoing",
     "a compensation activity must not have an outgoing flow",
     "delete the flow; put what follows into a subprocess for compensation",
-    "10.7.1",
 )
 HANDLER_UNUSED = warning(
     10703,
-    "handler-unused",
     "no compensation boundary event leads to the compensation activity",
     "draw an association to it, or delete isForCompensation",
-    "10.7.1",
 )
 COMPENSATION_WITHOUT_HANDLER = warning(
     10704,
-    "compensation-without-handler",
     "the compensation boundary event leads to no activity that compensates",
     "draw an association from it to one",
-    "10.7.1",
 )
 TWO_HANDLERS = warning(
     10705,
-    "two-handlers",
     "the compensation boundary event leads to several activities",
     "put them into one subprocess for compensation",
-    "10.7.1",
 )
 TWO_COMPENSATION_EVENTS = warning(
     10709,
-    "two-compensation-events",
     "the activity has several compensation boundary events; the first counts",
     "keep one of them",
-    "10.7.1",
 )
 HANDLER_NOT_MARKED = warning(
     10706,
-    "handler-not-marked",
     "the activity that compensates is not marked as such",
     'add isForCompensation="true" to it',
-    "10.7.1",
 )
 HANDLER_ELSEWHERE = error(
     10707,
-    "handler-elsewhere",
     "the activity that compensates is in another process or subprocess",
     "put it beside the activity whose work it undoes",
-    "10.7.1",
 )
 
 _BOUNDARY = names("boundaryEvent")

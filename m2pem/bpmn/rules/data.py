@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from lxml import etree
 
 from m2pem.bpmn.rules.references import ITEMS
-from m2pem.bpmn.rules.rule import Rule, error, warning
+from m2pem.bpmn.rules.rule import Rule, family
 from m2pem.bpmn.rules.tree import (
     SUBPROCESSES,
     Check,
@@ -21,154 +21,118 @@ from m2pem.bpmn.rules.tree import (
     texts,
 )
 
+error, warning = family("10.4.1")
+
 BAD_KEY = error(
     214,
-    "bad-key",
     "a name is none of the data store",
     "write a dotted name",
 )
 ASSOCIATION_IGNORED = warning(
     306,
-    "association-ignored",
     "a data association of a call activity passes nothing",
     'use <m2pem:in source="a.b" target="x"/> or <m2pem:out .../>',
 )
 UNWRITTEN_NAME = warning(
     307,
-    "unwritten-name",
     "a name is read that nothing writes",
     "write it before, or pass it in",
 )
 MIXED_KINDS = warning(
     319,
-    "mixed-kinds",
     "an expression compares or computes kinds that do not go together",
     "write number(x) or text(x)",
 )
 OTHER_VALUE = warning(
     320,
-    "other-value",
     "an expression has another value than in earlier versions, as its language says",
     "write number(x) or text(x)",
 )
 EMPTY_ASSIGNMENT = warning(
     311,
-    "empty-assignment",
     "an assignment's 'from' is empty",
     "write what it assigns, or delete it",
 )
 BAD_ASSIGNMENT = error(
     10424,
-    "bad-assignment",
     "an assignment of a data association lacks from or to",
     "write <assignment><from>expression</from><to>name</to></assignment>",
-    "10.4.1",
 )
 
 DATA_REFERENCE_OBJECT = warning(
     10401,
-    "data-reference-object",
     "the data object reference names no data object",
     "add dataObjectRef",
-    "10.4.1",
 )
 DATA_REFERENCE_ITEM = warning(
     10402,
-    "data-reference-item",
     "a data object reference must not have an item definition of its own",
     "move itemSubjectRef to the data object",
-    "10.4.1",
 )
 DATA_OBJECT_STATE = warning(
     10403,
-    "data-object-state",
     "a data object must not have a state; references to it can",
     "move dataState to a data object reference",
-    "10.4.1",
 )
 COLLECTION_MISMATCH = warning(
     10405,
-    "collection-mismatch",
     "isCollection is not what the item definition says",
     "write the same in both",
-    "10.4.1",
 )
 STORE_CAPACITY = warning(
     10406,
-    "store-capacity",
     "the data store's capacity is no whole number",
     "write a number, or delete it",
-    "10.4.1",
 )
 NO_INPUT_SET = warning(
     10407,
-    "no-input-set",
     "the ioSpecification has no input set",
     "add an inputSet with the data inputs that are needed; it may be empty",
-    "10.4.1",
 )
 NO_OUTPUT_SET = warning(
     10408,
-    "no-output-set",
     "the ioSpecification has no output set",
     "add an outputSet with the data outputs that are made; it may be empty",
-    "10.4.1",
 )
 INPUT_IN_NO_SET = warning(
     10409,
-    "input-in-no-set",
     "the data input is in no input set",
     "add dataInputRefs with its id to an inputSet",
-    "10.4.1",
 )
 OUTPUT_IN_NO_SET = warning(
     10410,
-    "output-in-no-set",
     "the data output is in no output set",
     "add dataOutputRefs with its id to an outputSet",
-    "10.4.1",
 )
 INPUT_SET_REFERENCE = warning(
     10411,
-    "input-set-reference",
     "the input set names no data input",
     "name a dataInput of the same ioSpecification or event",
-    "10.4.1",
 )
 OUTPUT_SET_REFERENCE = warning(
     10412,
-    "output-set-reference",
     "the output set names no data output",
     "name a dataOutput of the same ioSpecification or event",
-    "10.4.1",
 )
 OPTIONAL_INPUT = warning(
     10413,
-    "optional-input",
     "an optional data input is not among the set's dataInputRefs",
     "add it to dataInputRefs, too",
-    "10.4.1",
 )
 OPTIONAL_OUTPUT = warning(
     10414,
-    "optional-output",
     "an optional data output is not among the set's dataOutputRefs",
     "add it to dataOutputRefs, too",
-    "10.4.1",
 )
 PAIRED_SET = warning(
     10415,
-    "paired-set",
     "the set is paired with a set that does not exist",
     "name an outputSet in outputSetRefs, an inputSet in inputSetRefs",
-    "10.4.1",
 )
 SUBPROCESS_DATA = warning(
     10416,
-    "subprocess-data",
     "a subprocess must not have data inputs and outputs of its own",
     "use data objects of the process around it",
-    "10.4.1",
 )
 
 
@@ -261,52 +225,39 @@ CHECKS = Checks(
 
 DATA_ASSOCIATION_TARGET = warning(
     10421,
-    "data-association-target",
     "the data association has no targetRef",
     "name the data that it writes",
-    "10.4.1",
 )
 DATA_ASSOCIATION_END = warning(
     10422,
-    "data-association-end",
     "an end of the data association names no data",
     "name a data object, store, property, data input or data output",
-    "10.4.1",
 )
 DATA_ASSOCIATION_SOURCES = warning(
     10423,
-    "data-association-sources",
     "a data association with several sources must have a transformation",
     "keep one sourceRef, or add a transformation",
-    "10.4.1",
 )
 PROCESS_INPUT_WRITTEN = warning(
     10425,
-    "process-input-written",
     "a data association must not write a data input of its process; the caller does",
     "write a data object instead",
-    "10.4.1",
 )
 PROCESS_OUTPUT_READ = warning(
     10426,
-    "process-output-read",
     "a data association must not read a data output of its process; the caller does",
     "read a data object instead",
-    "10.4.1",
 )
 DATA_ASSOCIATION_ITEMS = warning(
     10427,
-    "data-association-items",
     "a data association without a transformation must join data of one structure",
     "give both ends an item definition of the same structureRef, or add a transformation",
-    "10.4.1",
 )
 IO_BINDING = warning(
     10323,
-    "io-binding",
     "the ioBinding lacks an operation, an input or an output",
     "name an operation of an interface, an inputSet and an outputSet of the process",
-    "10.3.6",
+    clause="10.3.6",
 )
 
 

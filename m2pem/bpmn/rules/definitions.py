@@ -2,101 +2,87 @@
 
 from lxml import etree
 
-from m2pem.bpmn.rules.rule import error, warning
+from m2pem.bpmn.rules.rule import family
 from m2pem.bpmn.rules.tree import Checks, Tree, is_true, texts, what
 from m2pem.bpmn.xml import BPMN, kind
 
+error, warning = family("8.3.1")
+
 MISSING_ID = warning(
     8301,
-    "missing-id",
     "an element that others could refer to has no id; m2pem makes one up",
     "give it an id that nothing else in the file has, so that others can name it",
-    "8.3.1",
 )
 DUPLICATE_ID = error(
     8302,
-    "duplicate-id",
     "two elements have the same id",
     "give one of the two another id, and its references too",
-    "8.3.1",
 )
 
 NO_TARGET_NAMESPACE = warning(
     8201,
-    "no-target-namespace",
     "definitions has no targetNamespace",
     'add one, for example targetNamespace="urn:my-missions"',
-    "8.2.1",
+    clause="8.2.1",
 )
 IMPORT_TYPE = warning(
     8202,
-    "import-type",
     "the import does not say of which type the imported file is",
     "add importType with the namespace of the file's format",
-    "8.2.2",
+    clause="8.2.2",
 )
 IMPORT_NAMESPACE = warning(
     8203,
-    "import-namespace",
     "the import does not say which namespace it imports",
     "add the targetNamespace of the imported file as namespace",
-    "8.2.2",
+    clause="8.2.2",
 )
 DUPLICATE_INNER_ID = warning(
     8303,
-    "duplicate-inner-id",
     "the id is also that of another element",
     "give one of the two another id",
-    "8.3.1",
 )
 EXTENSION_NOT_UNDERSTOOD = warning(
     8304,
-    "extension-not-understood",
     "the file says that an extension must be understood, and m2pem does not know it",
     'write mustUnderstand="false" if the mission means the same without it',
-    "8.3.3",
+    clause="8.3.3",
 )
 RELATIONSHIP_TYPE = warning(
     8305,
-    "relationship-type",
     "the relationship has no type",
     "add the type, or delete the relationship",
-    "8.3.4",
+    clause="8.3.4",
 )
 RELATIONSHIP_ENDS = warning(
     8306,
-    "relationship-ends",
     "the relationship lacks a source or a target",
     "add source and target, or delete the relationship",
-    "8.3.4",
+    clause="8.3.4",
 )
 RELATIONSHIP_DIRECTION = warning(
     8307,
-    "relationship-direction",
     "the relationship's direction is none that BPMN has",
     "write None, Forward, Backward or Both",
-    "8.3.4",
+    clause="8.3.4",
 )
 ASSOCIATION_END = warning(
     8401,
-    "association-end",
     "the association lacks a sourceRef or a targetRef",
     "add what it joins, or delete it",
-    "8.4.1",
+    clause="8.4.1",
 )
 ASSOCIATION_NOWHERE = warning(
     8402,
-    "association-nowhere",
     "an end of the association names nothing",
     "name an element of the file, or delete the association",
-    "8.4.1",
+    clause="8.4.1",
 )
 ASSOCIATION_DIRECTION = warning(
     8403,
-    "association-direction",
     "the association's direction is none that BPMN has",
     "write None, One or Both",
-    "8.4.1",
+    clause="8.4.1",
 )
 
 _INNER = (

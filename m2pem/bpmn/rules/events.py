@@ -2,7 +2,7 @@
 
 from lxml import etree
 
-from m2pem.bpmn.rules.rule import Rule, error, warning
+from m2pem.bpmn.rules.rule import Rule, family
 from m2pem.bpmn.rules.tree import (
     SUBPROCESSES,
     THROWING,
@@ -21,229 +21,187 @@ from m2pem.bpmn.rules.tree import (
 )
 from m2pem.bpmn.xml import BPMN, a, kind
 
+error, warning = family("10.5.4")
+
 OUTSIDE_ONLY = warning(
     308,
-    "outside-only",
     "what is awaited only the outside can send",
     'mark it m2pem:from="operator"',
 )
 TYPED_START_IN_SUBPROCESS = error(
     10331,
-    "typed-start-in-subprocess",
     "a start event in an embedded subprocess waits for something",
     "use a plain start event, and a catching intermediate event after it",
-    "10.3.5",
+    clause="10.3.5",
 )
 EVENT_NOT_ALLOWED = error(
     10387,
-    "event-not-allowed",
     "a multi-instance activity throws by itself what it cannot",
     "let it throw a message, signal, escalation, error or compensation",
-    "10.3.8",
+    clause="10.3.8",
 )
 NO_TRIGGER = error(
     10507,
-    "no-trigger",
     "a catching intermediate event, a boundary event or the start event of an event subprocess "
     "has no trigger",
     "give it an event definition",
-    "10.5.4",
 )
 ERROR_NOT_INTERRUPTING = error(
     10508,
-    "error-not-interrupting",
     "a boundary or start event that catches an error does not interrupt",
     "make it interrupting, or throw and catch an escalation",
-    "10.5.4",
 )
 BAD_ATTACHMENT = error(
     10519,
-    "bad-attachment",
     "a boundary event is attached to no activity beside it",
     "attach it to an activity of the same process or subprocess",
-    "10.5.4",
 )
 TIMER_TIME = error(
     10531,
-    "timer-time",
     "a timer has no time, several, or one that is no ISO 8601",
     "give it one timeDuration, timeDate or timeCycle",
-    "10.5.5",
+    clause="10.5.5",
 )
 MISSING_REFERENCE = warning(
     10532,
-    "missing-reference",
     "an event or task names no message, signal, error or escalation",
     "add messageRef, signalRef, errorRef or escalationRef",
-    "10.5.5",
+    clause="10.5.5",
 )
 NO_CONDITION = error(
     10533,
-    "no-condition",
     "a conditional event has no condition",
     "add one, for example <condition>battery.level &lt; 20</condition>",
-    "10.5.5",
+    clause="10.5.5",
 )
 LINK_NAME = error(
     10541,
-    "link-name",
     "a link event has no name",
     'name it: <linkEventDefinition name="A"/>, and the other end alike',
-    "10.5.5",
+    clause="10.5.5",
 )
 DANGLING_LINK = error(
     10542,
-    "dangling-link",
     "no catching link event has the name of a throwing one",
     "add a catching intermediate event with a link of this name",
-    "10.5.4",
 )
 DUPLICATE_LINK = error(
     10543,
-    "duplicate-link",
     "two catching link events have the same name",
     "give it another name, or lead the sources to one of the two",
-    "10.5.4",
 )
 LINK_THROW_OUTGOING = error(
     10545,
-    "link-throw-outgoing",
     "a sequence flow leads out of a throwing link event",
     "let it begin at what follows the link target",
-    "10.5.4",
 )
 LINK_CATCH_INCOMING = error(
     10546,
-    "link-catch-incoming",
     "a sequence flow leads into a catching link event",
     "lead it to what follows the link target",
-    "10.5.4",
 )
 LINK_CROSSES_BORDER = error(
     10547,
-    "link-crosses-border",
     "a link leads out of its process or subprocess",
     "put both of its ends into the same process or subprocess",
-    "10.5.5",
+    clause="10.5.5",
 )
 
 START_TRIGGER = error(
     10501,
-    "start-trigger",
     "a process can begin only plainly, or by a message, timer, condition or signal",
     "give the start event one of these triggers, or none",
-    "10.5.2",
+    clause="10.5.2",
 )
 EVENT_SUBPROCESS_START_TRIGGER = error(
     10502,
-    "event-subprocess-start-trigger",
     "an event subprocess can begin only by a message, timer, escalation, error, compensation, "
     "condition or signal",
     "give its start event one of these triggers",
-    "10.5.2",
+    clause="10.5.2",
 )
 END_RESULT = error(
     10503,
-    "end-result",
     "an end event can result only in a message, error, escalation, cancellation, compensation, "
     "signal or termination, or in nothing",
     "give it one of these results, or none",
-    "10.5.3",
+    clause="10.5.3",
 )
 CATCH_TRIGGER = error(
     10504,
-    "catch-trigger",
     "an intermediate event in the flow can wait only for a message, timer, condition, link or "
     "signal",
     "give it one of these triggers, or attach it to an activity",
-    "10.5.4",
 )
 THROW_RESULT = error(
     10505,
-    "throw-result",
     "an intermediate event can throw only a message, escalation, link, compensation or signal",
     "give it one of these results, or none; or make it an end event",
-    "10.5.4",
 )
 BOUNDARY_TRIGGER = error(
     10506,
-    "boundary-trigger",
     "a boundary event can wait only for a message, timer, escalation, error, cancellation, "
     "compensation, condition or signal",
     "give it one of these triggers",
-    "10.5.4",
 )
 NOT_INTERRUPTING_ELSEWHERE = warning(
     10511,
-    "not-interrupting-elsewhere",
     "isInterrupting has no meaning on this start event, which is in no event subprocess",
     "delete it",
-    "10.5.2",
+    clause="10.5.2",
 )
 PARALLEL_MULTIPLE = warning(
     10512,
-    "parallel-multiple",
     "an event with parallelMultiple must have several triggers",
     "add event definitions, or delete parallelMultiple",
-    "10.5.1",
+    clause="10.5.1",
 )
 START_WITHOUT_END = warning(
     10513,
-    "start-without-end",
     "it has a start event and no end event",
     "add an end event to each path",
-    "10.5.3",
+    clause="10.5.3",
 )
 END_WITHOUT_START = warning(
     10514,
-    "end-without-start",
     "it has an end event and no start event",
     "add a start event",
-    "10.5.2",
+    clause="10.5.2",
 )
 START_WITHOUT_FLOW = warning(
     10515,
-    "start-without-flow",
     "no sequence flow leads out of the start event",
     "draw one to what comes first",
-    "10.5.2",
+    clause="10.5.2",
 )
 INTERMEDIATE_WITHOUT_FLOW = warning(
     10516,
-    "intermediate-without-flow",
     "no sequence flow leads out of the intermediate event",
     "draw one to what follows, or make it an end event",
-    "10.5.4",
 )
 BOUNDARY_WITHOUT_FLOW = warning(
     10517,
-    "boundary-without-flow",
     "no sequence flow leads out of the boundary event",
     "draw one to what follows when it is triggered",
-    "10.5.4",
 )
 
 INTERMEDIATE_WITHOUT_INCOMING = warning(
     10520,
-    "intermediate-without-incoming",
     "no sequence flow leads into the intermediate event; it happens when its process begins",
     "draw one from what comes before",
-    "10.5.4",
 )
 COMPENSATION_NOT_INTERRUPTING = warning(
     10521,
-    "compensation-not-interrupting",
     "the start event of a compensation event subprocess cannot be non-interrupting",
     'delete isInterrupting="false"; what it compensates has ended',
-    "10.5.2",
+    clause="10.5.2",
 )
 
 SUBPROCESS_STARTS = warning(
     13301,
-    "subprocess-starts",
     "an embedded subprocess must not have several start events; each gets a token",
     "keep one, with a parallel gateway after it if both paths are meant",
-    "13.3.4",
+    clause="13.3.4",
 )
 
 
@@ -367,45 +325,39 @@ CHECKS = Checks(
 
 THROWN_ERROR_CODE = warning(
     8422,
-    "thrown-error-code",
     "the error that is thrown has no errorCode",
     "add errorCode to the error; until then its id is its code",
-    "8.4.3",
+    clause="8.4.3",
 )
 THROWN_ESCALATION_CODE = warning(
     8432,
-    "thrown-escalation-code",
     "the escalation that is thrown has no escalationCode",
     "add escalationCode to the escalation; until then its id is its code",
-    "8.4.4",
+    clause="8.4.4",
 )
 CANCEL_END_PLACE = error(
     10549,
-    "cancel-end-place",
     "a cancel end event may be only in a transaction",
     "make what is around it a transaction, or use an error or terminate end event",
-    "10.5.5",
+    clause="10.5.5",
 )
 CANCEL_BOUNDARY_PLACE = error(
     10550,
-    "cancel-boundary-place",
     "a cancel boundary event can be attached only to a transaction",
     "make the activity a transaction, or catch an error",
-    "10.5.5",
+    clause="10.5.5",
 )
 CANCEL_NOT_INTERRUPTING = error(
     10551,
-    "cancel-not-interrupting",
     "a cancel boundary event must interrupt the transaction",
     'delete cancelActivity="false"',
-    "10.5.5",
+    clause="10.5.5",
 )
 CANCEL_UNCAUGHT = warning(
     10552,
-    "cancel-uncaught",
     "no boundary event of the transaction catches the cancellation; its token ends there",
     "attach a cancel boundary event to the transaction",
-    "10.5.6",
+    clause="10.5.6",
 )
 
 

@@ -25,32 +25,27 @@ from m2pem.suggestions import suggest_or
 
 WRONG_NAMESPACE = error(
     218,
-    "wrong-namespace",
     "a prefix or namespace is like m2pem's, but is not",
     "see extensions.md",
 )
 MISPLACED_EXTENSION = warning(
     304,
-    "misplaced-extension",
     "an m2pem: name has no effect in this place",
     "move it, or delete it",
 )
 UNKNOWN_EXTENSION = error(
     305,
-    "unknown-extension",
     "m2pem has no such element or attribute",
     "correct it, or delete it",
 )
 FOREIGN_EXTENSION = warning(
     312,
-    "foreign-extension",
     "another program's extension elements have no effect here",
     "see extensions.md",
 )
 
 FOREIGN_EFFECT = warning(
     317,
-    "foreign-effect",
     "another engine's element or attribute changes what is executed there, and has no effect here",
     "see missions.md",
 )

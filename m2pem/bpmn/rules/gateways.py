@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from lxml import etree
 
 from m2pem.bpmn.rules.attributes import BAD_VALUE
-from m2pem.bpmn.rules.rule import error, warning
+from m2pem.bpmn.rules.rule import family
 from m2pem.bpmn.rules.sequence_flows import CONDITION_IGNORED, CONDITION_NOT_ALLOWED
 from m2pem.bpmn.rules.tree import (
     GATEWAYS,
@@ -22,68 +22,60 @@ from m2pem.bpmn.rules.tree import (
 )
 from m2pem.bpmn.xml import a, kind, local
 
+error, warning = family("10.6.6")
+
 NO_CONDITIONS = warning(
     309,
-    "no-conditions",
     "no flow out of a gateway has a condition",
     "give the flows conditions",
 )
 INCOMPLETE_CONDITIONS = warning(
     315,
-    "incomplete-conditions",
     "a gateway without a default may find none of its flows' conditions true",
     "draw a default flow, or cover the case",
 )
 NO_ACTIVATION_CONDITION = warning(
     10605,
-    "no-activation-condition",
     "a complex gateway does not say when it is activated",
     "add one, for example <activationCondition>activationCount >= 2</activationCondition>",
-    "10.6.5",
+    clause="10.6.5",
 )
 PARALLEL_EVENT_GATEWAY = error(
     10618,
-    "parallel-event-gateway",
     "an event-based gateway that does not begin a process cannot be parallel",
     'add instantiate="true" where it has no incoming flow; else fork with a parallel '
     "gateway, and wait for one event on each branch",
-    "10.6.6",
 )
 
 GATEWAY_DIRECTION = warning(
     8491,
-    "gateway-direction",
     "the gateway's direction is none that BPMN has",
     "write Unspecified, Converging, Diverging or Mixed",
-    "8.4.9",
+    clause="8.4.9",
 )
 IDLE_GATEWAY = warning(
     10601,
-    "idle-gateway",
     "the gateway neither merges nor splits",
     "draw several flows to it or from it, or delete it",
-    "10.6.1",
+    clause="10.6.1",
 )
 NOT_CONVERGING = warning(
     10602,
-    "not-converging",
     "a converging gateway must have several incoming flows and at most one outgoing flow",
     "correct its gatewayDirection; the flows count",
-    "10.6.1",
+    clause="10.6.1",
 )
 NOT_DIVERGING = warning(
     10603,
-    "not-diverging",
     "a diverging gateway must have at most one incoming flow and several outgoing flows",
     "correct its gatewayDirection; the flows count",
-    "10.6.1",
+    clause="10.6.1",
 )
 NOT_MIXED = warning(
     10604,
-    "not-mixed",
     "a mixed gateway must have several incoming and several outgoing flows",
     "correct its gatewayDirection; the flows count",
-    "10.6.1",
+    clause="10.6.1",
 )
 
 
@@ -110,67 +102,49 @@ CHECKS = Checks(dict.fromkeys(map(local, GATEWAYS), _gateway))
 
 EVENT_GATEWAY_BRANCHES = error(
     10611,
-    "event-gateway-branches",
     "an event-based gateway must have two or more outgoing flows",
     "lead a flow from it to each event that it waits for",
-    "10.6.6",
 )
 EVENT_GATEWAY_TARGET = error(
     10612,
-    "event-gateway-target",
     "an event-based gateway can lead only to catching intermediate events and receive tasks",
     "put an event between the two, or use another gateway",
-    "10.6.6",
 )
 EVENT_GATEWAY_TRIGGER = error(
     10613,
-    "event-gateway-trigger",
     "an event behind an event-based gateway can wait only for a message, signal, timer or "
     "condition",
     "give the event one of these triggers",
-    "10.6.6",
 )
 EVENT_GATEWAY_MIXED = warning(
     10614,
-    "event-gateway-mixed",
     "the event-based gateway leads to both message events and receive tasks",
     "use one of the two for all its messages",
-    "10.6.6",
 )
 EVENT_GATEWAY_BOUNDARY = error(
     10615,
-    "event-gateway-boundary",
     "a receive task behind an event-based gateway must not have boundary events",
     "make what it waits for another branch of the gateway",
-    "10.6.6",
 )
 EVENT_GATEWAY_SHARED_TARGET = warning(
     10616,
-    "event-gateway-shared-target",
     "what an event-based gateway leads to must not have another incoming flow",
     "draw an event of its own for the other flow",
-    "10.6.6",
 )
 EVENT_GATEWAY_CONDITION = warning(
     10617,
-    "event-gateway-condition",
     "a flow out of an event-based gateway must not have a condition; events decide",
     "delete the condition",
-    "10.6.6",
 )
 EVENT_GATEWAY_BEGINS = error(
     10619,
-    "event-gateway-begins",
     "an event-based gateway that begins a process must not have an incoming flow",
     'delete the flow, or instantiate="true"',
-    "10.6.6",
 )
 EVENT_GATEWAY_TYPE = error(
     10620,
-    "event-gateway-type",
     "the event-based gateway's type is none that BPMN has",
     "write Exclusive or Parallel",
-    "10.6.6",
 )
 _TRIGGERS = frozenset({"message", "signal", "timer", "conditional"})
 

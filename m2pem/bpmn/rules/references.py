@@ -5,16 +5,17 @@ References that execution needs (flows, attachments, signals, ...) are looked up
 
 from lxml import etree
 
-from m2pem.bpmn.rules.rule import Rule, error, warning
+from m2pem.bpmn.rules.rule import Rule, family
 from m2pem.bpmn.rules.tree import ACTIVITIES, EVENTS, Check, Checks, Tree, name_of, names, texts
+
+error, warning = family("9.3.1")
 
 DANGLING_REFERENCE = error(
     15301,
-    "dangling-reference",
     "a reference names nothing, or nothing of the right kind (a warning where it has no effect on "
     "execution: pools, lanes, message flows, data)",
     "name an element that is there",
-    "15.3.2",
+    clause="15.3.2",
 )
 
 ITEMS = names(
@@ -25,150 +26,126 @@ ITEMS = names(
 
 CATEGORY_VALUE = warning(
     8404,
-    "category-value",
     "categoryValueRef names no category value",
     "name a categoryValue of a category, or delete it",
-    "8.4.1",
+    clause="8.4.1",
 )
 ERROR_STRUCTURE = warning(
     8421,
-    "error-structure",
     "the error's structureRef names no item definition",
     "name an itemDefinition, or delete it",
-    "8.4.3",
+    clause="8.4.3",
 )
 ESCALATION_STRUCTURE = warning(
     8431,
-    "escalation-structure",
     "the escalation's structureRef names no item definition",
     "name an itemDefinition, or delete it",
-    "8.4.4",
+    clause="8.4.4",
 )
 MESSAGE_ITEM = warning(
     8451,
-    "message-item",
     "the message's itemRef names no item definition",
     "name an itemDefinition, or delete it",
-    "8.4.11",
+    clause="8.4.11",
 )
 OPERATION_OUT_MESSAGE = warning(
     8505,
-    "operation-out-message",
     "the operation's outMessageRef names no message",
     "name a message in definitions, or delete it",
-    "8.5.3",
+    clause="8.5.3",
 )
 OPERATION_ERROR = warning(
     8506,
-    "operation-error",
     "the operation's errorRef names no error",
     "name an error in definitions, or delete it",
-    "8.5.3",
+    clause="8.5.3",
 )
 PARTICIPANT_INTERFACE = warning(
     9303,
-    "participant-interface",
     "the pool's interfaceRef names no interface",
     "name an interface in definitions, or delete it",
-    "9.3.1",
 )
 PARTICIPANT_END_POINT = warning(
     9304,
-    "participant-end-point",
     "the pool's endPointRef names no end point",
     "name an endPoint in definitions, or delete it",
-    "9.3.1",
 )
 PARTNER_PARTICIPANT = warning(
     9305,
-    "partner-participant",
     "the partner's participantRef names no pool",
     "name a participant of a collaboration, or delete it",
-    "9.3.1",
 )
 CALLED_COLLABORATION = warning(
     9505,
-    "called-collaboration",
     "the call conversation's calledCollaborationRef names no collaboration",
     "name a collaboration or globalConversation, or delete it",
-    "9.5.4",
+    clause="9.5.4",
 )
 CONVERSATION_MESSAGE_FLOW = warning(
     9506,
-    "conversation-message-flow",
     "the conversation's messageFlowRef names no message flow",
     "name a messageFlow of the collaboration, or delete it",
-    "9.5.1",
+    clause="9.5.1",
 )
 COLLABORATION_CHOREOGRAPHY = warning(
     9701,
-    "collaboration-choreography",
     "the collaboration's choreographyRef names no choreography",
     "name a choreography in definitions, or delete it",
-    "9.7",
+    clause="9.7",
 )
 DEFINITIONAL_COLLABORATION = warning(
     10103,
-    "definitional-collaboration",
     "definitionalCollaborationRef names no collaboration",
     "name a collaboration of the file, or delete it",
-    "10.1",
+    clause="10.1",
 )
 SUPPORTED_PROCESS = warning(
     10104,
-    "supported-process",
     "supports names no process",
     "name a process of the file, or delete it",
-    "10.1",
+    clause="10.1",
 )
 SUPPORTED_INTERFACE = warning(
     10322,
-    "supported-interface",
     "supportedInterfaceRef names no interface",
     "name an interface in definitions, or delete it",
-    "10.3.6",
+    clause="10.3.6",
 )
 ROLE_RESOURCE = warning(
     10303,
-    "role-resource",
     "the role's resourceRef names no resource",
     "name a resource in definitions, or delete it",
-    "10.3.1",
+    clause="10.3.1",
 )
 TASK_OPERATION = warning(
     10311,
-    "task-operation",
     "the task's operationRef names no operation",
     "name an operation of an interface, or delete it",
-    "10.3.3",
+    clause="10.3.3",
 )
 DATA_ITEM = warning(
     10404,
-    "data-item",
     "itemSubjectRef names no item definition",
     "name an itemDefinition, or delete it",
-    "10.4.1",
+    clause="10.4.1",
 )
 EVENT_OPERATION = warning(
     10534,
-    "event-operation",
     "the event's operationRef names no operation",
     "name an operation of an interface, or delete it",
-    "10.5.5",
+    clause="10.5.5",
 )
 SIGNAL_STRUCTURE = warning(
     10539,
-    "signal-structure",
     "the signal's structureRef names no item definition",
     "name an itemDefinition, or delete it",
-    "10.5.5",
+    clause="10.5.5",
 )
 LANE_PARTITION = warning(
     10804,
-    "lane-partition",
     "the lane's partitionElementRef names nothing",
     "name an element of the file, or delete it",
-    "10.8",
+    clause="10.8",
 )
 
 _ITEM_DEFINITION = names("itemDefinition")

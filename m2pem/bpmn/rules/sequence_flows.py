@@ -2,7 +2,7 @@
 
 from lxml import etree
 
-from m2pem.bpmn.rules.rule import error, warning
+from m2pem.bpmn.rules.rule import family
 from m2pem.bpmn.rules.tree import (
     ACTIVITIES,
     Checks,
@@ -15,106 +15,84 @@ from m2pem.bpmn.rules.tree import (
 )
 from m2pem.bpmn.xml import BPMN
 
+error, warning = family("8.4.13")
+
 FLOW_INTO_START = error(
     7601,
-    "flow-into-start",
     "a sequence flow leads into a start event",
     "lead it to what follows the start event",
-    "7.6.2",
+    clause="7.6.2",
 )
 FLOW_INTO_BOUNDARY = error(
     7602,
-    "flow-into-boundary",
     "a sequence flow leads into a boundary event",
     "lead it to the activity, or to what follows the boundary event",
-    "7.6.2",
+    clause="7.6.2",
 )
 FLOW_OUT_OF_END = error(
     7603,
-    "flow-out-of-end",
     "a sequence flow leads out of an end event",
     "make it an intermediate throw event, or delete the flow",
-    "7.6.2",
+    clause="7.6.2",
 )
 FLOW_CROSSES_BORDER = error(
     7604,
-    "flow-crosses-border",
     "a sequence flow crosses the border of a subprocess or pool",
     "let it lead from or to the subprocess itself; between pools, draw a message flow",
-    "7.6.2",
+    clause="7.6.2",
 )
 CONDITION_NOT_ALLOWED = error(
     8471,
-    "condition-not-allowed",
     "a flow out of an event has a condition",
     "put an exclusive gateway behind the event",
-    "8.4.13",
 )
 CONDITION_IGNORED = warning(
     8472,
-    "condition-ignored",
     "a flow out of a parallel gateway has a condition",
     "delete the condition, or make the gateway inclusive",
-    "8.4.13",
 )
 DEFAULT_WITH_CONDITION = warning(
     8473,
-    "default-with-condition",
     "the default flow has a condition",
     "delete the condition, or make another flow the default",
-    "8.4.13",
 )
 DEFAULT_NOT_OWN = error(
     8474,
-    "default-not-own",
     "the default flow leaves another element",
     "name one of its own outgoing sequence flows",
-    "8.4.13",
 )
 EMPTY_CONDITION = warning(
     8475,
-    "empty-condition",
     "a conditionExpression is empty",
     "write the condition, or delete the conditionExpression",
-    "8.4.13",
 )
 
 LONE_CONDITION = warning(
     8476,
-    "lone-condition",
     "the only flow out of an activity has a condition",
     "add a flow for when it is false, or delete the condition",
-    "8.4.13",
 )
 IMMEDIATE_FALSE = warning(
     8477,
-    "immediate-false",
     "isImmediate must not be false in an executable process",
     "delete it",
-    "8.4.13",
 )
 LISTED_FLOW = warning(
     8478,
-    "listed-flow",
     "it lists an incoming or outgoing sequence flow that does not exist",
     "delete the incoming or outgoing element; the flows themselves count",
-    "8.4.13",
 )
 
 LISTED_FLOW_ELSEWHERE = warning(
     8479,
-    "listed-flow-elsewhere",
     "it lists an incoming or outgoing sequence flow that is another element's",
     "correct the incoming or outgoing element, or the flow; the flows count",
-    "8.4.13",
 )
 
 UNLISTED_FLOW = warning(
     8480,
-    "unlisted-flow",
     "it lists some of its incoming or outgoing sequence flows, and not this one",
     "add it to the incoming or outgoing elements; the flows count",
-    "8.4.13",
 )
 
 _INCOMING = BPMN + "incoming"

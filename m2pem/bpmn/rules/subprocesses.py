@@ -2,7 +2,7 @@
 
 from lxml import etree
 
-from m2pem.bpmn.rules.rule import error, warning
+from m2pem.bpmn.rules.rule import family
 from m2pem.bpmn.rules.tree import (
     ACTIVITIES,
     SUBPROCESSES,
@@ -17,108 +17,86 @@ from m2pem.bpmn.rules.tree import (
     what,
 )
 
+error, warning = family("10.3.5")
+
 NO_PROCESS = error(
     108,
-    "no-process",
     "the file has no process",
     "draw a process with a start event",
 )
 EMPTY_PROCESS = error(
     109,
-    "empty-process",
     "a process has no elements (a warning for a closed pool)",
     "draw its content, or delete it",
 )
 EMPTY_SUBPROCESS = warning(
     301,
-    "empty-subprocess",
     "a subprocess has no elements",
     "draw its content, or make it a task",
 )
 AD_HOC_ORDERING = error(
     10355,
-    "ad-hoc-ordering",
     "the ad-hoc subprocess's ordering is none that BPMN has",
     'write ordering="Parallel" or ordering="Sequential"',
-    "10.3.5",
 )
 NO_START = error(
     13201,
-    "no-start",
     "nothing in a process or subprocess can start, or an event subprocess has no start event",
     "add a start event",
-    "13.2",
+    clause="13.2",
 )
 UNREACHABLE = error(
     13202,
-    "unreachable",
     "no start event, and nothing else that begins, leads to an element",
     "draw a sequence flow to it, or delete it",
-    "13.2",
+    clause="13.2",
 )
 
 EVENT_SUBPROCESS_INCOMING = error(
     10332,
-    "event-subprocess-incoming",
     "an event subprocess must not have an incoming flow; its start event begins it",
     "delete the flow, or triggeredByEvent",
-    "10.3.5",
 )
 EVENT_SUBPROCESS_OUTGOING = error(
     10333,
-    "event-subprocess-outgoing",
     "an event subprocess must not have an outgoing flow",
     "delete the flow, or triggeredByEvent",
-    "10.3.5",
 )
 EVENT_SUBPROCESS_STARTS = error(
     10334,
-    "event-subprocess-starts",
     "an event subprocess must not have several start events",
     "keep one, or draw an event subprocess for each",
-    "10.3.5",
 )
 TRANSACTION_METHOD = warning(
     10341,
-    "transaction-method",
     "the transaction's method is none that BPMN has",
     "write ##Compensate, ##Store, ##Image or the URI of a protocol",
-    "10.3.5",
 )
 AD_HOC_ACTIVITIES = warning(
     10351,
-    "ad-hoc-activities",
     "the ad-hoc subprocess has no activity",
     "draw the activities that may be done in it",
-    "10.3.5",
 )
 AD_HOC_START = error(
     10352,
-    "ad-hoc-start",
     "an ad-hoc subprocess must not have a start event",
     "delete it; activities without an incoming flow can be begun at any time",
-    "10.3.5",
 )
 AD_HOC_END = warning(
     10353,
-    "ad-hoc-end",
     "an ad-hoc subprocess must not have an end event",
     "delete it; write a completionCondition",
-    "10.3.5",
 )
 AD_HOC_CANCEL = warning(
     10354,
-    "ad-hoc-cancel",
     "cancelRemainingInstances has no meaning in an ad-hoc subprocess of ordering Sequential",
     "delete it; only one activity runs at a time",
-    "10.3.5",
 )
 EVENT_SUBPROCESS_TWICE = warning(
     10555,
-    "event-subprocess-twice",
     "two interrupting event subprocesses wait for the same event",
     "keep one, or let one not interrupt",
-    "10.5.6",
+    clause="10.5.6",
 )
 _REFERENCES = {
     "message": "messageRef",
