@@ -7,6 +7,7 @@ from lxml import etree
 
 from m2pem.bpmn.rules.rule import Rule, family
 from m2pem.bpmn.rules.tree import ACTIVITIES, EVENTS, Check, Checks, Tree, name_of, names, texts
+from m2pem.bpmn.xml import a, kind
 
 error, warning = family("9.3.1")
 
@@ -24,123 +25,55 @@ ITEMS = names(
 )
 """Tags of BPMN's item-aware elements (clause 10.4.1)."""
 
-CATEGORY_VALUE = warning(
-    8404,
-    "categoryValueRef names no category value",
-    "name a categoryValue of a category, or delete it",
-    clause="8.4.1",
+
+def _names_no(number: int, reference: str, wanted: str, clause: str = "9.3.1") -> Rule:
+    """A reference to no element of a kind. `wanted`: the element's name, and where it may be."""
+    named = kind(wanted.partition(" ")[0])
+    remedy = f"name {a(wanted)}, or delete it"
+    return warning(number, f"{reference} names no {named}", remedy, clause=clause)
+
+
+CATEGORY_VALUE = _names_no(8404, "categoryValueRef", "categoryValue of a category", "8.4.1")
+ERROR_STRUCTURE = _names_no(8421, "the error's structureRef", "itemDefinition", "8.4.3")
+ESCALATION_STRUCTURE = _names_no(8431, "the escalation's structureRef", "itemDefinition", "8.4.4")
+MESSAGE_ITEM = _names_no(8451, "the message's itemRef", "itemDefinition", "8.4.11")
+OPERATION_OUT_MESSAGE = _names_no(
+    8505, "the operation's outMessageRef", "message in definitions", "8.5.3"
 )
-ERROR_STRUCTURE = warning(
-    8421,
-    "the error's structureRef names no item definition",
-    "name an itemDefinition, or delete it",
-    clause="8.4.3",
-)
-ESCALATION_STRUCTURE = warning(
-    8431,
-    "the escalation's structureRef names no item definition",
-    "name an itemDefinition, or delete it",
-    clause="8.4.4",
-)
-MESSAGE_ITEM = warning(
-    8451,
-    "the message's itemRef names no item definition",
-    "name an itemDefinition, or delete it",
-    clause="8.4.11",
-)
-OPERATION_OUT_MESSAGE = warning(
-    8505,
-    "the operation's outMessageRef names no message",
-    "name a message in definitions, or delete it",
-    clause="8.5.3",
-)
-OPERATION_ERROR = warning(
-    8506,
-    "the operation's errorRef names no error",
-    "name an error in definitions, or delete it",
-    clause="8.5.3",
-)
-PARTICIPANT_INTERFACE = warning(
-    9303,
-    "the pool's interfaceRef names no interface",
-    "name an interface in definitions, or delete it",
-)
-PARTICIPANT_END_POINT = warning(
-    9304,
-    "the pool's endPointRef names no end point",
-    "name an endPoint in definitions, or delete it",
-)
+OPERATION_ERROR = _names_no(8506, "the operation's errorRef", "error in definitions", "8.5.3")
+PARTICIPANT_INTERFACE = _names_no(9303, "the pool's interfaceRef", "interface in definitions")
+PARTICIPANT_END_POINT = _names_no(9304, "the pool's endPointRef", "endPoint in definitions")
 PARTNER_PARTICIPANT = warning(
     9305,
     "the partner's participantRef names no pool",
     "name a participant of a collaboration, or delete it",
 )
-CALLED_COLLABORATION = warning(
+CALLED_COLLABORATION = _names_no(
     9505,
-    "the call conversation's calledCollaborationRef names no collaboration",
-    "name a collaboration or globalConversation, or delete it",
-    clause="9.5.4",
+    "the call conversation's calledCollaborationRef",
+    "collaboration or globalConversation",
+    "9.5.4",
 )
-CONVERSATION_MESSAGE_FLOW = warning(
-    9506,
-    "the conversation's messageFlowRef names no message flow",
-    "name a messageFlow of the collaboration, or delete it",
-    clause="9.5.1",
+CONVERSATION_MESSAGE_FLOW = _names_no(
+    9506, "the conversation's messageFlowRef", "messageFlow of the collaboration", "9.5.1"
 )
-COLLABORATION_CHOREOGRAPHY = warning(
-    9701,
-    "the collaboration's choreographyRef names no choreography",
-    "name a choreography in definitions, or delete it",
-    clause="9.7",
+COLLABORATION_CHOREOGRAPHY = _names_no(
+    9701, "the collaboration's choreographyRef", "choreography in definitions", "9.7"
 )
-DEFINITIONAL_COLLABORATION = warning(
-    10103,
-    "definitionalCollaborationRef names no collaboration",
-    "name a collaboration of the file, or delete it",
-    clause="10.1",
+DEFINITIONAL_COLLABORATION = _names_no(
+    10103, "definitionalCollaborationRef", "collaboration of the file", "10.1"
 )
-SUPPORTED_PROCESS = warning(
-    10104,
-    "supports names no process",
-    "name a process of the file, or delete it",
-    clause="10.1",
+SUPPORTED_PROCESS = _names_no(10104, "supports", "process of the file", "10.1")
+SUPPORTED_INTERFACE = _names_no(
+    10322, "supportedInterfaceRef", "interface in definitions", "10.3.6"
 )
-SUPPORTED_INTERFACE = warning(
-    10322,
-    "supportedInterfaceRef names no interface",
-    "name an interface in definitions, or delete it",
-    clause="10.3.6",
+ROLE_RESOURCE = _names_no(10303, "the role's resourceRef", "resource in definitions", "10.3.1")
+TASK_OPERATION = _names_no(10311, "the task's operationRef", "operation of an interface", "10.3.3")
+DATA_ITEM = _names_no(10404, "itemSubjectRef", "itemDefinition", "10.4.1")
+EVENT_OPERATION = _names_no(
+    10534, "the event's operationRef", "operation of an interface", "10.5.5"
 )
-ROLE_RESOURCE = warning(
-    10303,
-    "the role's resourceRef names no resource",
-    "name a resource in definitions, or delete it",
-    clause="10.3.1",
-)
-TASK_OPERATION = warning(
-    10311,
-    "the task's operationRef names no operation",
-    "name an operation of an interface, or delete it",
-    clause="10.3.3",
-)
-DATA_ITEM = warning(
-    10404,
-    "itemSubjectRef names no item definition",
-    "name an itemDefinition, or delete it",
-    clause="10.4.1",
-)
-EVENT_OPERATION = warning(
-    10534,
-    "the event's operationRef names no operation",
-    "name an operation of an interface, or delete it",
-    clause="10.5.5",
-)
-SIGNAL_STRUCTURE = warning(
-    10539,
-    "the signal's structureRef names no item definition",
-    "name an itemDefinition, or delete it",
-    clause="10.5.5",
-)
+SIGNAL_STRUCTURE = _names_no(10539, "the signal's structureRef", "itemDefinition", "10.5.5")
 LANE_PARTITION = warning(
     10804,
     "the lane's partitionElementRef names nothing",
