@@ -139,19 +139,3 @@ class SearchProgress:
 
 DEFAULT_LIMITS = SearchLimits()
 """Those of `m2pem verify`."""
-
-
-__all__ = [
-    "DEFAULT_LIMITS",
-    "DataName",
-    "Draft",
-    "Editable",
-    "MissionFiles",
-    "MissionSource",
-    "Outline",
-    "OutlineElement",
-    "OutlineProcess",
-    "OutlineTrigger",
-    "SearchLimits",
-    "SearchProgress",
-]

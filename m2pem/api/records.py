@@ -1,3 +1,3 @@
 """Records, as OCUs and observers read them (docs/records.md)."""
 
-from m2pem.engine.records import *  # noqa: F403  # the names of its `__all__`
+from m2pem.engine.records import *  # noqa: F403  # every record

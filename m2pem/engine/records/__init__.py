@@ -10,185 +10,88 @@ that contains `element`.
 
 from typing import TypeAlias, Union
 
-from m2pem.engine.inputs import RequestOutcome, RequirementVerdict
-from m2pem.engine.records.base import RunOutcome, TokenOutcome, Trigger
-from m2pem.engine.records.compensation import (
-    CompensationBegan,
-    CompensationEnabled,
-    CompensationEnded,
-    CompensationTriggered,
-    ScopeReopened,
-    TransactionCancelled,
-)
-from m2pem.engine.records.events import (
-    ConditionReset,
-    DataWritten,
-    ErrorThrown,
-    EscalationThrown,
-    EventAwaited,
-    EventTriggered,
-    MessageThrown,
-    SignalThrown,
-)
-from m2pem.engine.records.incidents import (
-    IncidentClosed,
-    IncidentOpened,
-    IncidentResolved,
-    IncidentUpdated,
-)
-from m2pem.engine.records.requirements import (
-    RequirementDecided,
-    RequirementDropped,
-    RequirementLeftOpen,
-    RequirementMonitored,
-    TelemetryConditionChanged,
-)
-from m2pem.engine.records.run import (
-    BreakpointReached,
-    BreakpointsSet,
-    ControlRequested,
-    ControlRequestEnded,
-    GeometryReceived,
-    InputDeferred,
-    InputIgnored,
-    InputSeen,
-    MissionRevised,
-    OperatorGaveControlBack,
-    OperatorNote,
-    OperatorSetData,
-    OperatorTookControl,
-    RunClaimed,
-    RunEnded,
-    RunPaused,
-    RunResumed,
-    RunStarted,
-    RunYielded,
-    StopReason,
-)
-from m2pem.engine.records.tasks import (
-    AllocationDelayed,
-    AllocationEnded,
-    AllocationRequested,
-    BehaviorAdjusted,
-    BehaviorCancelRequested,
-    BehaviorContinued,
-    BehaviorEnded,
-    BehaviorProgressed,
-    BehaviorRequested,
-    BehaviorRestarted,
-    BehaviorUnsettled,
-    KeepingEnded,
-    PromptAnswered,
-    PromptOpened,
-    PromptWithdrawn,
-    ResourceKept,
-    ResourceReturned,
-    ResourcesAllocated,
-    ServiceEnded,
-    ServiceRequested,
-    ServiceWithdrawn,
-    WorkReassigned,
-)
-from m2pem.engine.records.tokens import (
-    ActivitiesChosen,
-    FlowTaken,
-    GatewayActivated,
-    GatewayReset,
-    InstanceOutput,
-    ScopeClosed,
-    ScopeCompleting,
-    ScopeInterrupted,
-    ScopeOpened,
-    TokenEntered,
-    TokenLeft,
-    TokensGathered,
-)
-
-__all__ = [
-    "ActivitiesChosen",
-    "AllocationDelayed",
-    "AllocationEnded",
-    "AllocationRequested",
-    "BehaviorAdjusted",
-    "BehaviorCancelRequested",
-    "BehaviorContinued",
-    "BehaviorEnded",
-    "BehaviorProgressed",
-    "BehaviorRequested",
-    "BehaviorRestarted",
-    "BehaviorUnsettled",
-    "BreakpointReached",
-    "BreakpointsSet",
-    "CompensationBegan",
-    "CompensationEnabled",
-    "CompensationEnded",
-    "CompensationTriggered",
-    "ConditionReset",
-    "DataWritten",
-    "ErrorThrown",
-    "EscalationThrown",
-    "EventAwaited",
-    "EventTriggered",
-    "FlowTaken",
-    "GatewayActivated",
-    "GatewayReset",
-    "GeometryReceived",
-    "IncidentClosed",
-    "IncidentOpened",
-    "IncidentResolved",
-    "IncidentUpdated",
-    "InputDeferred",
-    "InputIgnored",
-    "InputSeen",
-    "InstanceOutput",
-    "KeepingEnded",
-    "MessageThrown",
-    "MissionRevised",
-    "ControlRequestEnded",
-    "ControlRequested",
-    "OperatorNote",
-    "OperatorGaveControlBack",
-    "OperatorSetData",
-    "OperatorTookControl",
-    "PromptAnswered",
-    "PromptOpened",
-    "PromptWithdrawn",
-    "Record",
-    "RequirementDecided",
-    "RequirementDropped",
-    "RequirementLeftOpen",
-    "RequirementMonitored",
-    "RequirementVerdict",
-    "ResourceKept",
-    "ResourceReturned",
-    "ResourcesAllocated",
-    "RunClaimed",
-    "RunEnded",
-    "RequestOutcome",
-    "RunOutcome",
-    "RunPaused",
-    "RunResumed",
-    "RunStarted",
-    "RunYielded",
-    "ScopeClosed",
-    "ScopeCompleting",
-    "ScopeInterrupted",
-    "ScopeOpened",
-    "ScopeReopened",
-    "ServiceEnded",
-    "ServiceRequested",
-    "ServiceWithdrawn",
-    "SignalThrown",
-    "StopReason",
-    "TelemetryConditionChanged",
-    "TokenEntered",
-    "TokenLeft",
-    "TokenOutcome",
-    "TokensGathered",
-    "TransactionCancelled",
-    "Trigger",
-    "WorkReassigned",
-]
+from m2pem.engine.inputs import RequestOutcome as RequestOutcome
+from m2pem.engine.inputs import RequirementVerdict as RequirementVerdict
+from m2pem.engine.records.base import RunOutcome as RunOutcome
+from m2pem.engine.records.base import TokenOutcome as TokenOutcome
+from m2pem.engine.records.base import Trigger as Trigger
+from m2pem.engine.records.compensation import CompensationBegan as CompensationBegan
+from m2pem.engine.records.compensation import CompensationEnabled as CompensationEnabled
+from m2pem.engine.records.compensation import CompensationEnded as CompensationEnded
+from m2pem.engine.records.compensation import CompensationTriggered as CompensationTriggered
+from m2pem.engine.records.compensation import ScopeReopened as ScopeReopened
+from m2pem.engine.records.compensation import TransactionCancelled as TransactionCancelled
+from m2pem.engine.records.events import ConditionReset as ConditionReset
+from m2pem.engine.records.events import DataWritten as DataWritten
+from m2pem.engine.records.events import ErrorThrown as ErrorThrown
+from m2pem.engine.records.events import EscalationThrown as EscalationThrown
+from m2pem.engine.records.events import EventAwaited as EventAwaited
+from m2pem.engine.records.events import EventTriggered as EventTriggered
+from m2pem.engine.records.events import MessageThrown as MessageThrown
+from m2pem.engine.records.events import SignalThrown as SignalThrown
+from m2pem.engine.records.incidents import IncidentClosed as IncidentClosed
+from m2pem.engine.records.incidents import IncidentOpened as IncidentOpened
+from m2pem.engine.records.incidents import IncidentResolved as IncidentResolved
+from m2pem.engine.records.incidents import IncidentUpdated as IncidentUpdated
+from m2pem.engine.records.requirements import RequirementDecided as RequirementDecided
+from m2pem.engine.records.requirements import RequirementDropped as RequirementDropped
+from m2pem.engine.records.requirements import RequirementLeftOpen as RequirementLeftOpen
+from m2pem.engine.records.requirements import RequirementMonitored as RequirementMonitored
+from m2pem.engine.records.requirements import TelemetryConditionChanged as TelemetryConditionChanged
+from m2pem.engine.records.run import BreakpointReached as BreakpointReached
+from m2pem.engine.records.run import BreakpointsSet as BreakpointsSet
+from m2pem.engine.records.run import ControlRequested as ControlRequested
+from m2pem.engine.records.run import ControlRequestEnded as ControlRequestEnded
+from m2pem.engine.records.run import GeometryReceived as GeometryReceived
+from m2pem.engine.records.run import InputDeferred as InputDeferred
+from m2pem.engine.records.run import InputIgnored as InputIgnored
+from m2pem.engine.records.run import InputSeen as InputSeen
+from m2pem.engine.records.run import MissionRevised as MissionRevised
+from m2pem.engine.records.run import OperatorGaveControlBack as OperatorGaveControlBack
+from m2pem.engine.records.run import OperatorNote as OperatorNote
+from m2pem.engine.records.run import OperatorSetData as OperatorSetData
+from m2pem.engine.records.run import OperatorTookControl as OperatorTookControl
+from m2pem.engine.records.run import RunClaimed as RunClaimed
+from m2pem.engine.records.run import RunEnded as RunEnded
+from m2pem.engine.records.run import RunPaused as RunPaused
+from m2pem.engine.records.run import RunResumed as RunResumed
+from m2pem.engine.records.run import RunStarted as RunStarted
+from m2pem.engine.records.run import RunYielded as RunYielded
+from m2pem.engine.records.run import StopReason as StopReason
+from m2pem.engine.records.tasks import AllocationDelayed as AllocationDelayed
+from m2pem.engine.records.tasks import AllocationEnded as AllocationEnded
+from m2pem.engine.records.tasks import AllocationRequested as AllocationRequested
+from m2pem.engine.records.tasks import BehaviorAdjusted as BehaviorAdjusted
+from m2pem.engine.records.tasks import BehaviorCancelRequested as BehaviorCancelRequested
+from m2pem.engine.records.tasks import BehaviorContinued as BehaviorContinued
+from m2pem.engine.records.tasks import BehaviorEnded as BehaviorEnded
+from m2pem.engine.records.tasks import BehaviorProgressed as BehaviorProgressed
+from m2pem.engine.records.tasks import BehaviorRequested as BehaviorRequested
+from m2pem.engine.records.tasks import BehaviorRestarted as BehaviorRestarted
+from m2pem.engine.records.tasks import BehaviorUnsettled as BehaviorUnsettled
+from m2pem.engine.records.tasks import KeepingEnded as KeepingEnded
+from m2pem.engine.records.tasks import PromptAnswered as PromptAnswered
+from m2pem.engine.records.tasks import PromptOpened as PromptOpened
+from m2pem.engine.records.tasks import PromptWithdrawn as PromptWithdrawn
+from m2pem.engine.records.tasks import ResourceKept as ResourceKept
+from m2pem.engine.records.tasks import ResourceReturned as ResourceReturned
+from m2pem.engine.records.tasks import ResourcesAllocated as ResourcesAllocated
+from m2pem.engine.records.tasks import ServiceEnded as ServiceEnded
+from m2pem.engine.records.tasks import ServiceRequested as ServiceRequested
+from m2pem.engine.records.tasks import ServiceWithdrawn as ServiceWithdrawn
+from m2pem.engine.records.tasks import WorkReassigned as WorkReassigned
+from m2pem.engine.records.tokens import ActivitiesChosen as ActivitiesChosen
+from m2pem.engine.records.tokens import FlowTaken as FlowTaken
+from m2pem.engine.records.tokens import GatewayActivated as GatewayActivated
+from m2pem.engine.records.tokens import GatewayReset as GatewayReset
+from m2pem.engine.records.tokens import InstanceOutput as InstanceOutput
+from m2pem.engine.records.tokens import ScopeClosed as ScopeClosed
+from m2pem.engine.records.tokens import ScopeCompleting as ScopeCompleting
+from m2pem.engine.records.tokens import ScopeInterrupted as ScopeInterrupted
+from m2pem.engine.records.tokens import ScopeOpened as ScopeOpened
+from m2pem.engine.records.tokens import TokenEntered as TokenEntered
+from m2pem.engine.records.tokens import TokenLeft as TokenLeft
+from m2pem.engine.records.tokens import TokensGathered as TokensGathered
 
 Record: TypeAlias = Union[
     RunStarted,
