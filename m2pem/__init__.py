@@ -13,73 +13,41 @@ On the command line: `m2pem --help`.
 """
 
 import sys
-from importlib import import_module
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from m2pem.hookspecs import hookimpl
+from m2pem.hookspecs import hookimpl as hookimpl
+from m2pem.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
-    from m2pem.errors import AnswersError, FleetError, M2pemError, MissionError, OperatorError
-    from m2pem.fleet.fleet_file import load_fleet
-    from m2pem.scripting.campaign import Campaign, campaign
-    from m2pem.scripting.checking import CheckResult, check
-    from m2pem.scripting.diagram import draw
-    from m2pem.scripting.executive import Executive, Prompt, Run
-    from m2pem.scripting.rehearsal import rehearse, rehearse_async
-    from m2pem.scripting.run_result import RunResult
-    from m2pem.scripting.sources import load_mission
-    from m2pem.scripting.verification import VerificationResult, verify
+    from m2pem.errors import AnswersError as AnswersError
+    from m2pem.errors import FleetError as FleetError
+    from m2pem.errors import M2pemError as M2pemError
+    from m2pem.errors import MissionError as MissionError
+    from m2pem.errors import OperatorError as OperatorError
+    from m2pem.fleet.fleet_file import load_fleet as load_fleet
+    from m2pem.scripting.campaign import Campaign as Campaign
+    from m2pem.scripting.campaign import campaign as campaign
+    from m2pem.scripting.checking import CheckResult as CheckResult
+    from m2pem.scripting.checking import check as check
+    from m2pem.scripting.diagram import draw as draw
+    from m2pem.scripting.executive import Executive as Executive
+    from m2pem.scripting.executive import Prompt as Prompt
+    from m2pem.scripting.executive import Run as Run
+    from m2pem.scripting.rehearsal import rehearse as rehearse
+    from m2pem.scripting.rehearsal import rehearse_async as rehearse_async
+    from m2pem.scripting.run_result import RunResult as RunResult
+    from m2pem.scripting.sources import load_mission as load_mission
+    from m2pem.scripting.verification import VerificationResult as VerificationResult
+    from m2pem.scripting.verification import verify as verify
 
 __version__ = "0.2.0"
 
-__all__ = [
-    "AnswersError",
-    "Campaign",
-    "CheckResult",
-    "Executive",
-    "FleetError",
-    "M2pemError",
-    "MissionError",
-    "OperatorError",
-    "Prompt",
-    "Run",
-    "RunResult",
-    "VerificationResult",
-    "__version__",
-    "campaign",
-    "check",
-    "draw",
-    "hookimpl",
-    "load_fleet",
-    "load_mission",
-    "rehearse",
-    "rehearse_async",
-    "verify",
-]
-
 # Loaded when asked for: the parsers of files are most of what importing m2pem would cost.
-_MODULES = {
-    "m2pem.errors": "AnswersError FleetError M2pemError MissionError OperatorError",
-    "m2pem.fleet.fleet_file": "load_fleet",
-    "m2pem.scripting.campaign": "Campaign campaign",
-    "m2pem.scripting.checking": "CheckResult check",
-    "m2pem.scripting.diagram": "draw",
-    "m2pem.scripting.executive": "Executive Prompt Run",
-    "m2pem.scripting.rehearsal": "rehearse rehearse_async",
-    "m2pem.scripting.run_result": "RunResult",
-    "m2pem.scripting.sources": "load_mission",
-    "m2pem.scripting.verification": "VerificationResult verify",
-}
-_LAZY = {name: module for module, names in _MODULES.items() for name in names.split()}
+_LAZY, __getattr__ = lazy_exports(__name__, __file__)
 
-
-def __getattr__(name: str) -> Any:
-    if name not in _LAZY:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(import_module(_LAZY[name]), name)
-    globals()[name] = value
-    return value
+__all__ = ["__version__", "hookimpl"]
+__all__ += list(_LAZY)
 
 
 def __dir__() -> list[str]:

@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
@@ -91,8 +92,9 @@ def test_names_that_are_loaded_when_asked_for_are_all_there() -> None:
             _ = package.nothing
 
 
-def test_type_checkers_find_every_name_of_the_api_where_it_is_loaded_from() -> None:
-    source = Path(m2pem.api.__file__).read_text(encoding="utf-8")
+@pytest.mark.parametrize("package", [m2pem, m2pem.api, m2pem.testing])
+def test_every_name_that_type_checkers_find_is_loaded_from_there(package: ModuleType) -> None:
+    source = Path(str(package.__file__)).read_text(encoding="utf-8")
     imports = next(each for each in ast.parse(source).body if isinstance(each, ast.If))
     found = {
         name.asname: each.module
@@ -100,7 +102,7 @@ def test_type_checkers_find_every_name_of_the_api_where_it_is_loaded_from() -> N
         if isinstance(each, ast.ImportFrom)
         for name in each.names
     }
-    assert found == m2pem.api._LAZY
+    assert found == package._LAZY
 
 
 @pytest.mark.long

@@ -3,8 +3,9 @@
 Everything here is an interface, kept from release to release; what is not here may change.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from m2pem.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from m2pem.api.alerts import AlertsChanged as AlertsChanged
@@ -257,120 +258,6 @@ if TYPE_CHECKING:
     from m2pem.units import quantity as quantity
 
 # Loaded when asked for: an arbiter's module need not pay for what an OCU imports.
-_MODULES = {
-    "m2pem.api.alerts": "AlertSeverity AlertsChanged OperatorAlert",
-    "m2pem.api.approval": "EarlierApproval GivenApproval MissionApproval",
-    "m2pem.api.arbiter": (
-        "AddressedArbiter AdjustingArbiter Arbiter ArbiterContext BehaviorId BehaviorReport"
-        " BehaviorRequest Connection DetectingArbiter FencingArbiter Limits"
-        " ReclaimingArbiter ResolvedValue SightedArbiter adjusts"
-    ),
-    "m2pem.api.authoring": (
-        "DataName Draft Editable MissionFiles MissionSource Outline OutlineElement"
-        " OutlineProcess OutlineTrigger SearchLimits SearchProgress"
-    ),
-    "m2pem.api.bus": "FleetBus",
-    "m2pem.api.capabilities": "ArbiterCapabilities FaceCapabilities OcuCapabilities",
-    "m2pem.api.clock": "Clock SystemClock",
-    "m2pem.api.commands": "LazyCommand command_group simulator_group",
-    "m2pem.api.connection_reader": "ConnectionReader",
-    "m2pem.api.control": "MissionControl",
-    "m2pem.api.mission_control.watching": "ControlEvent",
-    "m2pem.api.declared_behaviors": "read_declared_behaviors",
-    "m2pem.api.description": "Description Importance Kind describe",
-    "m2pem.api.epoch_fence": "EpochFence",
-    "m2pem.api.follower": "Follower Listener follow",
-    "m2pem.api.goals": "GoalArbiter",
-    "m2pem.api.health": "ExecutiveAddress HealthCheck HealthStatus listening_check",
-    "m2pem.api.hosting": "CutOffPolicy Host HostLink HostedArbiter WhenCutOff",
-    "m2pem.api.behavior_parameters": "BehaviorParameters decode_parameters encode_parameters",
-    "m2pem.api.behavior_tracker": "BehaviorTracker",
-    "m2pem.api.async_queue": "AsyncQueue",
-    "m2pem.api.latest_task": "LatestTask",
-    "m2pem.api.estimates": "MissionEstimate NotEstimated TaskEstimate VehicleEstimate",
-    "m2pem.api.event_rules": "AnswerRule EventCondition EventThrower Fields ReceiveRule SendRule "
-    "Thrown ThrownEvents UNKNOWN Unknown read_rules read_template",
-    "m2pem.api.exporter": "ExportedRecord ExportedRun Exporter ExportOptions",
-    "m2pem.api.face": "Face FaceSettings",
-    "m2pem.api.log_context": "current_run trace_ids",
-    "m2pem.api.map_geometries": "shown_geometries",
-    "m2pem.api.ocu": "Ocu StandbyOcu",
-    "m2pem.api.operations": (
-        "MAX_DATA_VALUES MAX_NAME_CHARACTERS MAX_REASON_CHARACTERS OPERATIONS Operation"
-    ),
-    "m2pem.api.people": (
-        "ABSENT_AFTER_S MAX_NOTE_CHARACTERS PRESENCE_EVERY_S OpenControlRequest OperatorPresence"
-        " OperatorsChanged"
-    ),
-    "m2pem.api.remaining": (
-        "RemainingRoute RemainingSurvey RemainingWork raw_parameters restored_work"
-    ),
-    "m2pem.api.requirement_states": "RequirementState RequirementStates worst_first",
-    "m2pem.api.revision": "RevisionEffect RevisionPreview RevisionRefusal RunVersion",
-    "m2pem.api.run_view": "RunView",
-    "m2pem.api.runs": (
-        "CONTROL_REQUEST NEWS SCHEDULE Alert GeometryVersion HandedOver IncidentPreview"
-        " IncidentVerdict"
-        " OpenIncident OpenPrompt PromptClosed RequirementOutlook RequirementProspect RunId"
-        " RunStatus RunSummary ScopeData"
-        " SimulationResult StampedRecord TelemetrySample"
-    ),
-    "m2pem.api.statistics": (
-        "DurationCounts ExecutiveStatistics LinkStatistics SubscriptionStatistics"
-    ),
-    "m2pem.api.schedule": (
-        "WHEN_FREE Concurrency EntryId Missed Schedule ScheduleChanged ScheduledMission"
-        " ScheduledStatus SettledTime Settlement When"
-    ),
-    "m2pem.api.service": "Service ServiceContext ServiceError",
-    "m2pem.api.telemetry": (
-        "Detection GeoPosition LinkState PayloadState TeamMemberState TeamState Telemetry"
-        " VehicleState"
-    ),
-    "m2pem.engine.records": "Record",
-    "m2pem.findings": "Finding Severity",
-    "m2pem.mission.behavior": "BehaviorType Decision",
-    "m2pem.bpmn": "parse_mission",
-    "m2pem.mission.catalogue": (
-        "BehaviorSpec BehaviorState ParameterKind ParameterSpec ResourceId ResumePolicy"
-    ),
-    "m2pem.mission.library": "MissionFile",
-    "m2pem.mission.mission": "Mission",
-    "m2pem.mission.expression.described": "expression_dialects",
-    "m2pem.mission.geometry": "Area Point Route VehiclePosition",
-    "m2pem.mission.values": "Value",
-    "m2pem.fleet.behaviors": "FLOWN SHARED takeoff_first",
-    "m2pem.geo.cameras": "ImagePlan KNOWN_CAMERAS SurveyCamera image_plan",
-    "m2pem.geo.fence": "Fence",
-    "m2pem.api.fence_check": "BEHIND_RAD OFFSET_M find_breach known_yaw_rad stance_on",
-    "m2pem.fleet.endurance": "lasts_s",
-    "m2pem.fleet.approval": "file_digest person_of",
-    "m2pem.fleet.fleet": "Fleet",
-    "m2pem.geo.geoid": "ellipsoidal_m mean_sea_level_m undulation_m",
-    "m2pem.geo.geojson": "GeometryError as_geojson kind_of parse_geojson",
-    "m2pem.geo.geometry_files": (
-        "FileFormat FileProblem GeometryFile NamedGeometry READ_SUFFIXES read_geometry_file"
-        " write_geometry_file"
-    ),
-    "m2pem.geo.local_frame": "EastNorth LatLon LocalFrame distance_m offset",
-    "m2pem.geo.polygon": "convex_hull edges_enclose middle_of",
-    "m2pem.geo.polyline": "Polyline Segment",
-    "m2pem.geo.survey_pattern": "SurveyPattern SurveyRoute Surveyor best_heading_rad survey_routes",
-    "m2pem.geo.survey_tracks": "SURVEY_SPACING_M SurveyTracks",
-    "m2pem.geo.elevation_files": "TERRAIN_FOLDER Terrain TerrainError",
-    "m2pem.geo.terrain": "ProfilePoint lowest profile",
-    "m2pem.geo.terrain_following": "TOLERANCE_M follow_terrain not_covered",
-    "m2pem.suggestions": "did_you_mean",
-    "m2pem.units": "US_PER_S Dimension UnitError quantity",
-}
-_LAZY = {name: module for module, names in _MODULES.items() for name in names.split()}
+_LAZY, __getattr__ = lazy_exports(__name__, __file__)
 
 __all__ = list(_LAZY)
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _LAZY:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(import_module(_LAZY[name]), name)
-    globals()[name] = value
-    return value
