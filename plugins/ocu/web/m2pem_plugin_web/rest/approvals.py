@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from fastapi import APIRouter
 
-from m2pem.api import Draft, MissionApproval, MissionControl
+from m2pem.api import Draft, GivenApproval, MissionApproval, MissionControl
 from m2pem_plugin_web.access.permissions import Operator, Viewer
 from m2pem_plugin_web.missions.folder import MissionFolder
 from m2pem_plugin_web.missions.versions import VERSION_LENGTH
@@ -13,17 +13,12 @@ from m2pem_plugin_web.rest.drafts import MissionName, of_folder
 from m2pem_plugin_web.rest.models import Answer, Body, Name
 
 
-class GivenApprovalModel(Answer):
-    """A person has approved it, at microseconds since the Unix epoch."""
-
-    by: str
-    at_us: int
-
-
-class EarlierApprovalModel(GivenApprovalModel):
+class EarlierApprovalModel(Answer):
     """A person has approved an earlier content. `changed`: what is other now. `version`: the number
     of the version that the mission's file was then; null: none of that content is kept."""
 
+    by: str
+    at_us: int
     changed: list[str]
     version: int | None
 
@@ -42,8 +37,8 @@ class ApprovalModel(Answer):
     who: str
     editors: list[str]
     editor_unknown: bool
-    approvals: list[GivenApprovalModel]
-    not_counted: list[GivenApprovalModel]
+    approvals: list[GivenApproval]
+    not_counted: list[GivenApproval]
     earlier: list[EarlierApprovalModel]
 
 

@@ -17,6 +17,9 @@ from m2pem.api import (
     as_geojson,
     expression_dialects,
 )
+from m2pem.fleet.fleet import Video
+from m2pem.mission.expression import Dialect
+from m2pem.mission.expression.described import DialectWords
 from m2pem_plugin_web.access.permissions import Viewer
 from m2pem_plugin_web.problems import RESPONSES
 from m2pem_plugin_web.rest.models import Answer
@@ -53,15 +56,6 @@ class VehicleModel(Answer):
     payloads: list[str]
 
 
-class VideoModel(Answer):
-    """Where a camera's pictures come from: `kind` is hls, webrtc (WHEP), mjpeg or image, of which
-    one is fetched every `every_s` seconds."""
-
-    url: str
-    kind: str
-    every_s: float
-
-
 class PayloadModel(Answer):
     """What is mounted on a vehicle; `video`: null for none."""
 
@@ -69,7 +63,7 @@ class PayloadModel(Answer):
     vehicle: str
     detector: bool
     arbiter: str
-    video: VideoModel | None
+    video: Video | None
 
 
 class TeamModel(Answer):
@@ -130,22 +124,6 @@ class ServiceModel(BaseModel):
     writes: list[str]
 
 
-class FunctionModel(Answer):
-    """A function: the ways to call it (`x?` may be left out), and what it gives."""
-
-    name: str
-    signatures: list[str]
-    doc: str
-
-
-class DialectModel(Answer):
-    """What conditions of a dialect are written with."""
-
-    functions: list[FunctionModel]
-    words: list[str]
-    operators: list[str]
-
-
 def router(control: MissionControl) -> APIRouter:
     """The routes of the catalogue."""
     routes = APIRouter(prefix="/api", tags=["catalogue"], responses=RESPONSES)
@@ -169,14 +147,9 @@ def router(control: MissionControl) -> APIRouter:
         ]
 
     @routes.get("/expressions")
-    async def expressions(_: Viewer) -> dict[str, DialectModel]:
+    async def expressions(_: Viewer) -> Mapping[Dialect, DialectWords]:
         """Return the dialects of expressions: m2pem (bare), juel, xpath and feel."""
-        return {
-            dialect: DialectModel.of(
-                words, functions=[FunctionModel.of(each) for each in words.functions]
-            )
-            for dialect, words in expression_dialects().items()
-        }
+        return expression_dialects()
 
     return routes
 

@@ -3,7 +3,14 @@
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
-from m2pem.api import Draft, MissionControl
+from m2pem.api import (
+    Draft,
+    Finding,
+    MissionControl,
+    OutlineElement,
+    OutlineProcess,
+    OutlineTrigger,
+)
 from m2pem.errors import MissionError
 from m2pem_plugin_web.access.permissions import Viewer
 from m2pem_plugin_web.missions.folder import MissionFolder
@@ -11,37 +18,10 @@ from m2pem_plugin_web.missions.names import PathNames
 from m2pem_plugin_web.problems import RESPONSES
 from m2pem_plugin_web.rest.bounded_threads import BoundedThreads
 from m2pem_plugin_web.rest.drafts import DraftModel, draft_of, source_of
-from m2pem_plugin_web.rest.models import Answer, Body, FindingModel
+from m2pem_plugin_web.rest.models import Answer, Body
 
 AT_ONCE = 2
 """Files that are checked at the same time, in threads."""
-
-
-class ProcessModel(Answer):
-    """A process; `starts`: a run begins with it, unless another is named."""
-
-    id: str
-    name: str
-    executable: bool
-    starts: bool
-
-
-class ElementModel(Answer):
-    """Something drawn, or a flow; `parent`: what it is in, a subprocess or its process."""
-
-    id: str
-    name: str
-    type: str
-    process: str
-    parent: str
-
-
-class TriggerModel(Answer):
-    """A signal or message; `operators`: whether they are expected to send it."""
-
-    id: str
-    name: str
-    operators: bool
 
 
 class DataNameModel(Answer):
@@ -54,17 +34,17 @@ class DataNameModel(Answer):
 class OutlineModel(Answer):
     """What a file has, as far as it can be read."""
 
-    processes: list[ProcessModel]
-    elements: list[ElementModel]
+    processes: list[OutlineProcess]
+    elements: list[OutlineElement]
     names: list[DataNameModel]
-    signals: list[TriggerModel]
-    messages: list[TriggerModel]
+    signals: list[OutlineTrigger]
+    messages: list[OutlineTrigger]
 
 
 class CheckModel(BaseModel):
     """All findings of `m2pem check`; `outline` null: it is no BPMN."""
 
-    findings: list[FindingModel]
+    findings: list[Finding]
     outline: OutlineModel | None
 
 
@@ -96,7 +76,7 @@ def router(control: MissionControl, folder: MissionFolder) -> APIRouter:
             control.check, draft, process=wanted.process, data=wanted.data or ()
         )
         return CheckModel(
-            findings=[FindingModel.of(each) for each in called.findings(findings)],
+            findings=list(called.findings(findings)),
             outline=await threads.run(_outline, control, draft),
         )
 

@@ -1,14 +1,16 @@
 """/api/runs/{run}/breakpoints, step, data, value: runs that are debugged (docs/debugging.md)."""
 
-from typing import Annotated, Any
+from collections.abc import Sequence
+from typing import Annotated
 
 from fastapi import APIRouter, Query
 from pydantic import Field, StringConstraints
 
-from m2pem.api import MissionControl
+from m2pem.api import MissionControl, ScopeData
+from m2pem.api.runs import ExpressionValue
 from m2pem_plugin_web.access.permissions import Operator, Viewer
 from m2pem_plugin_web.problems import RESPONSES
-from m2pem_plugin_web.rest.models import Answer, Body, Data, Name, known_run
+from m2pem_plugin_web.rest.models import Body, Data, Name, known_run
 
 MAX_SCOPE = 2**31 - 1
 Condition = Annotated[str, StringConstraints(min_length=1, max_length=2_000)]
@@ -26,28 +28,6 @@ class DataModel(Body):
 
     data: Data
     scope: Annotated[int, Field(ge=0, le=MAX_SCOPE)] = 0
-
-
-class ScopeDataModel(Answer):
-    """Data of a process, subprocess or task; both ids "": of the data stores. `scope`: the number
-    with which it is changed, null: it cannot be. `instance`: of a loop or multi-instance activity,
-    from 0. `token`: on the activity whose own data it is."""
-
-    process: str
-    element: str
-    data: dict[str, Any]
-    scope: int | None
-    instance: int | None
-    token: int | None
-
-
-class ExpressionValueModel(Answer):
-    """The value of an expression, and its kind. `reason`: which name is not set, so that it is
-    null; "": none."""
-
-    value: Any
-    kind: str
-    reason: str
 
 
 def router(control: MissionControl) -> APIRouter:
@@ -73,21 +53,19 @@ def router(control: MissionControl) -> APIRouter:
             await control.set_data(run, wanted.data, scope=wanted.scope, by=person.name)
 
     @routes.get("/runs/{run}/data")
-    async def data(_: Viewer, run: str) -> list[ScopeDataModel]:
+    async def data(_: Viewer, run: str) -> Sequence[ScopeData]:
         """Return the data of a run that goes on: of its data stores, then of each active process,
         and of subprocesses and tasks that have some."""
         async with known_run(control, run):
-            found = await control.data(run)
-        return [ScopeDataModel.of(each) for each in found]
+            return await control.data(run)
 
     @routes.get("/runs/{run}/value")
     async def value(
         _: Viewer, run: str, expression: Condition, token: Annotated[int, Query(ge=0)] = 0
-    ) -> ExpressionValueModel:
+    ) -> ExpressionValue:
         """Return the value of an expression, as the element sees the data that a token is on; 0:
         as the first process does."""
         async with known_run(control, run):
-            found = await control.evaluate(run, expression, token=token)
-        return ExpressionValueModel.of(found)
+            return await control.evaluate(run, expression, token=token)
 
     return routes

@@ -4,26 +4,13 @@ import math
 
 from fastapi import APIRouter
 
-from m2pem.api import MissionControl
+from m2pem.api import MissionControl, NotEstimated, TaskEstimate
 from m2pem_plugin_web.access.permissions import Viewer
 from m2pem_plugin_web.missions.folder import MissionFolder
 from m2pem_plugin_web.problems import RESPONSES
 from m2pem_plugin_web.rest.bounded_threads import BoundedThreads
 from m2pem_plugin_web.rest.drafts import DraftModel, draft_of
 from m2pem_plugin_web.rest.models import Answer
-
-
-class TaskEstimateModel(Answer):
-    """A task of a vehicle or payload. `battery_left`: of the vehicle after it; below 0 if that does
-    not last."""
-
-    element: str
-    label: str
-    vehicle: str
-    begins_s: float
-    distance_m: float
-    time_s: float
-    battery_left: float
 
 
 class VehicleEstimateModel(Answer):
@@ -38,22 +25,14 @@ class VehicleEstimateModel(Answer):
     stated: bool
 
 
-class LeftOutModel(Answer):
-    """An element that is not estimated, or in part, and why."""
-
-    element: str
-    label: str
-    reason: str
-
-
 class MissionEstimateModel(Answer):
     """A mission. `reserve`: the part of a full battery that plans leave unused."""
 
     time_s: float
     reserve: float
     vehicles: list[VehicleEstimateModel]
-    tasks: list[TaskEstimateModel]
-    left_out: list[LeftOutModel]
+    tasks: list[TaskEstimate]
+    left_out: list[NotEstimated]
 
 
 def router(control: MissionControl, folder: MissionFolder) -> APIRouter:

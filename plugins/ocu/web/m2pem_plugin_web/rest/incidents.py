@@ -1,27 +1,13 @@
 """/api/incidents, /api/runs/{run}/incidents/...: errors about which operators decide."""
 
+from collections.abc import Sequence
+
 from fastapi import APIRouter
 
-from m2pem.api import IncidentPreview, MissionControl
+from m2pem.api import IncidentPreview, MissionControl, OpenIncident
 from m2pem_plugin_web.access.permissions import Operator, Viewer
 from m2pem_plugin_web.problems import RESPONSES
 from m2pem_plugin_web.rest.models import Answer, Body, Data, Name, known_run
-
-
-class IncidentModel(Answer):
-    """An error that no event catches: `MissionControl.incidents`."""
-
-    run: str
-    incident: str
-    element: str
-    task: str
-    code: str
-    reason: str
-    choices: list[str]
-    resources: list[str]
-    roles: dict[str, list[str]]
-    targets: dict[str, str]
-    operator_role: str
 
 
 class ChoiceModel(Body):
@@ -75,9 +61,9 @@ def router(control: MissionControl) -> APIRouter:
     routes = APIRouter(prefix="/api", tags=["incidents"], responses=RESPONSES)
 
     @routes.get("/incidents")
-    async def incidents(_: Viewer) -> list[IncidentModel]:
+    async def incidents(_: Viewer) -> Sequence[OpenIncident]:
         """The incidents of all runs that are open."""
-        return [IncidentModel.of(each) for each in await control.incidents()]
+        return await control.incidents()
 
     @routes.post("/runs/{run}/incidents/{incident}/preview")
     async def preview(_: Operator, run: str, incident: str, wanted: ChoiceModel) -> OutlookModel:

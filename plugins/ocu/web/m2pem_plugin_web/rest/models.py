@@ -10,10 +10,10 @@ from m2pem.api import (
     MAX_DATA_VALUES,
     MAX_NAME_CHARACTERS,
     MAX_REASON_CHARACTERS,
+    Decision,
     MissionControl,
     RunStatus,
     RunSummary,
-    Severity,
 )
 from m2pem.errors import NotDrivenError
 from m2pem_plugin_web.problems import ProblemError
@@ -88,13 +88,6 @@ class RecordPage(BaseModel):
     next: int | None
 
 
-class DecisionModel(BaseModel):
-    """A choice: `value` is kept, `label` is shown."""
-
-    value: str
-    label: str
-
-
 class PromptModel(BaseModel):
     """An open prompt."""
 
@@ -103,23 +96,8 @@ class PromptModel(BaseModel):
     process: str
     element: str
     text: str
-    decisions: list[DecisionModel]
+    decisions: list[Decision]
     role: str
-
-
-class FindingModel(Answer):
-    """What is wrong, or doubtful: where, and what would be right. `line` 0: none applies.
-    `place`: its latitude and longitude in degrees, if it has one."""
-
-    severity: Severity
-    rule: str
-    number: str
-    file: str
-    line: int
-    element: str
-    message: str
-    remedy: str
-    place: tuple[float, float] | None = None
 
 
 async def find_run(control: MissionControl, run: str) -> RunSummary:

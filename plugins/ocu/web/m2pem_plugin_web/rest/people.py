@@ -5,22 +5,10 @@ from typing import Annotated
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
-from m2pem.api import MAX_NOTE_CHARACTERS, MissionControl, person_of
+from m2pem.api import MAX_NOTE_CHARACTERS, MissionControl, OperatorPresence, person_of
 from m2pem_plugin_web.access.permissions import Operator, Viewer
 from m2pem_plugin_web.problems import RESPONSES
 from m2pem_plugin_web.rest.models import Answer, Body, known_resource, known_run
-
-
-class PresenceModel(Answer):
-    """An operator is present at a unit: `OperatorPresence`."""
-
-    by: str
-    unit: str
-    role: str
-    run: str
-    page: str
-    since_us: int
-    editing: str
 
 
 class ControlRequestModel(Answer):
@@ -40,7 +28,7 @@ class ControlRequestModel(Answer):
 class OperatorsModel(BaseModel):
     """Who is present, and who asks whom for what."""
 
-    operators: list[PresenceModel]
+    operators: list[OperatorPresence]
     control_requests: list[ControlRequestModel]
 
 
@@ -64,7 +52,7 @@ def router(control: MissionControl) -> APIRouter:
     async def operators(person: Viewer) -> OperatorsModel:
         """Who is present, and who asks whom for what."""
         return OperatorsModel(
-            operators=[PresenceModel.of(each) for each in await control.operators()],
+            operators=list(await control.operators()),
             control_requests=[
                 ControlRequestModel.of(
                     each, mine=_same(each.holder, person.name), own=_same(each.by, person.name)

@@ -9,13 +9,13 @@ import msgspec
 from fastapi import APIRouter, Query, Response
 from pydantic import AwareDatetime, BaseModel, Field
 
-from m2pem.api import MissionControl, MissionFile, SimulationResult
+from m2pem.api import Finding, MissionControl, MissionFile, SimulationResult
 from m2pem_plugin_web.access.permissions import Operator, Viewer
 from m2pem_plugin_web.jobs import Job, Jobs, JobState
 from m2pem_plugin_web.missions.folder import MissionFolder
 from m2pem_plugin_web.problems import RESPONSES, ProblemError
 from m2pem_plugin_web.rest.drafts import DraftModel, draft_of
-from m2pem_plugin_web.rest.models import Answer, FindingModel, RecordPage, RunModel, run_model
+from m2pem_plugin_web.rest.models import Answer, RecordPage, RunModel, run_model
 from m2pem_plugin_web.rest.record_pages import new_view, page_of
 from m2pem_plugin_web.rest.runs import LARGEST, MOST_RECORDS, RunMissionModel, file_models
 from m2pem_plugin_web.rest.verifications import JobModel
@@ -46,7 +46,7 @@ class RehearsalModel(Answer):
     state: JobState
     summary: RunModel | None
     problem: str | None
-    findings: list[FindingModel]
+    findings: list[Finding]
 
 
 class SampleModel(BaseModel):

@@ -1,18 +1,28 @@
 """/api/runs/{run}/revision: a running mission goes on with a new version of its file; and the
 versions that it has had."""
 
+from collections.abc import Sequence
 from typing import Annotated
 
 from fastapi import APIRouter
 from pydantic import Field, model_validator
 
-from m2pem.api import Draft, MissionControl, MissionSource, RevisionPreview
+from m2pem.api import (
+    Draft,
+    Finding,
+    MissionControl,
+    MissionSource,
+    RevisionEffect,
+    RevisionPreview,
+    RevisionRefusal,
+    RunVersion,
+)
 from m2pem_plugin_web.access.permissions import Commander, Operator, Viewer
 from m2pem_plugin_web.missions.folder import MissionFolder
 from m2pem_plugin_web.problems import RESPONSES
 from m2pem_plugin_web.rest.drafts import WrittenName, of_folder, source_of
 from m2pem_plugin_web.rest.incidents import OutlookModel, outlook_model
-from m2pem_plugin_web.rest.models import Answer, Body, FindingModel, Name, find_run, known_run
+from m2pem_plugin_web.rest.models import Answer, Body, Name, find_run, known_run
 
 MOST_MOVES = 1000
 
@@ -52,43 +62,6 @@ class RevisionModel(NewVersionModel):
     even_if_stuck: bool = False
 
 
-class VersionModel(Answer):
-    """A version that a run has had from record `seq` on. `at_us`: since then, by the executive's
-    clock; `by`: who began the run, or revised it. `shared_with`: runs under way that have it, too.
-    """
-
-    version: str
-    mission: str
-    seq: int
-    at_us: int
-    by: str
-    shared_with: list[str]
-
-
-class EffectModel(Answer):
-    """What a revision does to a token, or to an event that is awaited. `resources`: what the
-    token commands now."""
-
-    kind: str
-    element: str
-    token: int
-    text: str
-    resources: list[str]
-
-
-class RefusalModel(Answer):
-    """Why it cannot be. `candidates`: where the token can go instead, `labels`: what each of them
-    is called. `resources`: what the token commands now. `can_end`: it can end instead."""
-
-    element: str
-    token: int
-    text: str
-    candidates: list[str]
-    labels: list[str]
-    resources: list[str]
-    can_end: bool
-
-
 class PlanModel(Answer):
     """What a revision would do. `possible`: nothing speaks against it but what may be confirmed;
     `approval`: who must approve the new version before, "" if that is not needed. `busy`: what new
@@ -99,9 +72,9 @@ class PlanModel(Answer):
     previous: str
     possible: bool
     changes: list[str]
-    effects: list[EffectModel]
-    refusals: list[RefusalModel]
-    findings: list[FindingModel]
+    effects: list[RevisionEffect]
+    refusals: list[RevisionRefusal]
+    findings: list[Finding]
     outlook: OutlookModel | None
     approval: str
     busy: list[str]
@@ -128,10 +101,10 @@ def router(control: MissionControl, folder: MissionFolder) -> APIRouter:
         return Draft(await of_folder(folder.file, wanted.mission), source)
 
     @routes.get("/{run}/versions")
-    async def versions(_: Viewer, run: str) -> list[VersionModel]:
+    async def versions(_: Viewer, run: str) -> Sequence[RunVersion]:
         """Each version of its mission that a run has had, the present one last."""
         await find_run(control, run)
-        return [VersionModel.of(each) for each in await control.versions(run)]
+        return await control.versions(run)
 
     @routes.post("/{run}/revision/plan")
     async def plan(_: Operator, run: str, wanted: NewVersionModel) -> PlanModel:

@@ -6,7 +6,7 @@ from fastapi import APIRouter, Request
 from pydantic import BaseModel
 
 from m2pem.api import MissionControl
-from m2pem.api.allocation import SharedSpaceState
+from m2pem.api.allocation import SharedSpaceState, SpaceHolder, WaitingTask
 from m2pem.fleet.fleet import Fleet
 from m2pem.geo.geojson import as_geojson
 from m2pem.mission.geometry import Area, Route
@@ -142,29 +142,6 @@ def prompt_router(control: MissionControl, hub: Hub) -> APIRouter:
     return routes
 
 
-class WaitingTaskModel(Answer):
-    """A task that waits for vehicles or payloads: `MissionControl.waiting`. Times in seconds."""
-
-    run: str
-    allocation: str
-    element: str
-    task: str
-    behavior: str
-    waited_s: float
-    left_s: float | None
-    priority: int
-    reason: str
-    holders: dict[str, str]
-
-
-class SpaceHolderModel(Answer):
-    """A vehicle that has a place in a shared space. `behavior`: "" if it is at rest there."""
-
-    vehicle: str
-    behavior: str
-    lost: bool
-
-
 class SharedSpaceModel(Answer):
     """A shared space of the fleet file: `MissionControl.shared_space`. `geometry` (GeoJSON): an
     area, or a route with a corridor of `width_m`. `waiting`: the tasks that wait for a place."""
@@ -173,8 +150,8 @@ class SharedSpaceModel(Answer):
     capacity: int
     geometry: dict[str, Any]
     width_m: float | None
-    holders: list[SpaceHolderModel]
-    waiting: list[WaitingTaskModel]
+    holders: list[SpaceHolder]
+    waiting: list[WaitingTask]
 
 
 def space_model(fleet: Fleet, state: SharedSpaceState) -> SharedSpaceModel:
@@ -195,7 +172,7 @@ class HoldersModel(BaseModel):
 
     holders: dict[str, str]
     labels: dict[str, str]
-    waiting: list[WaitingTaskModel]
+    waiting: list[WaitingTask]
     shared_space: list[SharedSpaceModel]
     unavailable: dict[str, str]
 
@@ -217,7 +194,7 @@ def resource_router(control: MissionControl) -> APIRouter:
         return HoldersModel(
             holders={str(each): who for each, who in found.items()},
             labels=dict(await control.holder_labels()),
-            waiting=[WaitingTaskModel.of(each) for each in await control.waiting()],
+            waiting=list(await control.waiting()),
             shared_space=[
                 space_model(control.fleet(), each) for each in await control.shared_space()
             ],

@@ -6,13 +6,13 @@ from typing import Annotated, Any, Literal
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
-from m2pem.api import MissionControl, SearchLimits, SearchProgress
+from m2pem.api import Finding, MissionControl, SearchLimits, SearchProgress
 from m2pem_plugin_web.access.permissions import Operator, Viewer
 from m2pem_plugin_web.jobs import Jobs, JobState
 from m2pem_plugin_web.missions.folder import MissionFolder
 from m2pem_plugin_web.problems import RESPONSES
 from m2pem_plugin_web.rest.drafts import DraftModel, draft_of
-from m2pem_plugin_web.rest.models import Answer, FindingModel
+from m2pem_plugin_web.rest.models import Answer
 
 LONGEST_S = 3600.0
 MOST_STATES = 10_000_000
@@ -45,27 +45,16 @@ class JobModel(BaseModel):
     id: str
 
 
-class ProgressModel(Answer):
-    """How far it is: `waiting` of the `states` found are still to be searched. `decided`: by
-    property or requirement, its verdict, if that is certain already."""
-
-    seconds: float
-    states: int
-    waiting: int
-    memory_mb: float
-    decided: dict[str, str]
-
-
 class VerificationModel(Answer):
     """A verification. `report`: as docs/verification.schema.json says, when it is done."""
 
     id: str
     by: str
     state: JobState
-    progress: ProgressModel
+    progress: SearchProgress
     report: dict[str, Any] | None
     problem: str | None
-    findings: list[FindingModel]
+    findings: list[Finding]
 
 
 def router(control: MissionControl, folder: MissionFolder, jobs: Jobs[Report]) -> APIRouter:
