@@ -60,7 +60,7 @@ NO_HEADER = RunHeader("", b"", "")
 
 
 class DatabaseJournal(ABC):
-    """One thread writes, another reads; the event loop never waits for the database.
+    """A `Journal`: one thread writes, another reads; the event loop never waits for the database.
 
     `file`: beside which other files are kept. `reading`: a connection for the thread that reads.
     """
@@ -114,7 +114,6 @@ class DatabaseJournal(ABC):
 
     @property
     def file(self) -> Path | None:
-        """See `Journal.file`."""
         return self._path
 
     @property
@@ -124,7 +123,6 @@ class DatabaseJournal(ABC):
 
     @property
     def owned_until_s(self) -> float | None:
-        """See `Journal.owned_until_s`."""
         return None
 
     @abstractmethod
@@ -139,27 +137,22 @@ class DatabaseJournal(ABC):
     async def serve_fleet(
         self, fleet: str, resources: Collection[str], digest: str = "", page: str = ""
     ) -> None:
-        """See `Journal.serve_fleet`."""
         await self._write(
             lambda transaction: transaction.serve_fleet(fleet, resources, digest, page)
         )
 
     async def leave_fleet(self, fleet: str) -> None:
-        """See `Journal.leave_fleet`."""
         await self._write(lambda transaction: transaction.leave_fleet(fleet))
 
     async def fleet_server(self, fleet: str, resources: Collection[str]) -> FleetServer | None:
-        """See `Journal.fleet_server`."""
         return await self._read(lambda: self._fleet_server(fleet, resources))
 
     async def create(self, header: RunHeader, started: EntryChange | None = None) -> str:
-        """See `Journal.create`."""
         return await self._holding(
             lambda transaction: transaction.create(header, started), run_number
         )
 
     async def claim(self, run: str) -> int:
-        """See `Journal.claim`."""
         number = run_number(run)
         return await self._holding(lambda transaction: transaction.claim(number), lambda _: number)
 
@@ -280,7 +273,6 @@ class DatabaseJournal(ABC):
         return entries, before
 
     async def revisions(self, run: str) -> Sequence[Entry]:
-        """See `Journal.revisions`."""
         return await self._read(partial(self._revisions_of, run_number(run)))
 
     def _revisions_of(self, number: int) -> list[Entry]:
@@ -323,7 +315,6 @@ class DatabaseJournal(ABC):
         return JournalError(f"{self._place}: {run_id(number)}, record {seq}: {why}")
 
     async def runs(self, *, files: bool = True) -> Sequence[RunInfo]:
-        """See `Journal.runs`."""
         return await self._read(lambda: self._infos(_WITH_FILES if files else _WITHOUT_FILES))
 
     def _infos(self, columns: str) -> list[RunInfo]:
@@ -362,13 +353,11 @@ class DatabaseJournal(ABC):
             pass
 
     async def deletions(self) -> Sequence[Deletion]:
-        """See `Journal.deletions`."""
         return await self._read(lambda: deletions_in(self._reading))
 
     # --- the schedule ---------------------------------------------------------------------------
 
     async def schedule(self, plan: SchedulePlan, state: EntryState) -> ScheduleEntry:
-        """See `Journal.schedule`."""
         self._check_open()
         text = encode_part(plan)
         return await self._writer.submit(
@@ -376,12 +365,10 @@ class DatabaseJournal(ABC):
         )
 
     async def change_entry(self, change: EntryChange, *, deletes: str = "") -> None:
-        """See `Journal.change_entry`."""
         now_us = time.time_ns() // 1000
         await self._write(lambda transaction: transaction.change_entry(change, deletes, now_us))
 
     async def entries(self) -> Sequence[ScheduleEntry]:
-        """See `Journal.entries`."""
         return await self._read(self._entries)
 
     def _entries(self) -> list[ScheduleEntry]:
@@ -394,7 +381,6 @@ class DatabaseJournal(ABC):
         ]
 
     async def schedule_revisions(self) -> Mapping[str, int]:
-        """See `Journal.schedule_revisions`."""
         return await self._read(self._schedule_revisions)
 
     def _schedule_revisions(self) -> Mapping[str, int]:
@@ -407,15 +393,12 @@ class DatabaseJournal(ABC):
         return await never
 
     async def remove_entries(self, entries: Sequence[str]) -> None:
-        """See `Journal.remove_entries`."""
         await self._write(lambda transaction: transaction.remove_entries(entries))
 
     async def hold_schedule(self, fleet: str, hold: Hold | None) -> None:
-        """See `Journal.hold_schedule`."""
         await self._write(lambda transaction: transaction.hold_schedule(fleet, hold))
 
     async def schedule_hold(self, fleet: str) -> Hold | None:
-        """See `Journal.schedule_hold`."""
         return await self._read(lambda: self._schedule_hold(fleet))
 
     def _schedule_hold(self, fleet: str) -> Hold | None:
@@ -427,15 +410,12 @@ class DatabaseJournal(ABC):
     # --- approvals ------------------------------------------------------------------------------
 
     async def approve(self, approval: Approval) -> None:
-        """See `Journal.approve`."""
         await self._write(lambda transaction: transaction.approve(approval))
 
     async def withdraw_approval(self, approval: Approval) -> None:
-        """See `Journal.withdraw_approval`."""
         await self._write(lambda transaction: transaction.withdraw_approval(approval))
 
     async def approvals(self, fleet: str) -> Sequence[Approval]:
-        """See `Journal.approvals`."""
         return await self._read(lambda: self._approvals(fleet))
 
     def _approvals(self, fleet: str) -> list[Approval]:
@@ -444,11 +424,9 @@ class DatabaseJournal(ABC):
         return sorted(found, key=lambda each: each.at_us)
 
     async def note_edit(self, edit: Edit) -> None:
-        """See `Journal.note_edit`."""
         await self._write(lambda transaction: transaction.note_edit(edit))
 
     async def edits(self, digests: Collection[str]) -> Mapping[str, Edit]:
-        """See `Journal.edits`."""
         return await self._read(lambda: self._edits(digests))
 
     def _edits(self, digests: Collection[str]) -> dict[str, Edit]:
@@ -464,21 +442,17 @@ class DatabaseJournal(ABC):
     async def write_alerts(
         self, fleet: str, alerts: Mapping[int, str | None], *, last: int | None = None
     ) -> None:
-        """See `Journal.write_alerts`."""
         await self._write_numbered(Numbered.ALERTS, fleet, alerts, last)
 
     async def alerts(self, fleet: str) -> Mapping[int, str]:
-        """See `Journal.alerts`."""
         return await self._read(lambda: self._numbered(Numbered.ALERTS, fleet))
 
     async def write_drawings(
         self, fleet: str, drawings: Mapping[int, str | None], *, last: int | None = None
     ) -> None:
-        """See `Journal.write_drawings`."""
         await self._write_numbered(Numbered.DRAWINGS, fleet, drawings, last)
 
     async def drawings(self, fleet: str) -> Mapping[int, str]:
-        """See `Journal.drawings`."""
         return await self._read(lambda: self._numbered(Numbered.DRAWINGS, fleet))
 
     async def _write_numbered(

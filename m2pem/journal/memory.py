@@ -47,7 +47,7 @@ class _Run:
 
 
 class MemoryJournal:
-    """Keeps the contract of a journal until the process ends.
+    """A `Journal` until the process ends.
 
     `keep`: how many of a run's last entries are kept at least (at most twice as many are held), for
     long runs that are not read; None: all.
@@ -70,7 +70,6 @@ class MemoryJournal:
 
     @property
     def identity(self) -> UUID:
-        """See `Journal.identity`."""
         return self._identity
 
     @property
@@ -80,12 +79,10 @@ class MemoryJournal:
 
     @property
     def lease_s(self) -> float | None:
-        """See `Journal.lease_s`."""
         return None
 
     @property
     def owned_until_s(self) -> float | None:
-        """See `Journal.owned_until_s`."""
         return None
 
     def abandon(self, fleet: str) -> FleetServer | None:
@@ -101,18 +98,15 @@ class MemoryJournal:
         self._fleets.setdefault(fleet, {}).update(dict.fromkeys(resources, me))
 
     async def leave_fleet(self, fleet: str) -> None:
-        """See `Journal.leave_fleet`."""
         self._check_open()
         self._fleets.pop(fleet, None)
 
     async def fleet_server(self, fleet: str, resources: Collection[str]) -> FleetServer | None:
-        """See `Journal.fleet_server`."""
         self._check_open()
         served = self._fleets.get(fleet, {})
         return next((served[each] for each in resources if each in served), None)
 
     async def create(self, header: RunHeader, started: EntryChange | None = None) -> str:
-        """See `Journal.create`."""
         self._check_open()
         if started is not None:
             self._replaceable(started)
@@ -127,7 +121,6 @@ class MemoryJournal:
         return run
 
     async def claim(self, run: str) -> int:
-        """See `Journal.claim`."""
         found = self._find(run)
         if found.driven:
             raise JournalError(f"run {run} is already driven, by this process ({os.getpid()})")
@@ -136,18 +129,15 @@ class MemoryJournal:
         return found.position.epoch
 
     async def check_claim(self, run: str, epoch: int) -> None:
-        """See `Journal.check_claim`."""
         self._check_open()
         self._find(run).position.check_claim(run, epoch)
 
     async def release(self, run: str) -> None:
-        """See `Journal.release`."""
         self._check_open()
         if (found := self._runs.get(run_number(run))) is not None:
             found.driven = False
 
     async def append(self, entries: Sequence[Entry]) -> None:
-        """See `Journal.append`."""
         self._check_open()
         changed: dict[str, RunPosition] = {}
         for entry in entries:
@@ -162,7 +152,6 @@ class MemoryJournal:
             self._keep_entry(self._find(entry.run), entry)
 
     async def check(self) -> None:
-        """See `Journal.check`."""
         self._check_open()
 
     def _keep_entry(self, run: _Run, entry: Entry) -> None:
@@ -199,7 +188,6 @@ class MemoryJournal:
         return found.entries[first : first + _BATCH_ENTRIES]
 
     async def runs(self, *, files: bool = True) -> Sequence[RunInfo]:
-        """See `Journal.runs`."""
         self._check_open()
         return [
             found.position.info(
@@ -211,7 +199,6 @@ class MemoryJournal:
         ]
 
     async def delete(self, runs: Sequence[str], *, by: str, unended: bool = False) -> None:
-        """See `Journal.delete`."""
         for run in runs:
             found = self._find(run)
             if found.driven:
@@ -225,14 +212,12 @@ class MemoryJournal:
             self._deletions[number] = Deletion(run, records, now_us, by)
 
     async def deletions(self) -> Sequence[Deletion]:
-        """See `Journal.deletions`."""
         self._check_open()
         return [self._deletions[number] for number in sorted(self._deletions)]
 
     # --- the schedule ---------------------------------------------------------------------------
 
     async def schedule(self, plan: SchedulePlan, state: EntryState) -> ScheduleEntry:
-        """See `Journal.schedule`."""
         self._check_open()
         encode_part(plan)
         self._last_entry += 1
@@ -241,7 +226,6 @@ class MemoryJournal:
         return entry
 
     async def change_entry(self, change: EntryChange, *, deletes: str = "") -> None:
-        """See `Journal.change_entry`."""
         self._check_open()
         self._replaceable(change)
         if deletes:
@@ -262,12 +246,10 @@ class MemoryJournal:
         self._entries[change.entry] = ScheduleEntry(before.id, before.plan, change.state)
 
     async def entries(self) -> Sequence[ScheduleEntry]:
-        """See `Journal.entries`."""
         self._check_open()
         return list(self._entries.values())
 
     async def schedule_revisions(self) -> Mapping[str, int]:
-        """See `Journal.schedule_revisions`."""
         self._check_open()
         return {entry.id: entry.state.revision for entry in self._entries.values()}
 
@@ -277,7 +259,6 @@ class MemoryJournal:
         return await never
 
     async def remove_entries(self, entries: Sequence[str]) -> None:
-        """See `Journal.remove_entries`."""
         self._check_open()
         for entry in entries:
             if entry not in self._entries:
@@ -288,62 +269,51 @@ class MemoryJournal:
             self._entries.pop(entry, None)
 
     async def hold_schedule(self, fleet: str, hold: Hold | None) -> None:
-        """See `Journal.hold_schedule`."""
         self._check_open()
         self._holds[fleet] = hold
 
     async def schedule_hold(self, fleet: str) -> Hold | None:
-        """See `Journal.schedule_hold`."""
         self._check_open()
         return self._holds.get(fleet)
 
     # --- approvals ------------------------------------------------------------------------------
 
     async def approve(self, approval: Approval) -> None:
-        """See `Journal.approve`."""
         self._check_open()
         self._approvals[approval.fleet, approval.digest, approval.person] = approval
 
     async def withdraw_approval(self, approval: Approval) -> None:
-        """See `Journal.withdraw_approval`."""
         self._check_open()
         self._approvals.pop((approval.fleet, approval.digest, approval.person), None)
 
     async def approvals(self, fleet: str) -> Sequence[Approval]:
-        """See `Journal.approvals`."""
         self._check_open()
         found = [each for each in self._approvals.values() if each.fleet == fleet]
         return sorted(found, key=lambda each: each.at_us)
 
     async def note_edit(self, edit: Edit) -> None:
-        """See `Journal.note_edit`."""
         self._check_open()
         self._edits.setdefault(edit.digest, edit)
 
     async def edits(self, digests: Collection[str]) -> Mapping[str, Edit]:
-        """See `Journal.edits`."""
         self._check_open()
         return {each: self._edits[each] for each in digests if each in self._edits}
 
     async def write_alerts(
         self, fleet: str, alerts: Mapping[int, str | None], *, last: int | None = None
     ) -> None:
-        """See `Journal.write_alerts`."""
         self._write(Numbered.ALERTS, fleet, alerts, last)
 
     async def alerts(self, fleet: str) -> Mapping[int, str]:
-        """See `Journal.alerts`."""
         self._check_open()
         return dict(sorted(self._numbered[Numbered.ALERTS, fleet].items()))
 
     async def write_drawings(
         self, fleet: str, drawings: Mapping[int, str | None], *, last: int | None = None
     ) -> None:
-        """See `Journal.write_drawings`."""
         self._write(Numbered.DRAWINGS, fleet, drawings, last)
 
     async def drawings(self, fleet: str) -> Mapping[int, str]:
-        """See `Journal.drawings`."""
         self._check_open()
         return dict(sorted(self._numbered[Numbered.DRAWINGS, fleet].items()))
 
@@ -362,7 +332,6 @@ class MemoryJournal:
                 kept[number] = text
 
     async def close(self) -> None:
-        """See `Journal.close`."""
         self._closed = True
         for found in self._runs.values():
             found.driven = False

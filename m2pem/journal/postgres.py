@@ -93,7 +93,6 @@ class LeasedRuns:
             )
 
     def release(self, number: int) -> None:
-        """See `RunOwners.release`."""
         self._held.discard(number)
         self._lost.discard(number)
         if self._lost or not self._held:
@@ -194,12 +193,10 @@ class PostgresStorage:
         return f"process {pid} on {host} ({command})"
 
     def refuse_lost(self, number: int) -> None:
-        """See `Storage.refuse_lost`."""
         if self.owners.lost(number):
             raise _lost(number)
 
     def give_up(self, number: int) -> bool:
-        """See `Storage.give_up`."""
         self.connection.execute(
             "DELETE FROM owners WHERE run = ? AND executive = ?", (number, self.owners.lease.id)
         )
@@ -236,14 +233,12 @@ class PostgresStorage:
         return None
 
     def leave_fleet(self, fleet: str) -> None:
-        """See `Storage.leave_fleet`."""
         self.owners.fleets.pop(fleet, None)
         self.connection.execute(
             "DELETE FROM fleets WHERE fleet = ? AND executive = ?", (fleet, self.owners.lease.id)
         )
 
     def add_to_schedule(self, fleet: str, plan: str, state: str, revision: int) -> int:
-        """See `Storage.add_to_schedule`."""
         (number,) = self.connection.execute(
             "UPDATE identity SET last_entry = last_entry + 1 RETURNING last_entry"
         ).fetchone()  # type: ignore[misc]
@@ -255,7 +250,6 @@ class PostgresStorage:
     def commit(
         self, entries: Sequence[tuple[Any, ...]], positions: Mapping[int, RunPosition], wrote: bool
     ) -> None:
-        """See `Storage.commit`."""
         if not self._begun and not positions:
             self._in_transaction = False
             return
@@ -351,7 +345,6 @@ class PostgresStorage:
             time.sleep(_BETWEEN_TRIES_S)
 
     def rollback(self) -> None:
-        """See `Storage.rollback`."""
         begun, self._in_transaction = self._in_transaction and self._begun, False
         if begun and not self._connection.lost:
             self._connection.execute("ROLLBACK")
@@ -361,7 +354,6 @@ class PostgresStorage:
         self._files.check()
 
     def explained(self, error: Exception) -> JournalError:
-        """See `Storage.explained`."""
         explained = explained_error(error, self.place)
         if not self._unknown:
             return explained
@@ -373,7 +365,6 @@ class PostgresStorage:
         return True
 
     def is_worth_a_retry(self, error: Exception) -> bool:
-        """See `Storage.is_worth_a_retry`."""
         self._tries += 1
         passed = not self._unknown and self._tries < _TRIES
         if isinstance(
@@ -504,16 +495,13 @@ class PostgresJournal(DatabaseJournal):
 
     @property
     def owned_until_s(self) -> float | None:
-        """See `Journal.owned_until_s`."""
         return self._lease.until_s if self._owners.any else None
 
     @property
     def lease_s(self) -> float | None:
-        """See `Journal.lease_s`."""
         return self._lease.length_s
 
     def abandon(self, fleet: str) -> FleetServer | None:
-        """See `Journal.abandon`."""
         try:
             with closing(PostgresConnection(self._connect)) as connection:
                 standby = connection.execute(_SERVER, (standby_of(fleet), list(PLACES))).fetchone()
@@ -525,12 +513,10 @@ class PostgresJournal(DatabaseJournal):
         return FleetServer(*standby)
 
     async def changed(self, seen: int) -> int:
-        """See `Journal.changed`."""
         self._check_open()
         return await self._changes.changed(seen)
 
     async def close(self) -> None:
-        """See `Journal.close`."""
         await self._changes.close()
         await super().close()
 

@@ -67,7 +67,6 @@ class SqliteStorage:
         """See `Storage.fence`: a process that has lost its lock has ended."""
 
     def driver(self, number: int, position: RunPosition) -> str:
-        """See `Storage.driver`."""
         return f"process {position.pid}" if self.owners.held(number) else ""
 
     def refuse_lost(self, number: int) -> None:
@@ -99,7 +98,6 @@ class SqliteStorage:
         return None
 
     def leave_fleet(self, fleet: str) -> None:
-        """See `Storage.leave_fleet`."""
         for resource in self._fleets.pop(fleet, set()):
             lock = _fleet_lock(fleet, resource)
             _fleet_note(self._path, lock).unlink(missing_ok=True)
@@ -111,7 +109,6 @@ class SqliteStorage:
             self.leave_fleet(fleet)
 
     def add_to_schedule(self, fleet: str, plan: str, state: str, revision: int) -> int:
-        """See `Storage.add_to_schedule`."""
         added = self.connection.execute(
             "INSERT INTO schedule (fleet, plan, state, revision) VALUES (?, ?, ?, ?)",
             (fleet, plan, state, revision),
@@ -121,7 +118,6 @@ class SqliteStorage:
     def commit(
         self, entries: Sequence[tuple[Any, ...]], positions: Mapping[int, RunPosition], wrote: bool
     ) -> None:
-        """See `Storage.commit`."""
         self._write("INSERT INTO entries", entries)
         changed = [position_columns(*each) for each in positions.items()]
         self._write("REPLACE INTO standings", changed)
@@ -136,16 +132,13 @@ class SqliteStorage:
             self.connection.execute(statement, tuple(chain.from_iterable(some)))
 
     def rollback(self) -> None:
-        """See `Storage.rollback`."""
         if self.connection.in_transaction:
             self.connection.execute("ROLLBACK")
 
     def check(self) -> None:
-        """See `Storage.check`."""
         self._files.check()
 
     def explained(self, error: Exception) -> JournalError:
-        """See `Storage.explained`."""
         if isinstance(error, OSError):
             name = error.filename or self._path
             return JournalError(f"{name}: {disk_fault(error)}")
@@ -153,7 +146,6 @@ class SqliteStorage:
         return explained_error(error, self._path)
 
     def is_transient(self, error: Exception) -> bool:
-        """See `Storage.is_transient`."""
         # Files beside the database are read before anything is written; see `MarkFile`.
         return isinstance(error, OSError) or (
             isinstance(error, sqlite3.Error) and is_transient(error)

@@ -16,7 +16,6 @@ class AlertOperations(ControlParts):
     """See `m2pem.api.mission_control.alerts.AlertControl`."""
 
     async def incidents(self) -> Sequence[OpenIncident]:
-        """The incidents of all runs that are open."""
         return open_incidents(self._supervisor.runners.values(), self._supervisor.fleet)
 
     async def preview_incident(
@@ -29,7 +28,6 @@ class AlertOperations(ControlParts):
         to: str = "",
         roles: Mapping[str, Sequence[str]] | None = None,
     ) -> IncidentPreview:
-        """Whether the mission still completes after a choice about an incident."""
         async with self._explain_end("preview_incident", run):
             refuse_ended(self._supervisor.runner(run))
             item = self._choices.checked(run, incident, choice, bounded(data), to, roles or {})
@@ -47,7 +45,6 @@ class AlertOperations(ControlParts):
         by: str = "",
         even_if_stuck: bool = False,
     ) -> None:
-        """Decide about an incident."""
         async with self._explain_end("resolve_incident", run):
             refuse_ended(self._supervisor.runner(run))
             item = self._choices.checked(run, incident, choice, bounded(data), to, roles or {}, by)
@@ -61,13 +58,10 @@ class AlertOperations(ControlParts):
         await self._ask("resolve_incident", run, item)
 
     async def alerts(self, *, over: bool = False) -> Sequence[OperatorAlert]:
-        """The alerts that are open; with `over`, also those that are over."""
         return self._alerts.alerts(over=over)
 
     async def acknowledge_alert(self, alert: str, *, by: str = "") -> None:
-        """Note that an operator has seen an alert."""
         await self._alerts.acknowledge(alert, by)
 
     async def own_alert(self, alert: str, *, owner: str | None = None, by: str = "") -> None:
-        """Note who takes care of an alert."""
         await self._alerts.own(alert, by if owner is None else owner)

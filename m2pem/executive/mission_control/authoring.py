@@ -28,7 +28,6 @@ class AuthoringOperations(ControlParts):
     def check(
         self, mission: MissionSource, *, process: str | None = None, data: Iterable[str] = ()
     ) -> Sequence[Finding]:
-        """All findings of `m2pem check` for a mission and the fleet in use."""
         try:
             loaded = load_source(mission, self._supervisor.settings.search_path)
         except MissionError as error:
@@ -36,14 +35,12 @@ class AuthoringOperations(ControlParts):
         return self._starter.findings(loaded, process, tuple(data))
 
     def estimate(self, mission: MissionSource, *, process: str | None = None) -> MissionEstimate:
-        """What a mission takes as it is drawn, of each vehicle of the fleet in use."""
         if self._estimate is None:
             raise OperatorError("this executive cannot estimate missions")
         loaded = load_source(mission, self._supervisor.settings.search_path)
         return self._estimate(loaded, self._supervisor.fleet_now, process)
 
     async def simulate(self, mission: MissionSource, **options: Any) -> SimulationResult:
-        """Rehearse a mission with this fleet on a virtual clock."""
         supervisor = self._supervisor
         if self._rehearse is None:
             raise OperatorError("this executive cannot rehearse missions")
@@ -51,44 +48,36 @@ class AuthoringOperations(ControlParts):
         return await self._rehearse(mission, supervisor.fleet_now, **settings)
 
     async def verify(self, mission: MissionSource, **options: Any) -> Mapping[str, Any]:
-        """Verify a mission with this fleet, in a process of its own."""
         supervisor = self._supervisor
         settings = {"search_path": supervisor.settings.search_path, **options}
         return await verify_in_subprocess(mission, supervisor.fleet_now, **settings)
 
     def editable(self, mission: bytes, *, anew: bool = False) -> Editable:
-        """The same mission as an editor takes it."""
         return editable(mission, anew=anew)
 
     def outline(self, mission: bytes | Draft) -> Outline:
-        """What a file has, as far as it can be read."""
         draft = mission if isinstance(mission, Draft) else Draft(Path("mission.bpmn"), mission)
         library = library_of(mission, self._supervisor.settings.search_path)
         return outline(draft.source, library, self.services())
 
     def services(self) -> Mapping[str, Sequence[str]]:
-        """The service-task classes that there are, with what each writes."""
         return self._supervisor.plugins.service_writes()
 
     async def approval(self, mission: MissionSource) -> MissionApproval:
-        """Who has approved a mission, and who must before it may start."""
         loaded = await self._starter.read(mission)
         return await self._starter.approvals.state(loaded.file, loaded.source, loaded.library)
 
     async def approve(
         self, mission: MissionSource, *, digest: str = "", by: str = ""
     ) -> MissionApproval:
-        """Approve a mission."""
         loaded = await self._starter.read(mission)
         approvals = self._starter.approvals
         return await approvals.approve(loaded.file, loaded.source, loaded.library, by, digest)
 
     async def withdraw_approval(self, mission: MissionSource, *, by: str = "") -> MissionApproval:
-        """Withdraw an approval of a mission."""
         loaded = await self._starter.read(mission)
         approvals = self._starter.approvals
         return await approvals.withdraw(loaded.file, loaded.source, loaded.library, by)
 
     async def note_edit(self, digest: str, *, by: str = "") -> None:
-        """Note who has made a file what it is."""
         await self._starter.approvals.note_edit(digest, by)

@@ -29,14 +29,12 @@ class DebugOperations(ControlParts):
         *,
         by: str = "",
     ) -> None:
-        """Set breakpoints in place of those before; they can be deleted on any fleet."""
         if elements or conditions:
             self._refuse_debugging()
         wanted = i.SetBreakpoints(tuple(elements), tuple(conditions), by)
         await self._ask("set_breakpoints", run, wanted)
 
     async def step(self, run: RunId, *, by: str = "") -> None:
-        """Execute one token of a paused run."""
         self._refuse_debugging()
         async with self._explain_end("step", run):
             state = self._supervisor.runner(run).run.state
@@ -47,19 +45,16 @@ class DebugOperations(ControlParts):
     async def set_data(
         self, run: RunId, data: Mapping[str, Value], *, scope: int = 0, by: str = ""
     ) -> None:
-        """Change data of a paused run."""
         self._refuse_debugging()
         await self._ask("set_data", run, i.SetData(bounded(data), scope, by))
 
     async def data(self, run: RunId) -> Sequence[ScopeData]:
-        """The data of each active process, subprocess and task."""
         async with self._explain_end("data", run):
             runner = self._supervisor.runner(run)
             refuse_ended(runner)
             return data_of(runner.run.state)
 
     async def evaluate(self, run: RunId, expression: str, *, token: int = 0) -> ExpressionValue:
-        """The value of an expression over the data of a run that goes on."""
         async with self._explain_end("evaluate", run):
             runner = self._supervisor.runner(run)
             refuse_ended(runner)

@@ -15,38 +15,29 @@ class ExecutiveOperations(ControlParts):
     """See `m2pem.api.mission_control.executive.ExecutiveControl`."""
 
     async def switch_over(self, *, by: str = "") -> ExecutiveAddress:
-        """Leave every run, as it is, to the standby executive, and end."""
         return await self._switchover.ask(by)
 
     async def standbys(self) -> Sequence[ExecutiveAddress]:
-        """The executives that stand by for the fleet of this one."""
         found = await standbys_of(self._supervisor.journal, self._supervisor.fleet.name)
         return [ExecutiveAddress(each.host, each.pid, each.page) for each in found]
 
     def fleet(self) -> Fleet:
-        """The fleet in use."""
         return self._supervisor.fleet
 
     def catalogue(self) -> Mapping[ResourceId, Sequence[BehaviorSpec]]:
-        """What every resource can do."""
         return self._supervisor.arbiters.catalogue()
 
     def simulated(self) -> bool:
-        """Whether nothing real moves."""
         return self._supervisor.arbiters.nothing_is_real
 
     def speed(self) -> float:
-        """Seconds of mission time in a real second."""
         return self._supervisor.settings.speed
 
     async def health(self) -> Sequence[HealthCheck]:
-        """Whether this executive can do its work now."""
         return await self._health.checks()
 
     async def statistics(self) -> ExecutiveStatistics:
-        """What the executive has counted since it began, and what there is now."""
         return self._statistics.read()
 
     def journal_file(self) -> Path | None:
-        """Where the journal is; None: in memory."""
         return self._supervisor.journal.file

@@ -12,17 +12,14 @@ class OperatorOperations(ControlParts):
     """See `m2pem.api.mission_control.operators.OperatorControl`."""
 
     async def request_control(self, resource: str, *, by: str = "") -> None:
-        """Ask the operator who has a vehicle or payload for it."""
         self._supervisor.seen(by)
         await self._supervisor.control_requests.ask(resource, by)
 
     async def answer_control(self, resource: str, *, give: bool, by: str = "") -> None:
-        """Give a vehicle or payload to the operator who asks for it, or refuse."""
         self._supervisor.seen(by)
         await self._supervisor.control_requests.answer(resource, by, give=give)
 
     async def control_requests(self) -> Sequence[OpenControlRequest]:
-        """Who asks whom for which vehicle or payload."""
         return self._supervisor.control_requests.all()
 
     async def announce_presence(
@@ -36,15 +33,12 @@ class OperatorOperations(ControlParts):
         editing: str = "",
         by: str = "",
     ) -> None:
-        """An operator is present at a unit."""
         name = by or UNNAMED_OPERATOR
         presence = OperatorPresence(name, unit, role, run, page, editing=editing)
         self._supervisor.presence.announce(client, presence)
 
     async def end_presence(self, client: str) -> None:
-        """An operator is not present at a unit any more."""
         self._supervisor.presence.leave(client)
 
     async def operators(self) -> Sequence[OperatorPresence]:
-        """Who is present."""
         return self._supervisor.presence.present()

@@ -12,41 +12,33 @@ class ResourceOperations(ControlParts):
     """See `m2pem.api.mission_control.resources.ResourceControl`."""
 
     async def take(self, resource: str, *, by: str = "") -> None:
-        """Take a vehicle or payload from the missions."""
         self._supervisor.seen(by)
         await self._direct.take(resource, by)
 
     async def preview_take(self, resource: str) -> Sequence[TakeEffect]:
-        """What `take` of a resource would end now."""
         return self._supervisor.handover.preview(resource, self._supervisor.runners.values())
 
     async def give_back(self, resource: str, *, reason: str = "", by: str = "") -> None:
-        """Give it back to the missions."""
         self._supervisor.seen(by)
         await self._supervisor.control_release.give_back(
             resource, by, reason, self._supervisor.runners.values()
         )
 
     async def holders(self) -> Mapping[ResourceId, str]:
-        """Who has each resource."""
         return self._supervisor.handover.holders()
 
     async def holder_labels(self) -> Mapping[str, str]:
-        """The task and run of each behavior and request that has a resource, by its id."""
         supervisor = self._supervisor
         holders = supervisor.handover.holders().values()
         labels = {holder: holder_label(supervisor.runners, holder) for holder in holders}
         return {holder: label for holder, label in labels.items() if label}
 
     async def unavailable(self) -> Mapping[ResourceId, str]:
-        """Why missions get some resources not now, by resource; see `MissionControl`."""
         return self._supervisor.unavailable()
 
     async def waiting(self) -> Sequence[WaitingTask]:
-        """The tasks of all runs that wait for vehicles or payloads."""
         supervisor = self._supervisor
         return waiting_tasks(supervisor.runners.values(), supervisor.clock.now_us())
 
     async def shared_space(self) -> Sequence[SharedSpaceState]:
-        """Who has places in the shared spaces of the fleet file, and who waits for one."""
         return self._supervisor.shared_space()

@@ -19,7 +19,6 @@ class RevisionOperations(ControlParts):
     """See `m2pem.api.mission_control.revisions.RevisionControl`."""
 
     async def versions(self, run: RunId) -> Sequence[RunVersion]:
-        """Each version of its mission that a run has had."""
         now: dict[str, list[RunId]] = {}
         for other in self._supervisor.runners.values():
             state = other.run.state
@@ -29,7 +28,6 @@ class RevisionOperations(ControlParts):
         return [replace(had, shared_with=tuple(now.get(had.version, ()))) for had, _ in found]
 
     async def version_files(self, run: RunId, version: str) -> MissionFiles:
-        """The files of a version that a run has had."""
         return files_of(await self._had(run), run, version)
 
     async def _had(self, run: RunId) -> list[tuple[RunVersion, MissionFiles]]:
@@ -47,7 +45,6 @@ class RevisionOperations(ControlParts):
     async def plan_revision(
         self, run: RunId, mission: MissionSource, *, moves: Mapping[str, str] | None = None
     ) -> RevisionPreview:
-        """What it would do to a run to go on with a new version of its mission."""
         async with self._explain_end("plan_revision", run):
             refuse_ended(self._supervisor.runner(run))
             prepared = await self._revisions.prepare(run, mission, moves or {}, "")
@@ -63,7 +60,6 @@ class RevisionOperations(ControlParts):
         by: str = "",
         even_if_stuck: bool = False,
     ) -> None:
-        """Go on with a new version of a run's mission."""
         async with self._explain_end("revise", run):
             refuse_ended(self._supervisor.runner(run))
             prepared = await self._revisions.prepare(run, mission, moves or {}, by)

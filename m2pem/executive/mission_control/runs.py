@@ -34,7 +34,6 @@ class RunOperations(ControlParts):
         by: str = "",
         even_if_busy: bool = False,
     ) -> RunId:
-        """Start a mission, also one that was loaded; returns when the journal has its beginning."""
         return await self._starter.start(
             mission, process, bounded(data), by, even_if_busy=even_if_busy
         )
@@ -47,12 +46,10 @@ class RunOperations(ControlParts):
         *,
         by: str = "",
     ) -> RunId:
-        """Command one behavior from outside of a mission."""
         self._supervisor.seen(by)
         return await self._direct.execute(resource, behavior, bounded(parameters) or {}, by)
 
     async def missions(self) -> Sequence[str]:
-        """The mission files of the search path, the working folder and `missions` in it."""
         here = Path.cwd()
         folders = (*self._supervisor.settings.search_path, here, here / "missions")
         return [str(path) for path in await asyncio.to_thread(mission_files_in, folders)]
@@ -60,18 +57,15 @@ class RunOperations(ControlParts):
     async def preview_start(
         self, mission: MissionSource, *, process: str | None = None, data: Iterable[str] = ()
     ) -> StartPreview:
-        """What a start would begin with now, and what speaks against it."""
         return await self._starter.preview(mission, process, tuple(data))
 
     async def pause(self, run: RunId, *, by: str = "") -> None:
-        """Hold every commanded resource and freeze timers."""
         emergency = self._supervisor.emergency
         async with self._explain_end("pause", run):
             asked = emergency.pause(self._supervisor.runner(run), by)
             await emergency.written("pause", {run: asked})
 
     async def resume(self, run: RunId, *, by: str = "") -> None:
-        """Go on after a pause."""
         await self._ask("resume", run, i.ResumeRun(by))
 
     async def signal(
@@ -82,7 +76,6 @@ class RunOperations(ControlParts):
         data: Mapping[str, Value] | None = None,
         by: str = "",
     ) -> None:
-        """Emit a signal to one run or to all that are active."""
         given = bounded(data)
         if run is not None:
             async with self._explain_end("signal", run):
@@ -119,11 +112,9 @@ class RunOperations(ControlParts):
     async def message(
         self, message: str, *, run: RunId, data: Mapping[str, Value] | None = None, by: str = ""
     ) -> None:
-        """Send a message."""
         await self._ask("message", run, i.MessageReceived(message, bounded(data), by))
 
     async def answer(self, run: RunId, prompt: str, decision: str, *, by: str = "") -> None:
-        """Answer a prompt; the first answer wins."""
         if prompt == LOSS_PROMPT and self._supervisor.losses.is_open(run):
             match decision:
                 case "go_on":
@@ -140,7 +131,6 @@ class RunOperations(ControlParts):
         await self._ask("answer", run, i.PromptAnswer(prompt, decision, by))
 
     async def add_note(self, run: RunId, text: str, *, by: str = "") -> None:
-        """Write a note into a run's log."""
         note = text.strip()
         if not note or len(note) > MAX_NOTE_CHARACTERS:
             raise OperatorError(
@@ -149,7 +139,6 @@ class RunOperations(ControlParts):
         await self._ask("note", run, i.OperatorNoted(note, by or UNNAMED_OPERATOR))
 
     async def stop(self, run: RunId, *, by: str = "", reason: str = "") -> None:
-        """End every token, cancel every behavior."""
         emergency, interrupted = self._supervisor.emergency, self._supervisor.interrupted
         is_taken_up_later = interrupted.stop(run, by, reason)
         if is_taken_up_later and run not in self._supervisor.runners:
@@ -162,7 +151,6 @@ class RunOperations(ControlParts):
                 await emergency.written("stop", {run: asked})
 
     async def stop_all(self, *, by: str = "", reason: str = "") -> Sequence[RunId]:
-        """Stop every run that has not ended, and hold the schedule."""
         emergency, schedule = self._supervisor.emergency, self._schedule
         asked = emergency.stop_all(self._supervisor.runners.values(), by, reason)
         interrupted = self._supervisor.interrupted.stop_all(by, reason)

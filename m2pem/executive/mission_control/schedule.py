@@ -24,7 +24,6 @@ class ScheduleOperations(ControlParts):
         priority: int = 0,
         by: str = "",
     ) -> EntryId:
-        """Have a mission started later."""
         if not self._schedule.served:
             raise OperatorError(
                 "this executive starts no scheduled missions: `m2pem serve` is one that does"
@@ -44,23 +43,18 @@ class ScheduleOperations(ControlParts):
         return await self._schedule.schedule(plan, resources, holds)
 
     async def scheduled(self) -> Schedule:
-        """What starts when, and what it waits for."""
         return self._schedule.view()
 
     async def unschedule(self, entry: EntryId, *, by: str = "") -> None:
-        """Cancel an entry."""
         await self._schedule.cancel(entry, by)
 
     async def start_scheduled(self, entry: EntryId, *, by: str = "") -> RunId:
-        """Start the mission of an entry now."""
         return await self._scheduler.start(entry, by)
 
     async def hold_schedule(
         self, entry: EntryId | None = None, *, by: str = "", reason: str = ""
     ) -> None:
-        """Let an entry, or the whole schedule, start nothing until it is released."""
         await self._schedule.hold(entry, by, reason)
 
     async def release_schedule(self, entry: EntryId | None = None, *, by: str = "") -> None:
-        """Let an entry, or the whole schedule, start missions again."""
         await self._schedule.release(entry, by)

@@ -23,19 +23,16 @@ class WatchOperations(ControlParts):
     def subscribe(
         self, run: RunId | None = None, size: int = 10_000
     ) -> AsyncIterator[ControlEvent]:
-        """What is committed from now on, and first the prompts that are open."""
         subscription = self._supervisor.events.subscribe(run, size)
         subscription.put(self.prompts())
         return subscription
 
     def telemetry(self, size: int = 100) -> AsyncIterator[Telemetry]:
-        """Telemetry from now on."""
         return self._bus.subscribe(size)
 
     async def records(
         self, run: RunId, after_seq: int = 0, limit: int = 1000
     ) -> Sequence[StampedRecord]:
-        """A page of a run's records; it ends with those of an input, so it may be longer."""
         page: list[StampedRecord] = []
         async for entry in self._supervisor.journal.read(run, after_seq):
             page += stamped_records(run, entry.seq, entry.t_us / 1_000_000, entry.records)
@@ -44,7 +41,6 @@ class WatchOperations(ControlParts):
         return page
 
     async def runs(self) -> Sequence[RunSummary]:
-        """Every run of the journal but those that it has lost whole."""
         lines = await self._supervisor.journal.runs(files=False)
 
         def summaries() -> list[RunSummary]:
@@ -54,7 +50,6 @@ class WatchOperations(ControlParts):
         return summaries() if len(lines) < MANY_RUNS else await asyncio.to_thread(summaries)
 
     def prompts(self) -> Sequence[OpenPrompt]:
-        """The prompts that are open."""
         return [
             prompt
             for runner in self._supervisor.runners.values()
@@ -62,7 +57,6 @@ class WatchOperations(ControlParts):
         ]
 
     async def mission(self, run: RunId) -> Mission:
-        """The mission of a run as it is now, of an older one from the journal."""
         runner = self._supervisor.runners.get(run)
         if runner is not None:
             return runner.run.state.mission
@@ -74,14 +68,12 @@ class WatchOperations(ControlParts):
         raise OperatorError(f"the journal has no run {run}")
 
     async def mission_time_s(self, run: RunId) -> float:
-        """Seconds from the start of a run."""
         state = self._supervisor.runner(run).run.state
         if state.status is EngineStatus.ENDED:
             raise OperatorError(f"{run} has ended")
         return max(0, state.mission_time_us(self._supervisor.clock.now_us())) / 1_000_000
 
     async def wait(self, run: RunId) -> RunSummary:
-        """Wait until the run has ended and its vehicles are released."""
         runner = self._supervisor.runner(run)
         await runner.done.wait()
         if runner.failure is not None:

@@ -97,7 +97,7 @@ class FolderPictures:
 
 
 class MemoryPictures:
-    """Pictures of a journal in memory, of its last runs."""
+    """As `FolderPictures`, for a journal in memory: of its last runs."""
 
     def __init__(self, most: int = MOST_IN_MEMORY, most_bytes: int = MEMORY_BYTES) -> None:
         self._most = most
@@ -105,7 +105,6 @@ class MemoryPictures:
         self._kept: OrderedDict[RunId, dict[int, Picture]] = OrderedDict()
 
     def put(self, run: RunId, number: int, picture: Picture) -> None:
-        """See `FolderPictures.put`."""
         pictures = self._kept.setdefault(run, {})
         size = sum(len(each.content) for each in pictures.values())
         if size + len(picture.content) > self._most_bytes:
@@ -115,15 +114,12 @@ class MemoryPictures:
             self._kept.popitem(last=False)
 
     def get(self, run: RunId, number: int) -> Picture | None:
-        """See `FolderPictures.get`."""
         return self._kept.get(run, {}).get(number)
 
     def runs(self) -> Iterable[RunId]:
-        """See `FolderPictures.runs`."""
         return list(self._kept)
 
     def remove(self, run: RunId, after: int = 0) -> None:
-        """See `FolderPictures.remove`."""
         pictures = self._kept.get(run, {})
         for number in [each for each in pictures if each > after]:
             del pictures[number]

@@ -152,7 +152,7 @@ def _write(descriptor: int, text: bytes) -> None:
 
 
 class MemoryStore:
-    """Tracks of a journal in memory."""
+    """As `FolderStore`, for a journal in memory."""
 
     def __init__(self, most: int = MOST_IN_MEMORY, most_bytes: int = MEMORY_BYTES) -> None:
         self._most = most
@@ -160,43 +160,36 @@ class MemoryStore:
         self._texts: OrderedDict[RunId, MemoryText] = OrderedDict()
 
     def open(self, run: RunId) -> "MemoryText":
-        """See `FolderStore.open`."""
         text = self._texts.setdefault(run, MemoryText())
         while len(self._texts) > self._most:
             self._texts.popitem(last=False)
         return text
 
     def read(self, run: RunId, size: int = -1) -> bytes:
-        """See `FolderStore.read`."""
         text = self._texts.get(run)
         whole = text.read() if text is not None else b""
         return whole if size < 0 else whole[:size]
 
     def runs(self) -> Iterable[RunId]:
-        """See `FolderStore.runs`."""
         return list(self._texts)
 
     def remove(self, run: RunId) -> None:
-        """See `FolderStore.remove`."""
         self._texts.pop(run, None)
 
 
 class MemoryText:
-    """A track in memory."""
+    """As `TextFile`, in memory."""
 
     def __init__(self) -> None:
         self._text = bytearray()
 
     def read(self) -> bytes:
-        """See `TextFile.read`."""
         return bytes(self._text)
 
     def append(self, text: bytes) -> None:
-        """See `TextFile.append`."""
         self._text += text
 
     def replace(self, text: bytes) -> None:
-        """See `TextFile.replace`."""
         self._text = bytearray(text)
 
     def close(self) -> None:
