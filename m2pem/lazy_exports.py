@@ -1,8 +1,8 @@
 """Packages whose names are imported when they are asked for, so that an import costs little.
 
 Such a package imports its names for type checkers alone: `if TYPE_CHECKING: from a.b import C as
-C`, one a line, which also says that it offers them. What is imported at run time is read there, so
-that no second list can differ from it.
+C`, which also says that it offers them. What is imported at run time is read there, so that no
+second list can differ from it.
 """
 
 import re
@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from importlib import import_module
 from typing import Any
 
-_IMPORT = re.compile(r"^    from (\S+) import (\w+) as \2$", re.MULTILINE)
+_IMPORT = re.compile(r"^    from (\S+) import (?:\(\s+)?(\w+) as \2\b", re.MULTILINE)
 
 
 def lazy_exports(package: str, file: str) -> tuple[Mapping[str, str], Callable[[str], Any]]:
@@ -25,7 +25,10 @@ def lazy_exports(package: str, file: str) -> tuple[Mapping[str, str], Callable[[
     def load(name: str) -> Any:
         if name not in modules:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        value = getattr(import_module(modules[name]), name)
+        module = import_module(modules[name])
+        if not hasattr(module, name):  # a module in that package
+            import_module(f"{modules[name]}.{name}")
+        value = getattr(module, name)
         setattr(sys.modules[package], name, value)
         return value
 

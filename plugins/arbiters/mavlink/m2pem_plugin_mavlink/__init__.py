@@ -7,66 +7,33 @@ transactions to perform on it. `signing_of` reads how the vehicle's frames are s
 loaded when it is first used.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from m2pem_plugin_mavlink.hooks import (
-    m2pem_check_host,
-    m2pem_register_arbiters,
-    m2pem_register_commands,
-    m2pem_register_faces,
-)
+from m2pem.lazy_exports import lazy_exports
+from m2pem_plugin_mavlink.hooks import m2pem_check_host as m2pem_check_host
+from m2pem_plugin_mavlink.hooks import m2pem_register_arbiters as m2pem_register_arbiters
+from m2pem_plugin_mavlink.hooks import m2pem_register_commands as m2pem_register_commands
+from m2pem_plugin_mavlink.hooks import m2pem_register_faces as m2pem_register_faces
 
 if TYPE_CHECKING:
-    from m2pem_plugin_mavlink.link.routed_link import RoutedLink, open_link
-    from m2pem_plugin_mavlink.link.vehicle_link import VehicleLink
-    from m2pem_plugin_mavlink.microservices import camera, camera_images, gimbal, gimbal_status
-    from m2pem_plugin_mavlink.microservices.message_requests import SetMessageInterval
-    from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
-    from m2pem_plugin_mavlink.protocol.transaction import (
-        ExchangeError,
-        NoAnswerError,
-        RefusedError,
+    from m2pem_plugin_mavlink.link.routed_link import RoutedLink as RoutedLink
+    from m2pem_plugin_mavlink.link.routed_link import open_link as open_link
+    from m2pem_plugin_mavlink.link.vehicle_link import VehicleLink as VehicleLink
+    from m2pem_plugin_mavlink.microservices import camera as camera
+    from m2pem_plugin_mavlink.microservices import camera_images as camera_images
+    from m2pem_plugin_mavlink.microservices import gimbal as gimbal
+    from m2pem_plugin_mavlink.microservices import gimbal_status as gimbal_status
+    from m2pem_plugin_mavlink.microservices.message_requests import (
+        SetMessageInterval as SetMessageInterval,
     )
-    from m2pem_plugin_mavlink.signing.policy import signing_of
+    from m2pem_plugin_mavlink.protocol.messages import Address as Address
+    from m2pem_plugin_mavlink.protocol.messages import Message as Message
+    from m2pem_plugin_mavlink.protocol.messages import message_type as message_type
+    from m2pem_plugin_mavlink.protocol.transaction import ExchangeError as ExchangeError
+    from m2pem_plugin_mavlink.protocol.transaction import NoAnswerError as NoAnswerError
+    from m2pem_plugin_mavlink.protocol.transaction import RefusedError as RefusedError
+    from m2pem_plugin_mavlink.signing.policy import signing_of as signing_of
 
-__all__ = [
-    "Address",
-    "ExchangeError",
-    "Message",
-    "NoAnswerError",
-    "RefusedError",
-    "RoutedLink",
-    "SetMessageInterval",
-    "VehicleLink",
-    "camera",
-    "camera_images",
-    "gimbal",
-    "gimbal_status",
-    "m2pem_check_host",
-    "m2pem_register_arbiters",
-    "m2pem_register_commands",
-    "m2pem_register_faces",
-    "message_type",
-    "open_link",
-    "signing_of",
-]
+_LAZY, __getattr__ = lazy_exports(__name__, __file__)
 
-_MODULES = {
-    "link.routed_link": "RoutedLink open_link",
-    "link.vehicle_link": "VehicleLink",
-    "microservices.message_requests": "SetMessageInterval",
-    "protocol.messages": "Address Message message_type",
-    "protocol.transaction": "ExchangeError NoAnswerError RefusedError",
-    "signing.policy": "signing_of",
-}
-_LAZY = {name: module for module, names in _MODULES.items() for name in names.split()}
-_SERVICES = ("camera", "camera_images", "gimbal", "gimbal_status")
-
-
-def __getattr__(name: str) -> Any:
-    if name in _SERVICES:
-        return import_module(f"{__name__}.microservices.{name}")
-    if name not in _LAZY:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_LAZY[name]}"), name)
+__all__ = list(_LAZY)
