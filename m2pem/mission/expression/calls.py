@@ -7,12 +7,9 @@ JUEL: methods of texts and lists, Camunda's `execution.getVariable('x')`, and Fl
 from collections.abc import Callable, Mapping, Sequence
 
 from m2pem.mission.expression.dialect import Dialect
-from m2pem.mission.expression.feel_functions import FEEL_FUNCTIONS, FeelFunction
-from m2pem.mission.expression.functions import (
-    FUNCTIONS,
-    OWN,
-    Function,
-)
+from m2pem.mission.expression.feel_functions import FEEL_FUNCTIONS
+from m2pem.mission.expression.functions import FUNCTIONS, OWN
+from m2pem.mission.expression.signatures import Function
 from m2pem.mission.expression.temporal import NOW
 from m2pem.mission.expression.tree import (
     And,
@@ -86,10 +83,10 @@ def feel_call(name: str, arguments: Arguments, names: Sequence[str]) -> Node:
     return Call(f"FEEL {name}", arguments)
 
 
-def _in_order(function: FeelFunction, given: Mapping[str, Node]) -> tuple[str, Arguments]:
+def _in_order(function: Function, given: Mapping[str, Node]) -> tuple[str, Arguments]:
     """Which way to call a function the names mean, and its arguments as that has them; too many
     where a name is wrong."""
-    for number, each in enumerate((function, *function.others)):
+    for number, each in enumerate(function.ways):
         known = [parameter.name for parameter in each.parameters]
         if given.keys() <= {*known}:
             last = max((known.index(name) for name in given), default=-1)
@@ -117,7 +114,7 @@ def method_call(receiver: Node, method: str, arguments: Arguments) -> Node:
 
 def _function(name: str, arguments: Arguments, dialect: Dialect = Dialect.JUEL) -> Node:
     own = OWN.get(dialect.name, {})
-    functions: dict[str, Function] = {**FUNCTIONS, **own}
+    functions = {**FUNCTIONS, **own}
     prefix = f"{dialect.name} " if name in own else ""
     function = functions.get(name)
     if function is None:

@@ -7,80 +7,50 @@ item, and a value for a list of it, where the other is wanted (clause 10.3.2.9.4
 import math
 import re
 import statistics
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from decimal import (
-    ROUND_CEILING,
-    ROUND_DOWN,
-    ROUND_FLOOR,
-    ROUND_HALF_DOWN,
-    ROUND_HALF_EVEN,
-    ROUND_HALF_UP,
-    ROUND_UP,
-    Decimal,
-    InvalidOperation,
-    localcontext,
-)
+from decimal import Decimal, InvalidOperation, localcontext
 
 from m2pem.mission.expression import feel_library as lib
 from m2pem.mission.expression import feel_values as v
 from m2pem.mission.expression.feel_library import NoValueError
 from m2pem.mission.expression.feel_values import DIGITS, FeelValue, number
 from m2pem.mission.expression.operators import bounded_list, bounded_text, look_at
-from m2pem.mission.expression.temporal import (
-    DATE,
-    DAYS,
-    MOMENT,
-    MONTHS,
-    TIME,
-    iso,
-    read_duration,
-)
-
-NUMBER, TEXT, BOOLEAN, LIST, CONTEXT = ("number",), ("text",), ("boolean",), ("list",), ("context",)
-ANY: tuple[str, ...] = ()
-"""Kinds that a parameter takes; none: all, null too."""
+from m2pem.mission.expression.signatures import Function, Parameter
+from m2pem.mission.expression.temporal import iso, read_duration
 
 
 @dataclass(frozen=True, slots=True)
-class Parameter:
-    """A parameter: its name, the kinds it takes, and whether it may be left out or be null."""
+class FeelFunction(Function):
+    """A function of FEEL. One that takes a list alone, which is `repeated`, takes its items as
+    arguments as well."""
 
-    name: str
-    kinds: tuple[str, ...] = ANY
-    optional: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class FeelFunction:
-    """A function of FEEL. `rest`: the list may be written as the arguments themselves. `more`: the
-    last parameter may be there several times. `others`: other ways to call it. `gives`: the kinds
-    of its values besides null; none: any. `decimals`: it computes with numbers."""
-
-    name: str
-    parameters: tuple[Parameter, ...]
-    compute: Callable[..., FeelValue]
-    rest: bool = False
-    gives: tuple[str, ...] = ()
-    others: tuple["FeelFunction", ...] = ()
-    more: bool = False
-    decimals: bool = False
-    _least: int = field(init=False)
+    _of_items: bool = field(init=False)
+    _decimals: bool = field(init=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "_least", sum(not each.optional for each in self.parameters))
+        Function.__post_init__(self)
+        taken = [each.kinds for each in self.parameters]
+        of_items = self.repeated and taken == [("list",)]
+        object.__setattr__(self, "_of_items", of_items)
+        decimals = of_items or any("number" in each for each in (self.gives, *taken))
+        object.__setattr__(self, "_decimals", decimals)
+
+    def fits(self, given: Sequence[frozenset[str]]) -> bool:
+        """Whether arguments of some kinds can give a value, in one of the ways to call it."""
+        return any(
+            each._of_items
+            or (each.accepts(len(given)) and all(map(_takes, each.parameters, given)))
+            for each in self.ways
+        )
 
     def call(self, arguments: Sequence[FeelValue]) -> FeelValue:
         """Return the value; null where there is none."""
-        for each in (self, *self.others):
+        for each in self.ways:
             if each._fits(arguments):
                 return each._call(arguments)
         v.without_value(f"{self.name}() of {len(arguments)} arguments")
         return None
-
-    def accepts(self, count: int) -> bool:
-        """Whether it may be called so with so many arguments."""
-        return count >= self._least and (count <= len(self.parameters) or self.rest or self.more)
 
     def _fits(self, arguments: Sequence[FeelValue]) -> bool:
         if not self.accepts(len(arguments)):
@@ -93,11 +63,11 @@ class FeelFunction:
         )
 
     def _call(self, arguments: Sequence[FeelValue]) -> FeelValue:
-        if self.rest and (len(arguments) > 1 or not isinstance(arguments[0], list)):
+        if self._of_items and (len(arguments) > 1 or not isinstance(arguments[0], list)):
             arguments = [[*arguments]]
         taken = list[FeelValue]()
         parameters = self.parameters
-        if self.more:
+        if self.repeated:
             parameters += parameters[-1:] * len(arguments)
         for each, value in zip(parameters, arguments, strict=False):
             if value is None and each.kinds and not each.optional:
@@ -111,7 +81,7 @@ class FeelFunction:
                 look_at(len(found))
             taken.append(found)
         try:
-            if not self.decimals:
+            if not self._decimals:
                 return _bounded(self.compute(*taken), self.name)
             with localcontext(DIGITS):
                 return _bounded(self.compute(*taken), self.name)
@@ -143,146 +113,174 @@ def _as_kind(value: FeelValue, kinds: tuple[str, ...]) -> FeelValue:
     return _WRONG
 
 
+def _takes(parameter: Parameter, given: frozenset[str]) -> bool:
+    known = {"context" if each == "map" else each for each in given}
+    anything = not parameter.kinds or not given or "list" in {*parameter.kinds, *given}
+    return anything or not known.isdisjoint(parameter.kinds)
+
+
 # --- the table ------------------------------------------------------------------------------------
 
-
-def _function(
-    name: str,
-    parameters: str,
-    kinds: Sequence[tuple[str, ...]],
-    compute: Callable[..., FeelValue],
-    gives: tuple[str, ...] = (),
-    *others: FeelFunction,
-    rest: bool = False,
-    more: bool = False,
-) -> FeelFunction:
-    """`parameters`: their names, separated by commas, with a ? after those that are optional."""
-    names = [each.strip() for each in parameters.split(",")] if parameters else []
-    taken = tuple(
-        Parameter(each.rstrip("?"), of, each.endswith("?"))
-        for each, of in zip(names, kinds, strict=True)
-    )
-    decimals = rest or "number" in {*gives, *(kind for each in kinds for kind in each)}
-    return FeelFunction(name, taken, compute, rest, gives, others, more, decimals)
-
-
-_WHEN = (DATE, MOMENT)
-_f = _function
-
-FEEL_FUNCTIONS: dict[str, FeelFunction] = {
-    each.name: each
-    for each in (
-        _f("@", "text", [TEXT], lib.literal, (DATE, MOMENT, TIME, DAYS, MONTHS)),
-        _f("date", "from", [("text", DATE, MOMENT)], lib.as_date, (DATE,),
-           _f("date", "year,month,day", [NUMBER] * 3, lib.date_of)),
-        _f("date and time", "from", [("text", DATE, MOMENT)], lib.as_moment, (MOMENT,),
-           _f("date and time", "date,time", [_WHEN, (TIME,)], lib.moment_of)),
-        _f("time", "from", [("text", TIME, *_WHEN)], lib.as_time, (TIME,),
-           _f("time", "hour,minute,second,offset?", [*[NUMBER] * 3, (DAYS,)], lib.time_of)),
-        _f("duration", "from", [("text", DAYS, MONTHS)],
-           lambda value: read_duration(value) if isinstance(value, str) else value, (DAYS, MONTHS)),
-        _f("years and months duration", "from,to", [_WHEN, _WHEN], lib.months_between, (MONTHS,)),
-        _f("number", "from,grouping separator?,decimal separator?",
-           [("text", "number"), TEXT, TEXT], lib.as_number, NUMBER),
-        _f("string", "from", [ANY], lib.as_text, TEXT),
-        _f("range", "from", [TEXT], lib.as_range, ("range",)),
-        _f("substring", "string,start position,length?", [TEXT, NUMBER, NUMBER], lib.substring,
-           TEXT),
-        _f("string length", "string", [TEXT], lambda text: Decimal(len(text)), NUMBER),
-        _f("upper case", "string", [TEXT], str.upper, TEXT),
-        _f("lower case", "string", [TEXT], str.lower, TEXT),
-        _f("substring before", "string,match", [TEXT, TEXT], lib.text_before, TEXT),
-        _f("substring after", "string,match", [TEXT, TEXT], lib.text_after, TEXT),
-        _f("contains", "string,match", [TEXT, TEXT], lambda a, b: b in a, BOOLEAN),
-        _f("starts with", "string,match", [TEXT, TEXT], str.startswith, BOOLEAN),
-        _f("ends with", "string,match", [TEXT, TEXT], str.endswith, BOOLEAN),
-        _f("matches", "input,pattern,flags?", [TEXT] * 3, lib.matches, BOOLEAN),
-        _f("replace", "input,pattern,replacement,flags?", [TEXT] * 4, lib.replaced_text, TEXT),
-        _f("split", "string,delimiter", [TEXT, TEXT], lib.split_text, LIST),
-        _f("string join", "list,delimiter?,prefix?,suffix?", [LIST, TEXT, TEXT, TEXT], lib.joined,
-           TEXT),
-        _f("trim", "string", [TEXT], str.strip, TEXT),
-        _f("is blank", "string", [TEXT], lambda text: not text.strip(), BOOLEAN),
-        _f("decimal", "n,scale", [NUMBER, NUMBER], lib.rounded(ROUND_HALF_EVEN), NUMBER),
-        _f("floor", "n,scale?", [NUMBER, NUMBER], lib.rounded(ROUND_FLOOR), NUMBER),
-        _f("ceiling", "n,scale?", [NUMBER, NUMBER], lib.rounded(ROUND_CEILING), NUMBER),
-        _f("round up", "n,scale", [NUMBER, NUMBER], lib.rounded(ROUND_UP), NUMBER),
-        _f("round down", "n,scale", [NUMBER, NUMBER], lib.rounded(ROUND_DOWN), NUMBER),
-        _f("round half up", "n,scale", [NUMBER, NUMBER], lib.rounded(ROUND_HALF_UP), NUMBER),
-        _f("round half down", "n,scale", [NUMBER, NUMBER], lib.rounded(ROUND_HALF_DOWN), NUMBER),
-        _f("abs", "n", [("number", DAYS, MONTHS)], abs),
-        _f("modulo", "dividend,divisor", [NUMBER, NUMBER], lib.modulo, NUMBER),
-        _f("sqrt", "number", [NUMBER], lib.root, NUMBER),
-        _f("log", "number", [NUMBER], lib.logarithm, NUMBER),
-        _f("exp", "number", [NUMBER], lambda n: number(n).exp(), NUMBER),
-        _f("odd", "number", [NUMBER], lib.parity(1), BOOLEAN),
-        _f("even", "number", [NUMBER], lib.parity(0), BOOLEAN),
-        _f("list contains", "list,element", [LIST, ANY],
-           lambda values, item: any(v.kind(each) == v.kind(item) and bool(v.equal(each, item))
-                                    for each in values), BOOLEAN),
-        _f("count", "list", [LIST], lambda values: Decimal(len(values)), NUMBER),
-        _f("min", "list", [LIST], lib.extreme(-1), rest=True),
-        _f("max", "list", [LIST], lib.extreme(1), rest=True),
-        _f("sum", "list", [LIST], lib.of_numbers(lambda n: sum(n, Decimal())), NUMBER, rest=True),
-        _f("product", "list", [LIST], lib.of_numbers(lambda n: math.prod(n, start=Decimal(1))),
-           NUMBER, rest=True),
-        _f("mean", "list", [LIST], lib.of_numbers(lambda n: sum(n, Decimal()) / len(n)), NUMBER,
-           rest=True),
-        _f("median", "list", [LIST], lib.of_numbers(statistics.median), NUMBER, rest=True),
-        _f("stddev", "list", [LIST], lib.of_numbers(lib.deviation), NUMBER, rest=True),
-        _f("mode", "list", [LIST],
-           lambda values: sorted(statistics.multimode(lib.numbers(values))), LIST, rest=True),
-        _f("all", "list", [LIST], lib.truths(False), BOOLEAN, rest=True),
-        _f("any", "list", [LIST], lib.truths(True), BOOLEAN, rest=True),
-        _f("sublist", "list,start position,length?", [LIST, NUMBER, NUMBER], lib.sublist, LIST),
-        _f("append", "list,item", [LIST, ANY], lambda a, *b: [*a, *b], LIST,
-           more=True),
-        _f("concatenate", "list", [ANY], lib.concatenated, LIST, more=True),
-        _f("insert before", "list,position,newItem", [LIST, NUMBER, ANY], lib.inserted, LIST),
-        _f("remove", "list,position", [LIST, NUMBER], lib.removed, LIST),
-        _f("list replace", "list,position,newItem", [LIST, ("number",), ANY], lib.replaced, LIST,
-           _f("list replace", "list,match,newItem", [LIST, ("function",), ANY], lib.replaced)),
-        _f("reverse", "list", [LIST], lambda values: values[::-1], LIST),
-        _f("index of", "list,match", [LIST, ANY], lib.indices, LIST),
-        _f("union", "list", [ANY], lambda *lists: lib.distinct(lib.concatenated(*lists)), LIST,
-           more=True),
-        _f("distinct values", "list", [LIST], lib.distinct, LIST),
-        _f("duplicate values", "list", [LIST], lib.doubled, LIST),
-        _f("flatten", "list", [LIST], lib.flat, LIST),
-        _f("sort", "list,precedes?", [LIST, ("function",)], lib.in_order, LIST),
-        _f("partition", "list,size", [LIST, NUMBER], lib.partition, LIST),
-        _f("is empty", "list", [ANY], lib.is_empty, BOOLEAN),
-        _f("get value", "m,key", [CONTEXT, ("text", "list")], lib.get_value),
-        _f("get entries", "m", [CONTEXT], lib.entries_of, LIST),
-        _f("context", "entries", [LIST], lib.context_of, CONTEXT),
-        _f("context put", "context,key,value", [CONTEXT, ("text",), ANY], lib.put, CONTEXT,
-           _f("context put", "context,keys,value", [CONTEXT, ("list",), ANY], lib.put)),
-        _f("context merge", "contexts", [LIST], lib.merged, CONTEXT),
-        _f("day of week", "date", [_WHEN], lambda day: lib.WEEKDAYS[day.weekday()], TEXT),
-        _f("day of year", "date", [_WHEN], lambda day: Decimal(day.timetuple().tm_yday), NUMBER),
-        _f("week of year", "date", [_WHEN], lambda day: Decimal(day.isocalendar()[1]), NUMBER),
-        _f("month of year", "date", [_WHEN], lambda day: lib.MONTHS[day.month - 1], TEXT),
-        _f("last day of month", "date", [_WHEN], lambda day: lib.last_day(lib.as_date(day)),
-           (DATE,)),
-        _f("is", "value1,value2?", [ANY, ANY], lib.is_same, BOOLEAN),
-        _f("is defined", "value", [ANY], lambda value: value is not None, BOOLEAN),
-        _f("get or else", "value,default", [ANY, ANY], lambda a, b: b if a is None else a),
-        _f("assert", "value,condition,cause?", [ANY, BOOLEAN, TEXT], lib.asserted),
-        _f("cycle", "duration", [(DAYS, MONTHS)], lambda each: f"R/{iso(each)}", TEXT,
-           _f("cycle", "repetitions,duration", [NUMBER, (DAYS, MONTHS)],
-              lambda count, each: f"R{lib.whole(count)}/{iso(each)}")),
-        *(
-            _f(name, "range1,range2", [ANY, ANY], lib.relation(compute), BOOLEAN)
-            for name, compute in lib.RELATIONS.items()
-        ),
-    )
-}  # fmt: skip
+FEEL_FUNCTIONS = FeelFunction.table([
+    ("@(text: text) -> date|date and time|time|duration", lib.literal, ""),
+    ("date(from: text|date|date and time) -> date", lib.as_date, "a date, of its text or parts"),
+    ("date(year: number, month: number, day: number)", lib.date_of, ""),
+    ("date and time(from: text|date|date and time) -> date and time", lib.as_moment,
+     "a date with a time, of its text or parts"),
+    ("date and time(date: date|date and time, time: time)", lib.moment_of, ""),
+    ("time(from: text|time|date|date and time) -> time", lib.as_time,
+     "a time of day, of its text or parts"),
+    ("time(hour: number, minute: number, second: number, offset?: days and time duration)",
+     lib.time_of, ""),
+    ("duration(from: text|duration) -> duration",
+     lambda value: read_duration(value) if isinstance(value, str) else value,
+     "a duration, of its text in ISO 8601"),
+    ("years and months duration(from: date|date and time, to: date|date and time)"
+     " -> years and months duration", lib.months_between, "the whole months between two dates"),
+    ("number(from: text|number, grouping separator?: text, decimal separator?: text) -> number",
+     lib.as_number, "the number that a text writes"),
+    ("string(from) -> text", lib.as_text, "the value as a text"),
+    ("range(from: text) -> range", lib.as_range, "a range, of its text: [1..5]"),
+    ("substring(string: text, start position: number, length?: number) -> text", lib.substring,
+     "the text from a position on; the first is 1, the last -1"),
+    ("string length(string: text) -> number", lambda text: Decimal(len(text)),
+     "how many characters the text has"),
+    ("upper case(string: text) -> text", str.upper, "the text in capital letters"),
+    ("lower case(string: text) -> text", str.lower, "the text in small letters"),
+    ("substring before(string: text, match: text) -> text", lib.text_before,
+     "what is before the first match"),
+    ("substring after(string: text, match: text) -> text", lib.text_after,
+     "what follows the first match"),
+    ("contains(string: text, match: text) -> boolean", lambda a, b: b in a,
+     "whether the text has the match in it"),
+    ("starts with(string: text, match: text) -> boolean", str.startswith,
+     "whether the text begins with the match"),
+    ("ends with(string: text, match: text) -> boolean", str.endswith,
+     "whether the text ends with the match"),
+    ("matches(input: text, pattern: text, flags?: text) -> boolean", lib.matches,
+     "whether the regular expression fits a part of the text"),
+    ("replace(input: text, pattern: text, replacement: text, flags?: text) -> text",
+     lib.replaced_text, "the text, with what the regular expression fits replaced"),
+    ("split(string: text, delimiter: text) -> list", lib.split_text,
+     "the parts of the text between what the regular expression fits"),
+    ("string join(list: list, delimiter?: text, prefix?: text, suffix?: text) -> text", lib.joined,
+     "the texts of the list as one, with the delimiter between them"),
+    ("trim(string: text) -> text", str.strip, "the text without spaces at its ends"),
+    ("is blank(string: text) -> boolean", lambda text: not text.strip(),
+     "whether the text has only spaces"),
+    ("decimal(n: number, scale: number) -> number", lib.rounded("ROUND_HALF_EVEN"),
+     "the number with so many decimals; a half goes to the even digit"),
+    ("floor(n: number, scale?: number) -> number", lib.rounded("ROUND_FLOOR"),
+     "the greatest number with so many decimals that is not above n"),
+    ("ceiling(n: number, scale?: number) -> number", lib.rounded("ROUND_CEILING"),
+     "the least number with so many decimals that is not below n"),
+    ("round up(n: number, scale: number) -> number", lib.rounded("ROUND_UP"),
+     "the number with so many decimals, away from zero"),
+    ("round down(n: number, scale: number) -> number", lib.rounded("ROUND_DOWN"),
+     "the number with so many decimals, towards zero"),
+    ("round half up(n: number, scale: number) -> number", lib.rounded("ROUND_HALF_UP"),
+     "the nearest number with so many decimals; a half goes away from zero"),
+    ("round half down(n: number, scale: number) -> number", lib.rounded("ROUND_HALF_DOWN"),
+     "the nearest number with so many decimals; a half goes towards zero"),
+    ("abs(n: number|duration)", abs, "the number or duration without its sign"),
+    ("modulo(dividend: number, divisor: number) -> number", lib.modulo,
+     "the remainder, with the sign of the divisor"),
+    ("sqrt(number: number) -> number", lib.root, "the square root"),
+    ("log(number: number) -> number", lib.logarithm, "the natural logarithm"),
+    ("exp(number: number) -> number", lambda n: number(n).exp(), "e to the power of the number"),
+    ("odd(number: number) -> boolean", lib.parity(1), "whether the integer is odd"),
+    ("even(number: number) -> boolean", lib.parity(0), "whether the integer is even"),
+    ("list contains(list: list, element) -> boolean",
+     lambda values, item: any(v.kind(each) == v.kind(item) and v.equal(each, item)
+                              for each in values),
+     "whether an item equals the element"),
+    ("count(list: list) -> number", lambda values: Decimal(len(values)),
+     "how many items the list has"),
+    ("min(list: list, ...)", lib.extreme(-1), "the least item"),
+    ("max(list: list, ...)", lib.extreme(1), "the greatest item"),
+    ("sum(list: list, ...) -> number", lib.of_numbers(lambda n: sum(n, Decimal())),
+     "the sum of the numbers"),
+    ("product(list: list, ...) -> number", lib.of_numbers(lambda n: math.prod(n, start=Decimal(1))),
+     "the product of the numbers"),
+    ("mean(list: list, ...) -> number", lib.of_numbers(lambda n: sum(n, Decimal()) / len(n)),
+     "the arithmetic mean of the numbers"),
+    ("median(list: list, ...) -> number", lib.of_numbers(statistics.median),
+     "the middle one of the numbers"),
+    ("stddev(list: list, ...) -> number", lib.of_numbers(lib.deviation),
+     "the sample standard deviation of the numbers"),
+    ("mode(list: list, ...) -> list",
+     lambda values: sorted(statistics.multimode(lib.numbers(values))),
+     "the numbers that are most frequent"),
+    ("all(list: list, ...) -> boolean", lib.truths(False), "whether all items are true"),
+    ("any(list: list, ...) -> boolean", lib.truths(True), "whether an item is true"),
+    ("sublist(list: list, start position: number, length?: number) -> list", lib.sublist,
+     "the items from a position on; the first is 1, the last -1"),
+    ("append(list: list, item, ...) -> list", lambda a, *b: [*a, *b],
+     "the list with the items at its end"),
+    ("concatenate(list, ...) -> list", lib.concatenated, "the items of all lists"),
+    ("insert before(list: list, position: number, newItem) -> list", lib.inserted,
+     "the list with an item before the position"),
+    ("remove(list: list, position: number) -> list", lib.removed,
+     "the list without the item at the position"),
+    ("list replace(list: list, position: number, newItem) -> list", lib.replaced,
+     "the list with another item at the position, or where the function is true"),
+    ("list replace(list: list, match: function, newItem)", lib.replaced, ""),
+    ("reverse(list: list) -> list", lambda values: values[::-1], "the list from its end"),
+    ("index of(list: list, match) -> list", lib.indices,
+     "the positions of the items that equal the match"),
+    ("union(list, ...) -> list", lambda *lists: lib.distinct(lib.concatenated(*lists)),
+     "the items of all lists, each once"),
+    ("distinct values(list: list) -> list", lib.distinct, "the items, each once"),
+    ("duplicate values(list: list) -> list", lib.doubled, "the items that are there several times"),
+    ("flatten(list: list) -> list", lib.flat,
+     "the items, with those of inner lists in place of these"),
+    ("sort(list: list, precedes?: function) -> list", lib.in_order,
+     "the items in order; precedes: whether one is before another"),
+    ("partition(list: list, size: number) -> list", lib.partition, "the items in lists of so many"),
+    ("is empty(list) -> boolean", lib.is_empty, "whether the list has no items"),
+    ("get value(m: context, key: text|list)", lib.get_value, "the value of a key of the context"),
+    ("get entries(m: context) -> list", lib.entries_of, "a list of the context's keys and values"),
+    ("context(entries: list) -> context", lib.context_of,
+     "a context, of a list of keys and values"),
+    ("context put(context: context, key: text, value) -> context", lib.put,
+     "the context with another value of a key, or of a path of keys"),
+    ("context put(context: context, keys: list, value)", lib.put, ""),
+    ("context merge(contexts: list) -> context", lib.merged,
+     "the entries of all contexts; of equal keys, the last"),
+    ("day of week(date: date|date and time) -> text", lambda day: lib.WEEKDAYS[day.weekday()],
+     "the name of the weekday"),
+    ("day of year(date: date|date and time) -> number",
+     lambda day: Decimal(day.timetuple().tm_yday), "the number of the day in its year"),
+    ("week of year(date: date|date and time) -> number", lambda day: Decimal(day.isocalendar()[1]),
+     "the number of the week, by ISO 8601"),
+    ("month of year(date: date|date and time) -> text", lambda day: lib.MONTHS[day.month - 1],
+     "the name of the month"),
+    ("last day of month(date: date|date and time) -> date",
+     lambda day: lib.last_day(lib.as_date(day)), "the last day of the date's month"),
+    ("is(value1, value2?) -> boolean", lib.is_same,
+     "whether both are the same, and of the same kind"),
+    ("is defined(value) -> boolean", lambda value: value is not None,
+     "whether the value is not null"),
+    ("get or else(value, default)", lambda a, b: b if a is None else a,
+     "the value, or the default if it is null"),
+    ("assert(value, condition: boolean, cause?: text)", lib.asserted,
+     "the value; an error if the condition is not true"),
+    ("cycle(duration: duration) -> text", lambda each: f"R/{iso(each)}",
+     "a timer's cycle, in ISO 8601"),
+    ("cycle(repetitions: number, duration: duration)",
+     lambda count, each: f"R{lib.whole(count)}/{iso(each)}", ""),
+    *(
+        (f"{name}(range1, range2) -> boolean", lib.relation(compute),
+         f"whether range1 {name} range2 (points, or ranges)")
+        for name, compute in lib.RELATIONS.items()
+    ),
+])  # fmt: skip
 
 
 ALTERNATIVES = {
     f"{name}/{number}": replace(each, others=())
     for name, function in FEEL_FUNCTIONS.items()
-    for number, each in enumerate((function, *function.others) if function.others else ())
+    for number, each in enumerate(function.ways if function.others else ())
 }
 """The ways to call a function: the names of arguments tell which one is meant."""
 

@@ -3,26 +3,25 @@
 import math
 import operator
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import replace
 from decimal import ROUND_HALF_UP, Decimal
 from typing import Any
 
 import m2pem.mission.timers as times  # imports this package too: only its name is bound yet
 from m2pem.errors import ExpressionError, ExpressionSyntaxError
 from m2pem.mission.expression import xpath
-from m2pem.mission.expression.feel_functions import ALTERNATIVES, FEEL_FUNCTIONS, FeelFunction
+from m2pem.mission.expression.feel_functions import ALTERNATIVES, FEEL_FUNCTIONS
 from m2pem.mission.expression.feel_library import text_after, text_before
 from m2pem.mission.expression.literals import NUMBER, read_number
 from m2pem.mission.expression.operators import (
-    TEXT_AS_VALUE,
     bounded,
     bounded_text,
     describe,
     equal,
     kind,
-    look_at,
     text_of,
 )
+from m2pem.mission.expression.signatures import Function
 from m2pem.mission.expression.temporal import Computed
 
 EARTH_RADIUS_M = 6_371_008.8
@@ -31,51 +30,6 @@ EARTH_RADIUS_M = 6_371_008.8
 `distance()` of expressions is that of the haversine formula on this sphere, not the one of
 `m2pem.geo`: missions and journals that exist must always give the same values.
 """
-
-_ANY = ("null", "boolean", "number", "text", "list", "map")
-
-
-@dataclass(frozen=True, slots=True)
-class Function:
-    """A function: what it takes, and what computes it.
-
-    `takes` holds the kinds of each parameter; with `rest` the last one may be repeated, and
-    `optional` of the last may be left out. Unless a parameter takes null, a null argument makes the
-    result null. `gives`: the kinds of its values, besides null.
-    """
-
-    signature: str
-    takes: tuple[tuple[str, ...], ...]
-    compute: Callable[..., Computed]
-    rest: bool = False
-    gives: tuple[str, ...] = ("number",)
-    optional: int = 0
-
-    @property
-    def name(self) -> str:
-        """The function's name in expressions."""
-        return self.signature.partition("(")[0]
-
-    def accepts(self, count: int) -> bool:
-        """Whether it may be called with so many arguments."""
-        least = len(self.takes) - self.optional
-        return count >= least if self.rest else least <= count <= len(self.takes)
-
-    def call(self, arguments: list[Computed]) -> Computed:
-        """Return the function's value; raises ExpressionError."""
-        null = False
-        for index, argument in enumerate(arguments):
-            kinds = self.takes[min(index, len(self.takes) - 1)]
-            if argument is None and "null" not in kinds:
-                null = True
-            elif kind(argument) not in kinds:
-                wanted = " or ".join(kinds)
-                raise ExpressionError(f"{self.name}() takes a {wanted}, not {describe(argument)}")
-            elif isinstance(argument, list):
-                look_at(len(argument))
-            elif isinstance(argument, str):
-                look_at(len(argument) // TEXT_AS_VALUE)
-        return None if null else self.compute(*arguments)
 
 
 def _to_whole(
@@ -210,79 +164,93 @@ def _distance(a: list[Computed], b: list[Computed]) -> Computed:
     return 2 * EARTH_RADIUS_M * math.asin(min(1.0, math.sqrt(h)))
 
 
-_NUMBER = ("number",)
-_TEXT = ("text",)
-_BOOLEAN = ("boolean",)
+FUNCTIONS = Function.table([
+    ("abs(x: number) -> number", lambda x: bounded(abs(x), "abs()", x),
+     "the number without its sign"),
+    ("min(x: number|list, ...) -> number", _extreme("min", min),
+     "the least of some numbers, or of one list of numbers"),
+    ("max(x: number|list, ...) -> number", _extreme("max", max),
+     "the greatest of some numbers, or of one list of numbers"),
+    ("round(x: number) -> number", _to_whole("round", _round),
+     "the nearest integer; a half goes away from zero"),
+    ("floor(x: number) -> number", _to_whole("floor", math.floor),
+     "the greatest integer that is not above x"),
+    ("ceil(x: number) -> number", _to_whole("ceil", math.ceil),
+     "the least integer that is not below x"),
+    ("sqrt(x: number) -> number", _sqrt, "the square root; x must not be negative"),
+    ("mod(x: number, y: number) -> number", _mod,
+     "the remainder of x / y, with the sign of y; y must not be 0"),
+    ("number(x: number|text) -> number", _number, "the number that a text writes"),
+    ("text(x: boolean|number|text) -> text", text_of, "a number, boolean or text as a text"),
+    ("length(x: text|list|map) -> number", len,
+     "how many characters a text, items a list, or keys a map has"),
+    ("contains(x: text|list, y) -> boolean", _contains,
+     "whether the text x has the text y in it, or the list x an item equal to y"),
+    ("starts_with(x: text, y: text) -> boolean", str.startswith,
+     "whether the text x begins with the text y"),
+    ("ends_with(x: text, y: text) -> boolean", str.endswith,
+     "whether the text x ends with the text y"),
+    ("upper(x: text) -> text", _upper, "the text in capital letters"),
+    ("lower(x: text) -> text", _lower, "the text in small letters"),
+    ("exists(x) -> boolean", lambda x: x is not None, "whether x is not null"),
+    ("is_empty(x) -> boolean", lambda x: x is None or x in ("", [], {}),
+     "whether x is null, an empty text, list or map"),
+    ("sum(x: list) -> number", _sum, "the sum of a list of numbers"),
+    ("date(x: text) -> number", _date,
+     "the time that a date is, in seconds since 1970-01-01T00:00:00Z"),
+    ("duration(x: text) -> number", _duration, "how many seconds a duration has"),
+    ("distance(a: list, b: list) -> number", _distance,
+     "horizontal distance in metres between two positions [latitude, longitude]"),
+])  # fmt: skip
 
-FUNCTIONS: dict[str, Function] = {
-    function.name: function
-    for function in (
-        Function("abs(x)", (_NUMBER,), lambda x: bounded(abs(x), "abs()", x)),
-        Function("min(x, ...)", (("number", "list"),), _extreme("min", min), rest=True),
-        Function("max(x, ...)", (("number", "list"),), _extreme("max", max), rest=True),
-        Function("round(x)", (_NUMBER,), _to_whole("round", _round)),
-        Function("floor(x)", (_NUMBER,), _to_whole("floor", math.floor)),
-        Function("ceil(x)", (_NUMBER,), _to_whole("ceil", math.ceil)),
-        Function("sqrt(x)", (_NUMBER,), _sqrt),
-        Function("mod(x, y)", (_NUMBER, _NUMBER), _mod),
-        Function("number(x)", (("number", "text"),), _number),
-        Function("text(x)", (("boolean", "number", "text"),), text_of, gives=_TEXT),
-        Function("length(x)", (("text", "list", "map"),), len),
-        Function("contains(x, y)", (("text", "list"), _ANY), _contains, gives=_BOOLEAN),
-        Function("starts_with(x, y)", (_TEXT, _TEXT), str.startswith, gives=_BOOLEAN),
-        Function("ends_with(x, y)", (_TEXT, _TEXT), str.endswith, gives=_BOOLEAN),
-        Function("upper(x)", (_TEXT,), _upper, gives=_TEXT),
-        Function("lower(x)", (_TEXT,), _lower, gives=_TEXT),
-        Function("exists(x)", (_ANY,), lambda x: x is not None, gives=_BOOLEAN),
-        Function("is_empty(x)", (_ANY,), lambda x: x is None or x in ("", [], {}), gives=_BOOLEAN),
-        Function("sum(x)", (("list",),), _sum),
-        Function("date(x)", (_TEXT,), _date),
-        Function("duration(x)", (_TEXT,), _duration),
-        Function("distance(a, b)", (("list",), ("list",)), _distance),
-    )
+
+def _converting(function: Function) -> Function:
+    """A function that converts its arguments to the kinds it takes, and so takes all."""
+    to = [_CONVERSIONS[kind] for each in function.parameters for kind in each.kinds]
+    parameters = tuple(replace(each, kinds=()) for each in function.parameters)
+    compute = xpath.converted(function.compute, *to) if to else function.compute
+    return replace(function, parameters=parameters, compute=compute)
+
+
+_CONVERSIONS: dict[str, Callable[[Computed], Computed]] = {
+    "text": xpath.string,
+    "number": xpath.rounded,
 }
 
-
-def _xpath(
-    signature: str,
-    converts: tuple[Callable[[Computed], Computed], ...],
-    compute: Callable[..., Computed],
-    gives: tuple[str, ...] = _NUMBER,
-    optional: int = 0,
-) -> Function:
-    """`converts`: what each argument is converted by."""
-    takes = (_ANY,) * len(converts)
-    made = xpath.converted(compute, *converts)
-    return Function(signature, takes, made, gives=gives, optional=optional)
-
-
-XPATH_FUNCTIONS: dict[str, Function] = {
-    function.name: function
-    for function in (
-        Function("boolean(x)", (_ANY,), lambda x: xpath.truth(x, ""), gives=_BOOLEAN),
-        Function("ceiling(x)", (_ANY,), xpath.whole(math.ceil)),
-        Function("concat(x, y, ...)", (_ANY, _ANY), xpath.concat, rest=True, gives=_TEXT),
-        _xpath("contains(x, y)", (xpath.string,) * 2, operator.contains, _BOOLEAN),
-        Function("floor(x)", (_ANY,), xpath.whole(math.floor)),
-        _xpath("normalize-space(x)", (xpath.string,), xpath.normalize_space, _TEXT),
-        Function("number(x)", (_ANY,), xpath.number),
-        Function("round(x)", (_ANY,), xpath.rounded),
-        _xpath("starts-with(x, y)", (xpath.string,) * 2, str.startswith, _BOOLEAN),
-        Function("string(x)", (_ANY,), xpath.string, gives=_TEXT),
-        _xpath("string-length(x)", (xpath.string,), len),
-        _xpath("substring(x, start, length)", (xpath.string, *(xpath.rounded,) * 2),
-               xpath.substring, _TEXT, optional=1),
-        _xpath("substring-after(x, y)", (xpath.string,) * 2, text_after, _TEXT),
-        _xpath("substring-before(x, y)", (xpath.string,) * 2, text_before, _TEXT),
-        _xpath("translate(x, y, z)", (xpath.string,) * 3, xpath.translate, _TEXT),
-    )
+XPATH_FUNCTIONS = {
+    name: _converting(each)
+    for name, each in Function.table([
+        ("boolean(x) -> boolean", lambda x: xpath.truth(x, ""),
+         "x as a boolean: of a number, whether it is not 0; of a text, whether it has any"),
+        ("ceiling(x) -> number", xpath.whole(math.ceil), "the least integer that is not below x"),
+        ("concat(x, y, ...) -> text", xpath.concat, "the texts, one after the other"),
+        ("contains(x: text, y: text) -> boolean", operator.contains,
+         "whether the text x has the text y in it"),
+        ("floor(x) -> number", xpath.whole(math.floor), "the greatest integer that is not above x"),
+        ("normalize-space(x: text) -> text", xpath.normalize_space,
+         "the text without spaces at its ends, and with single ones in it"),
+        ("number(x) -> number", xpath.number, "x as a number"),
+        ("round(x) -> number", xpath.rounded, "the nearest integer; a half goes up"),
+        ("starts-with(x: text, y: text) -> boolean", str.startswith,
+         "whether the text x begins with the text y"),
+        ("string(x) -> text", xpath.string, "x as a text"),
+        ("string-length(x: text) -> number", len, "how many characters the text has"),
+        ("substring(x: text, start: number, length?: number) -> text", xpath.substring,
+         "the text from the character start on, which counts from 1"),
+        ("substring-after(x: text, y: text) -> text", text_after,
+         "what follows the first y in the text x"),
+        ("substring-before(x: text, y: text) -> text", text_before,
+         "what is before the first y in the text x"),
+        ("translate(x: text, y: text, z: text) -> text", xpath.translate,
+         "the text x, with the characters of z for those of y"),
+    ]).items()
 }  # fmt: skip
 """XPath's own, which convert what they take (XPath 1.0, clause 4)."""
 
 OWN: dict[str, dict[str, Function]] = {"XPATH": XPATH_FUNCTIONS}
 """Functions that one language has, or has otherwise, by how their names begin in a tree."""
 
-LISTED: dict[str, Function | FeelFunction] = {
+LISTED: dict[str, Function] = {
     **FUNCTIONS,
     **{f"XPATH {name}": each for name, each in XPATH_FUNCTIONS.items()},
     **{f"FEEL {name}": each for name, each in (FEEL_FUNCTIONS | ALTERNATIVES).items()},

@@ -1,11 +1,10 @@
 """Which kinds of values an expression can have, whatever is in the data."""
 
-from collections.abc import Callable, Sequence
-from itertools import chain, product, repeat
+from collections.abc import Callable
+from itertools import product
 from typing import TypeAlias
 
 from m2pem.mission.expression.feel_arithmetic import result_kind
-from m2pem.mission.expression.feel_functions import FeelFunction, Parameter
 from m2pem.mission.expression.functions import LISTED
 from m2pem.mission.expression.operators import kind
 from m2pem.mission.expression.temporal import DAYS, MONTHS
@@ -58,12 +57,8 @@ def kinds(node: Node, *, coerced: bool = False, of: Of = lambda _: DATA) -> froz
             return DATA
         case Call(function, arguments):
             called = LISTED[function]
-            if isinstance(called, FeelFunction):
-                given = [within(each) for each in arguments]
-                return (frozenset(called.gives) or DATA) if _fits(called, given) else frozenset()
-            takes = chain(called.takes, repeat(called.takes[-1]))
-            fits = all((within(each) | {"null"}) & {*next(takes)} for each in arguments)
-            return frozenset(called.gives) if fits else frozenset()
+            fits = called.fits([within(each) for each in arguments])
+            return (frozenset(called.gives) or DATA) if fits else frozenset()
         case If(_, then, otherwise):
             return within(then) | within(otherwise)
         case Negate(operand):
@@ -79,20 +74,6 @@ def kinds(node: Node, *, coerced: bool = False, of: Of = lambda _: DATA) -> froz
         case ContextOf() | RangeOf() | Lambda():
             return frozenset({"map"})
     return frozenset({"boolean"})
-
-
-def _fits(called: FeelFunction, given: Sequence[frozenset[str]]) -> bool:
-    """Whether there is a way to call a function of FEEL with arguments of some kinds."""
-    for each in (called, *called.others):
-        if each.rest or (each.accepts(len(given)) and all(map(_takes, each.parameters, given))):
-            return True
-    return False
-
-
-def _takes(parameter: Parameter, given: frozenset[str]) -> bool:
-    known = {"context" if each == "map" else each for each in given}
-    anything = not parameter.kinds or not given or "list" in {*parameter.kinds, *given}
-    return anything or not known.isdisjoint(parameter.kinds)
 
 
 def _result(left: str, sign: Operation, right: str) -> str | None:

@@ -44,9 +44,9 @@ DATE, MOMENT, TIME, DAYS, MONTHS = (
 )
 """What FEEL calls them."""
 
-_DATE = r"(?P<year>[0-9]{4})-(?P<month>[0-9]{2})-(?P<day>[0-9]{2})"
+_DATE = r"(?P<day>[0-9]{4}-[0-9]{2}-[0-9]{2})"
 _CLOCK = (
-    r"(?P<hour>[0-9]{2}):(?P<minute>[0-9]{2}):(?P<second>[0-9]{2})(?:\.(?P<part>[0-9]+))?"
+    r"(?P<clock>[0-9]{2}:[0-9]{2}:[0-9]{2})(?:\.(?P<part>[0-9]+))?"
     r"(?P<zone>Z|[+-][0-9]{2}:[0-9]{2}(?::[0-9]{2})?|@[A-Za-z0-9_+/-]+)?"
 )
 _PATTERNS = {
@@ -59,6 +59,7 @@ _DAYS = re.compile(
     r"(?:T(?=.)(?:(?P<hours>[0-9]+)H)?(?:(?P<minutes>[0-9]+)M)?(?:(?P<seconds>[0-9]*\.?[0-9]*)S)?)?"
 )
 _MONTHS = re.compile(r"(?P<sign>-?)P(?=.)(?:(?P<years>[0-9]+)Y)?(?:(?P<months>[0-9]+)M)?")
+_MIDNIGHT = "24:00:00"
 _MOST_OFFSET = timedelta(hours=18)
 
 
@@ -82,7 +83,7 @@ def iso(value: Temporal) -> str:
 
 def read_date(text: str) -> date:
     """A date as written; raises ValueError."""
-    return _day(_matched(DATE, text))
+    return date.fromisoformat(_matched(DATE, text)["day"])
 
 
 def read_time(text: str) -> time:
@@ -93,8 +94,9 @@ def read_time(text: str) -> time:
 def read_moment(text: str) -> datetime:
     """A date and time as written, midnight where it has no time; raises ValueError."""
     found = _matched(MOMENT, text)
-    moment = datetime.combine(_day(found), _clock(found) if found["hour"] else time())
-    return moment + timedelta(days=1) if found["hour"] == "24" else moment
+    day = date.fromisoformat(found["day"])
+    moment = datetime.combine(day, _clock(found) if found["clock"] else time())
+    return moment + timedelta(days=1) if found["clock"] == _MIDNIGHT else moment
 
 
 def _matched(kind: str, text: str) -> re.Match[str]:
@@ -103,36 +105,20 @@ def _matched(kind: str, text: str) -> re.Match[str]:
     raise ValueError(text)
 
 
-def _day(found: re.Match[str]) -> date:
-    return date(int(found["year"]), int(found["month"]), int(found["day"]))
-
-
 def _clock(found: re.Match[str]) -> time:
-    hour, minute, second = (int(found[part]) for part in ("hour", "minute", "second"))
-    part = (found["part"] or "").ljust(6, "0")
+    clock, part, zone = found["clock"], found["part"] or "0", found["zone"] or ""
     if part[6:].strip("0"):
         raise ValueError(found[0])
-    microsecond = int(part[:6])
-    if (hour, minute, second, microsecond) == (24, 0, 0, 0):
-        hour = 0
-    return time(hour, minute, second, microsecond, _zone(found["zone"]))
-
-
-def _zone(text: str | None) -> tzinfo | None:
-    if text is None:
-        return None
-    if text == "Z":
-        return UTC
-    if text.startswith("@"):
+    if clock == _MIDNIGHT and not part.strip("0"):
+        clock = "00:00:00"
+    if zone.startswith("@"):
         try:
-            return ZoneInfo(text[1:])
+            return time.fromisoformat(f"{clock}.{part[:6]}").replace(tzinfo=ZoneInfo(zone[1:]))
         except (KeyError, OSError):
-            raise ValueError(text) from None
-    hours, minutes, *seconds = map(int, text[1:].split(":"))
-    return offset_zone(
-        timedelta(hours=hours, minutes=minutes, seconds=sum(seconds))
-        * (-1 if text[0] == "-" else 1)
-    )
+            raise ValueError(zone) from None
+    read = time.fromisoformat(f"{clock}.{part[:6]}{zone}")
+    offset = read.utcoffset()
+    return read if offset is None else read.replace(tzinfo=offset_zone(offset))
 
 
 def offset_zone(offset: timedelta) -> tzinfo:
