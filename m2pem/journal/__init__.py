@@ -6,8 +6,11 @@ from pathlib import Path
 from urllib.parse import quote, unquote, urlsplit
 
 from m2pem.errors import JournalError, JournalUrlError
-from m2pem.journal.base import Entry, Journal, RunHeader, RunInfo
-from m2pem.journal.memory import MemoryJournal
+from m2pem.journal.base import Entry as Entry
+from m2pem.journal.base import Journal as Journal
+from m2pem.journal.base import RunHeader as RunHeader
+from m2pem.journal.base import RunInfo as RunInfo
+from m2pem.journal.memory import MemoryJournal as MemoryJournal
 from m2pem.journal.postgres_address import (
     SCHEMES,
     SUFFIX,
@@ -16,19 +19,6 @@ from m2pem.journal.postgres_address import (
     read_address,
     without_password,
 )
-
-__all__ = [
-    "Entry",
-    "Journal",
-    "MemoryJournal",
-    "RunHeader",
-    "RunInfo",
-    "default_url",
-    "file_of",
-    "is_postgres",
-    "open_journal",
-    "postgres_address",
-]
 
 
 def open_journal(url: str) -> Journal:

@@ -5,26 +5,12 @@ refused. An input `Revise` is decided by making the plan again: it is carried ou
 plan that was shown.
 """
 
-from m2pem.engine.revision.carrying_out import revise
-from m2pem.engine.revision.plan import (
-    Adjustment,
-    Arming,
-    Effect,
-    EffectKind,
-    Move,
-    Refusal,
-    RevisionPlan,
-)
-from m2pem.engine.revision.planning import plan_revision
-
-__all__ = [
-    "Adjustment",
-    "Arming",
-    "Effect",
-    "EffectKind",
-    "Move",
-    "Refusal",
-    "RevisionPlan",
-    "plan_revision",
-    "revise",
-]
+from m2pem.engine.revision.carrying_out import revise as revise
+from m2pem.engine.revision.plan import Adjustment as Adjustment
+from m2pem.engine.revision.plan import Arming as Arming
+from m2pem.engine.revision.plan import Effect as Effect
+from m2pem.engine.revision.plan import EffectKind as EffectKind
+from m2pem.engine.revision.plan import Move as Move
+from m2pem.engine.revision.plan import Refusal as Refusal
+from m2pem.engine.revision.plan import RevisionPlan as RevisionPlan
+from m2pem.engine.revision.planning import plan_revision as plan_revision

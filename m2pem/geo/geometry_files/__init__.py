@@ -9,29 +9,20 @@ from pathlib import PurePath
 from typing import TypeAlias
 
 from m2pem.geo.geojson import GeometryError
-from m2pem.geo.geometry_files.contents import Contents, FileProblem, GeometryFile, NamedGeometry
+from m2pem.geo.geometry_files.contents import Contents
+from m2pem.geo.geometry_files.contents import FileProblem as FileProblem
+from m2pem.geo.geometry_files.contents import GeometryFile as GeometryFile
+from m2pem.geo.geometry_files.contents import NamedGeometry as NamedGeometry
 from m2pem.geo.geometry_files.csv_file import read_csv, write_csv
 from m2pem.geo.geometry_files.geojson_file import read_geojson, write_geojson
 from m2pem.geo.geometry_files.kml_file import read_kml, read_kmz, write_kml
-from m2pem.geo.geometry_files.mission_commands import KEEP_OUT
+from m2pem.geo.geometry_files.mission_commands import KEEP_OUT as KEEP_OUT
 from m2pem.geo.geometry_files.mission_plans import (
     read_plan,
     read_waypoints,
     write_plan,
     write_waypoints,
 )
-
-__all__ = [
-    "KEEP_OUT",
-    "MAX_BYTES",
-    "READ_SUFFIXES",
-    "FileFormat",
-    "FileProblem",
-    "GeometryFile",
-    "NamedGeometry",
-    "read_geometry_file",
-    "write_geometry_file",
-]
 
 MAX_BYTES = 10_000_000
 
