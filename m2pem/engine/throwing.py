@@ -1,8 +1,7 @@
 """Throwing errors and escalations: scope by scope outwards, to the event that catches them."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeVar
 
 from m2pem.engine import records as r
 from m2pem.engine.execution import Execution
@@ -16,7 +15,7 @@ from m2pem.engine.scopes import (
     start_event_subprocess,
 )
 from m2pem.engine.state import Behavior, Scope, Token
-from m2pem.mission.elements import Activity, BoundaryEvent, Event, StartEvent
+from m2pem.mission.elements import Activity, BoundaryEvent, Event, StartEvent, catches
 from m2pem.mission.events import (
     Escalation,
     EventDefinition,
@@ -103,7 +102,7 @@ def throw_error_in_process(x: Execution, code: str, reason: str) -> None:
     starts: list[StartEvent] = []
     if scope.id in x.state.scopes and not (scope.interrupted or scope.completing):
         starts = [start for each in scope.container.event_subprocesses for start in each.starts]
-    caught = _best_match(starts, code, error_code)
+    caught = catches(starts, code, error_code)
     element = scope.container.id
     caught_by = caught.id if caught is not None else ""
     x.emit(r.ErrorThrown(0, element, element, scope.id, code, reason, caught_by))
@@ -197,13 +196,13 @@ def _find_catcher(
     while token is not None:
         node, scope = token.node, token.scope
         if isinstance(node, Activity) and token.instance is None and not token.is_reopened:
-            boundary = _best_match(node.boundary, code, code_of)
+            boundary = catches(node.boundary, code, code_of)
             if boundary is not None:
                 return _AtBoundary(token, boundary)
         if scope.loop is None and not (scope.interrupted or scope.completing):
             handlers = scope.container.event_subprocesses
             starts = [start for each in handlers if each is not node for start in each.starts]
-            start = _best_match(starts, code, code_of)
+            start = catches(starts, code, code_of)
             if start is not None:
                 return _InScope(scope, start)
         token = scope.owner
@@ -214,20 +213,3 @@ def catcher_of_error(thrower: Token, code: str) -> Event | None:
     """Return the event that would catch an error thrown at a token; None: the run would fail."""
     caught = _find_catcher(thrower, code, error_code)
     return caught.event if caught is not None else None
-
-
-Catching = TypeVar("Catching", bound=Event)
-
-
-def _best_match(
-    events: Sequence[Catching], code: str, code_of: Callable[[EventDefinition], str | None]
-) -> Catching | None:
-    for_all = None
-    for event in events:
-        for definition in event.definitions:
-            caught = code_of(definition)
-            if caught == "":
-                for_all = for_all or event
-            elif caught == code:
-                return event
-    return for_all

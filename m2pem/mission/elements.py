@@ -8,10 +8,10 @@ Names are those of BPMN 2.0.2, chapter 10.
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Self, TypeAlias, Union
+from typing import Self, TypeAlias, TypeVar, Union
 
 from m2pem.mission.behavior import Behavior, Mappings, Prompt, Script, ServiceCall
 from m2pem.mission.events import (
@@ -425,6 +425,24 @@ def undoes(element: Element | None) -> bool:
     return isinstance(element, BoundaryEvent) and any(
         isinstance(each, CompensateEventDefinition) for each in element.definitions
     )
+
+
+Catching = TypeVar("Catching", bound=Event)
+
+
+def catches(
+    events: Sequence[Catching], code: str, code_of: Callable[[EventDefinition], str | None]
+) -> Catching | None:
+    """Return the event that names an error's or escalation's code, else one that catches all."""
+    for_all = None
+    for event in events:
+        for definition in event.definitions:
+            caught = code_of(definition)
+            if caught == "":
+                for_all = for_all or event
+            elif caught == code:
+                return event
+    return for_all
 
 
 _THROWING = (SendTask, EndEvent, IntermediateThrowEvent)

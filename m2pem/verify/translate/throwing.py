@@ -1,7 +1,6 @@
 """Throwing errors, escalations, signals and messages: what catches them, and what follows."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import TypeVar
 
 from m2pem.mission import elements as e
 from m2pem.mission.events import (
@@ -15,8 +14,6 @@ from m2pem.verify.translate.compensation import compensated_by, cut_short, forge
 from m2pem.verify.translate.context import ActivityInstance, CompensatedBy, TranslationContext
 from m2pem.verify.translate.net_builder import Effect, ScopeDraft, entry_place, product
 from m2pem.verify.translate.scopes import begin_event_subprocess, handler_instance
-
-Catching = TypeVar("Catching", bound=e.Event)
 
 
 def catchable(scope: ScopeDraft, instance: ActivityInstance | None) -> list[str]:
@@ -115,7 +112,7 @@ def _catch(
             assert left is not None
             node, taken_off = left.node, False
         if left is not None and left.boundary:
-            event = best(left.node.boundary, code, code_of)
+            event = e.catches(left.node.boundary, code, code_of)
             if event is not None:
                 there, without = _there(context, condition, left, taken_off=taken_off)
                 found.append(_at_boundary(context, there, left, event, taken_off=taken_off))
@@ -123,7 +120,7 @@ def _catch(
                     return found, None
                 condition = without
         if here.open is not None:
-            start = best(_starts(here, node), code, code_of)
+            start = e.catches(_starts(here, node), code, code_of)
             if start is not None:
                 begun = condition.and_then(Effect(read=frozenset({here.open})))
                 ways = product([begun], begin_handler(context, here, start))
@@ -185,21 +182,6 @@ def begin_handler(
 
 def _starts(scope: ScopeDraft, but: e.FlowNode) -> list[e.StartEvent]:
     return [start for each in handlers(scope) if each is not but for start in each.starts]
-
-
-def best(
-    events: Sequence[Catching], code: str, code_of: Callable[[EventDefinition], str | None]
-) -> Catching | None:
-    """The event that names a code, else one that catches all."""
-    for_all = None
-    for event in events:
-        for definition in event.definitions:
-            caught = code_of(definition)
-            if caught == "":
-                for_all = for_all or event
-            elif caught == code:
-                return event
-    return for_all
 
 
 # --- signals and messages -----------------------------------------------------------------------
