@@ -5,6 +5,7 @@ fields, and then a view is made from the run's records again.
 """
 
 from collections.abc import Mapping
+from operator import attrgetter
 from typing import TYPE_CHECKING
 
 import msgspec
@@ -124,32 +125,13 @@ def view_of(
 
 
 def _token_of(token: Token) -> _Token:
-    return _Token(
-        token.id,
-        token.process,
-        token.element,
-        token.scope,
-        token.seq,
-        token.since_us,
-        token.instance,
-        token.is_around,
-        list(token.work),
-        sorted(token.prompts),
-        token.waits,
-    )
+    return _Token(*(*_same(token), list(token.work), sorted(token.prompts), token.waits))
 
 
 def _token_from(read: _Token, work: Mapping[str, Behavior | Service | Allocation]) -> Token:
-    return Token(
-        read.id,
-        read.process,
-        read.element,
-        read.scope,
-        read.seq,
-        read.since_us,
-        read.instance,
-        read.is_around,
-        {each: work[each] for each in read.work if each in work},
-        set(read.prompts),
-        read.waits,
-    )
+    at_work = {each: work[each] for each in read.work if each in work}
+    return Token(*(*_same(read), at_work, set(read.prompts), read.waits))
+
+
+_same = attrgetter(*_Token.__struct_fields__[:-3])
+"""What a token has in the same order and form in both."""

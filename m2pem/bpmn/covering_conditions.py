@@ -4,18 +4,18 @@ Each comparison is tried with values on both sides of its literal. What is no co
 literal, such as a function, may have any value. Null is tried only where a condition names it.
 """
 
-import operator
 from collections import defaultdict
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from itertools import pairwise, product
 from math import prod
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 from m2pem.bpmn.data_names import written_by
 from m2pem.mission.behavior import Assignment
 from m2pem.mission.elements import BoundaryEvent, FlowNode, ScriptTask, SubProcess, UserTask
 from m2pem.mission.expression import Expression
 from m2pem.mission.expression import tree as t
+from m2pem.mission.expression.operators import ORDERS
 
 Scalar: TypeAlias = bool | int | float | str | None
 _Values: TypeAlias = dict[tuple[type, Scalar], Scalar]
@@ -242,16 +242,8 @@ def _compared(how: t.Comparison, left: Scalar, right: Scalar) -> bool:
             return not _equal(left, right)
     for kind in (str, int | float):
         if isinstance(left, kind) and isinstance(right, kind):
-            return _ORDERS[how](left, right)
+            return ORDERS[how](left, right)
     return True  # it cannot be evaluated, which is another error than the one looked for
-
-
-_ORDERS: Mapping[t.Comparison, Callable[[Any, Any], bool]] = {
-    t.Comparison.LESS: operator.lt,
-    t.Comparison.LESS_EQUAL: operator.le,
-    t.Comparison.GREATER: operator.gt,
-    t.Comparison.GREATER_EQUAL: operator.ge,
-}
 
 
 def _equal(left: Scalar, right: Scalar) -> bool:

@@ -3,11 +3,11 @@
 import re
 from collections.abc import Callable
 
+from m2pem.bpmn.times import READERS
 from m2pem.errors import ExpressionSyntaxError
 from m2pem.mission.expression import parse
 from m2pem.mission.expression.literals import shorten, show_scalar
 from m2pem.mission.script import parse_script
-from m2pem.mission.timers import cycle, date_us, duration_us
 
 EXPRESSION = "write for example user.decision == 'continue' (docs/conditions.md)"
 SCRIPT = "one statement a line: dotted.name = expression, or throw error CODE"
@@ -28,13 +28,6 @@ _FEEL_TIME = re.compile(r"=\s*[a-z ]+\(\s*\"([^\"]*)\"\s*\)")
 _SHORT = re.compile(r"([0-9]+) ?(ms|[smhd])", re.IGNORECASE)
 _NAME = re.compile(r"[^\W\d]\w*(?:\.\w+)*")
 _REPEATED = "###"
-
-Read = Callable[[str], object]
-_TIMES: dict[str, Read] = {
-    "timeDuration": lambda text: duration_us(text, 0),
-    "timeDate": date_us,
-    "timeCycle": cycle,
-}
 
 
 def expression_remedy(text: str) -> str:
@@ -111,13 +104,13 @@ def time_remedy(kind: str, text: str) -> str:
         return _FORMS[kind]
     for pattern in (_QUOTED, _FEEL_TIME):
         match = pattern.fullmatch(text)
-        if match and _reads(_TIMES[kind], match[match.re.groups]):
+        if match and _reads(READERS[kind], match[match.re.groups]):
             return f"write {match[match.re.groups]} alone"
     if "(" in text and _reads(parse, f"= {text}"):
         return f"write = {shorten(text)}, as FEEL does"
-    if _reads(_TIMES[kind], text.upper()):
+    if _reads(READERS[kind], text.upper()):
         return f"write {text.upper()}, in capitals"
-    for other, read in _TIMES.items():
+    for other, read in READERS.items():
         if other != kind and _reads(read, text):
             return f"put it into a {other}"
     *_, period = text.split(_REPEATED)
@@ -141,7 +134,7 @@ def _iso(count: int, unit: str) -> str:
     return f"P{count}D" if unit == "d" else f"PT{count}{unit.upper()}"
 
 
-def _reads(read: Read, text: str) -> bool:
+def _reads(read: Callable[[str], object], text: str) -> bool:
     try:
         read(text)
     except ExpressionSyntaxError:

@@ -11,9 +11,9 @@ from m2pem.mission.expression.vocabulary import COERCING
 from m2pem.mission.timers import cycle, date_us, duration_us
 from m2pem.mission.values import Value
 
-_CHECKS: dict[TimerKind, Callable[[Value], object]] = {
-    TimerKind.DATE: date_us,
+READERS: dict[str, Callable[[Value], object]] = {
     TimerKind.DURATION: lambda value: duration_us(value, 0),
+    TimerKind.DATE: date_us,
     TimerKind.CYCLE: cycle,
 }
 _TAKES = {
@@ -27,7 +27,7 @@ def wrong_time(expression: Expression, kind: TimerKind) -> str:
     """What is wrong with the time that an expression gives; "" if it is, or may be, right."""
     if expression.constant:
         try:
-            _CHECKS[kind](expression.evaluate(lambda _: None))
+            READERS[kind](expression.evaluate(lambda _: None))
         except (ExpressionSyntaxError, ExpressionError) as error:
             return str(error)
         return ""
