@@ -111,6 +111,7 @@ def unwritten(
             if mapping.source.text not in mapping.source.names:  # a copy may well copy nothing
                 store.reads.append(Read(mapping.source, node.id, mapping.line))
         store.reads += _reads(node)
+        store.reads += _flow_conditions(node)
         begins = isinstance(node, StartEvent) and isinstance(node.container, Process)
         # A condition that begins a process reads the data of the main one.
         of_main = begins and node.container not in called
@@ -174,13 +175,17 @@ def remaining_names(nodes: Iterable[FlowNode]) -> frozenset[str]:
     """Return the names that elements read of what is left of tasks."""
     found: set[str] = set()
     for node in nodes:
-        conditions = _conditions(node) if isinstance(node, Event) else ()
-        inputs = node.mappings.inputs if isinstance(node, CallActivity) else ()
-        for each in (*_reads(node), *conditions):
-            found |= each.expression.names
-        for mapping in (*_data_mappings(node), *inputs):
-            found |= mapping.source.names
+        found |= read_by(node)
+        found.update(name for each in _flow_conditions(node) for name in each.names)
     return frozenset(filter(split_name, found))
+
+
+def read_by(node: FlowNode) -> set[str]:
+    """The names that a node itself reads; those of the conditions of its flows are not there."""
+    conditions = _conditions(node) if isinstance(node, Event) else ()
+    inputs = node.mappings.inputs if isinstance(node, CallActivity) else ()
+    found = {name for each in (*_reads(node), *conditions) for name in each.names}
+    return found.union(*(each.source.names for each in (*_data_mappings(node), *inputs)))
 
 
 def _data_mappings(node: FlowNode) -> tuple[DataMapping, ...]:
@@ -198,9 +203,6 @@ def _reads(node: FlowNode) -> Iterator[Read]:
         yield Read(node.activation, node.id, node.line)
     if isinstance(node, Activity) and node.loop is not None:
         yield from _loop_reads(node, node.loop)
-    for flow in node.outgoing:
-        if flow.condition is not None:
-            yield Read(flow.condition, flow.id, flow.line)
     if isinstance(node, ScriptTask | ServiceTask | SendTask) and node.behavior is not None:
         yield from _parameters(node, node.behavior.parameters)
         yield from _needs(node, node.behavior.roles)
@@ -214,6 +216,12 @@ def _reads(node: FlowNode) -> Iterator[Read]:
         for definition in node.definitions:
             if isinstance(definition, TimerEventDefinition):
                 yield Read(definition.expression, node.id, definition.line)
+
+
+def _flow_conditions(node: FlowNode) -> Iterator[Read]:
+    for flow in node.outgoing:
+        if flow.condition is not None:
+            yield Read(flow.condition, flow.id, flow.line)
 
 
 def _assignments(node: FlowNode) -> Iterator[Assignment]:
@@ -261,28 +269,42 @@ def _needs(node: FlowNode, roles: Iterable[Role]) -> Iterator[Read]:
 
 def written_by(node: FlowNode) -> set[str]:
     """The names that a node itself writes, without those of its service or behavior."""
-    written = {mapping.target for mapping in _data_mappings(node)}
+    written = stored_by(node)
     if isinstance(node, Event):
         written |= set(caught_data(node.definitions, ""))
+    if isinstance(node, Activity | Event):
+        written.update(mapping.target for mapping in node.data_flow.inputs)
     if isinstance(node, Activity) and node.loop is not None:
         written.add(LOOP_COUNTER)
         if isinstance(node.loop, MultiInstance):
             written |= {*INSTANCE_COUNTS, node.loop.item, node.loop.output_item}
-            written.add(node.loop.output_collection)
-    written.update(each.key for each in _assignments(node))
-    if isinstance(node, UserTask) and node.prompt is not None:
-        written.add(node.prompt.store)
-    elif isinstance(node, ComplexGateway):
+    if isinstance(node, ComplexGateway):
         written |= {"activationCount", "waitingForStart"}
         written.update(flow.local_id for flow in node.incoming)
-    elif isinstance(node, CallActivity):
-        written.update(mapping.target for mapping in node.mappings.outputs)
     behavior = getattr(node, "behavior", None)
-    if isinstance(behavior, Behavior):
-        written.update(role.need.store for role in behavior.roles if role.need is not None)
-        if any(parameter.name in GEOMETRIES for parameter in behavior.parameters):
-            written.add(f"{node.local_id}.remaining")
+    if isinstance(behavior, Behavior) and any(
+        parameter.name in GEOMETRIES for parameter in behavior.parameters
+    ):
+        written.add(f"{node.local_id}.remaining")
     return written - {""}
+
+
+def stored_by(node: FlowNode) -> set[str]:
+    """The names under which a node stores what comes of it, as its element says."""
+    stored = {each.key for each in _assignments(node)}
+    if isinstance(node, Activity | Event):
+        stored.update(each.target for each in node.data_flow.outputs)
+    if isinstance(node, Activity) and isinstance(node.loop, MultiInstance):
+        stored.add(node.loop.output_collection)
+    if isinstance(node, UserTask) and node.prompt is not None:
+        stored.add(node.prompt.store)
+    elif isinstance(node, CallActivity):
+        stored.update(each.target for each in node.mappings.outputs)
+    behavior = getattr(node, "behavior", None)
+    for role in behavior.roles if isinstance(behavior, Behavior) else ():
+        if role.need is not None:
+            stored.add(role.need.store)
+    return stored - {""}
 
 
 def _kinds_written_by(node: FlowNode) -> dict[str, frozenset[str]]:

@@ -13,13 +13,14 @@ from m2pem.api.authoring import (
 )
 from m2pem.bpmn import read_partly
 from m2pem.bpmn.context import KEY, ReadingContext
+from m2pem.bpmn.data_names import read_by
 from m2pem.bpmn.files import open_part
 from m2pem.diagram.layout.model import DATA, Element, children, is_node, referred_id, tag
 from m2pem.mission.elements import Activity
 from m2pem.mission.events import Message, Signal
 from m2pem.mission.library import Library
 from m2pem.mission.loops import INSTANCE_COUNTS, LOOP_COUNTER, MultiInstance, StandardLoop
-from m2pem.verify.requirements.names import read_by, written_by
+from m2pem.verify.requirements.names import written_by
 
 _LISTED = (*DATA, "sequenceFlow")
 
@@ -81,8 +82,7 @@ def _names(context: ReadingContext, services: Mapping[str, Sequence[str]]) -> It
     for node in context.nodes:
         for name in [*written_by(node, services), *_of_instances(node)]:
             written[name, node.id] = None
-        for expression in read_by(node):
-            read |= expression.names
+        read |= read_by(node)
     for ends in context.flows:
         if ends.flow.condition is not None:
             read |= ends.flow.condition.names

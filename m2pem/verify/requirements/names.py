@@ -3,18 +3,17 @@
 That includes the names of the data store that a mission reads or writes anywhere.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
+from m2pem.bpmn.data_names import read_by, stored_by
 from m2pem.errors import ExpressionSyntaxError
 from m2pem.fleet.allocation import resources_of, spelled_out
 from m2pem.fleet.behaviors import SHARED
 from m2pem.fleet.fleet import Fleet
 from m2pem.mission import elements as e
-from m2pem.mission.behavior import Assignment, Behavior, Need, Parameter
-from m2pem.mission.candidate_facts import is_fact
+from m2pem.mission.behavior import Behavior
 from m2pem.mission.elements import FlowNode, UserTask
-from m2pem.mission.expression import Expression, parse
-from m2pem.mission.loops import MultiInstance, StandardLoop
+from m2pem.mission.expression import Expression
 from m2pem.mission.mission import Mission
 from m2pem.suggestions import suggest
 from m2pem.verify.ltl.formula import (
@@ -42,68 +41,21 @@ def data_names(
         if flow.condition is not None:
             found |= flow.condition.names
     for node in mission.nodes:
-        found.update(written_by(node, service_writes or {}))
-        for expression in read_by(node):
-            found |= expression.names
+        found |= written_by(node, service_writes or {}) | read_by(node)
     return frozenset(name for name in found if name)
 
 
-def written_by(node: e.FlowNode, services: Mapping[str, Sequence[str]]) -> Iterator[str]:
+def written_by(node: e.FlowNode, services: Mapping[str, Sequence[str]]) -> set[str]:
     """Names that a node writes, or declares; `services`: what services write, by class."""
+    written = stored_by(node)
     if isinstance(node, e.SubProcess):
-        yield from (each.key for each in node.data)
-    if isinstance(node, e.Activity | e.Event):
-        yield from (each.target for each in node.data_flow.outputs)
-    if isinstance(node, e.CallActivity):
-        yield from (each.target for each in node.mappings.outputs)
-    elif isinstance(node, e.UserTask) and node.prompt is not None:
-        yield node.prompt.store
-    elif isinstance(node, e.ScriptTask) and node.script is not None:
-        yield from (s.key for s in node.script.statements if isinstance(s, Assignment))
-    elif isinstance(node, e.ServiceTask) and node.call is not None:
-        yield from services.get(node.call.service, ())
+        written.update(each.key for each in node.data)
+    if isinstance(node, e.ServiceTask) and node.call is not None:
+        written.update(services.get(node.call.service, ()))
     behavior = getattr(node, "behavior", None)
     if behavior is not None and (behavior.name, behavior.type) in SHARED:
-        yield from SHARED[behavior.name, behavior.type].writes
-    for role in behavior.roles if behavior is not None else ():
-        if role.need is not None and role.need.store:
-            yield role.need.store
-    if isinstance(node, e.Activity) and isinstance(node.loop, MultiInstance):
-        yield node.loop.output_collection
-
-
-def read_by(node: e.FlowNode) -> Iterator[Expression]:
-    """The expressions that a node reads."""
-    parameters: Iterable[Parameter] = ()
-    behavior = getattr(node, "behavior", None)
-    if behavior is not None:
-        parameters = behavior.parameters
-        for role in behavior.roles:
-            if role.need is not None:
-                yield from _read_by_need(role.need)
-    elif isinstance(node, e.ServiceTask) and node.call is not None:
-        parameters = node.call.properties
-    yield from (each.value for each in parameters if isinstance(each.value, Expression))
-    if isinstance(node, e.ScriptTask) and node.script is not None:
-        yield from (s.expression for s in node.script.statements if isinstance(s, Assignment))
-    if isinstance(node, e.CallActivity):
-        yield from (each.source for each in node.mappings.inputs)
-    loop = node.loop if isinstance(node, e.Activity) else None
-    conditions: tuple[Expression | None, ...] = ()
-    if isinstance(loop, StandardLoop):
-        conditions = (loop.condition,)
-    elif isinstance(loop, MultiInstance):
-        conditions = (loop.cardinality, loop.collection, loop.completion)
-    yield from (each for each in conditions if each is not None)
-
-
-def _read_by_need(need: Need) -> Iterator[Expression]:
-    if need.same:
-        yield parse(need.same)
-    if need.wait_limit is not None:
-        yield need.wait_limit
-    for expression in need.expressions:
-        yield from (parse(name) for name in sorted(expression.names) if not is_fact(name))
+        written.update(SHARED[behavior.name, behavior.type].writes)
+    return written
 
 
 _WHERE = ("area", "route", "target")
