@@ -104,10 +104,19 @@ class Constant:
 
 
 @dataclass(frozen=True, slots=True)
-class Not:
-    """`!a`."""
-
+class _Unary:
     operand: "Formula"
+
+
+@dataclass(frozen=True, slots=True)
+class _Binary:
+    left: "Formula"
+    right: "Formula"
+
+
+@dataclass(frozen=True, slots=True)
+class Not(_Unary):
+    """`!a`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,78 +134,53 @@ class Or:
 
 
 @dataclass(frozen=True, slots=True)
-class Implies:
+class Implies(_Binary):
     """`a -> b`."""
 
-    left: "Formula"
-    right: "Formula"
-
 
 @dataclass(frozen=True, slots=True)
-class Iff:
+class Iff(_Binary):
     """`a <-> b`."""
 
-    left: "Formula"
-    right: "Formula"
-
 
 @dataclass(frozen=True, slots=True)
-class Always:
+class Always(_Unary):
     """`[] a`: from now on."""
 
-    operand: "Formula"
-
 
 @dataclass(frozen=True, slots=True)
-class Eventually:
+class Eventually(_Unary):
     """`<> a`: now or later."""
 
-    operand: "Formula"
-
 
 @dataclass(frozen=True, slots=True)
-class Until:
+class Until(_Binary):
     """`a U b`: b comes, and a holds until then."""
 
-    left: "Formula"
-    right: "Formula"
-
 
 @dataclass(frozen=True, slots=True)
-class WeakUntil:
+class WeakUntil(_Binary):
     """`a W b`: the same, or a holds for ever."""
 
-    left: "Formula"
-    right: "Formula"
-
 
 @dataclass(frozen=True, slots=True)
-class Next:
+class Next(_Unary):
     """A formula about the next moment."""
 
-    operand: "Formula"
-
 
 @dataclass(frozen=True, slots=True)
-class Once:
+class Once(_Unary):
     """`once a`: now or before."""
 
-    operand: "Formula"
-
 
 @dataclass(frozen=True, slots=True)
-class Historically:
+class Historically(_Unary):
     """`historically a`: until now, always."""
 
-    operand: "Formula"
-
 
 @dataclass(frozen=True, slots=True)
-class Since:
+class Since(_Binary):
     """`a since b`: b came, and a has held after it."""
-
-    left: "Formula"
-    right: "Formula"
 
 
 @dataclass(frozen=True, slots=True)
@@ -277,9 +261,9 @@ def children(formula: Formula) -> tuple[Formula, ...]:
     match formula:
         case And() | Or() | Count():
             return formula.operands
-        case Implies() | Iff() | Until() | WeakUntil() | Since():
+        case _Binary():
             return (formula.left, formula.right)
-        case Not() | Always() | Eventually() | Next() | Once() | Historically() | Timed():
+        case _Unary() | Timed():
             return (formula.operand,)
         case _:
             return ()
