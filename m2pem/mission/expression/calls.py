@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from m2pem.mission.expression.dialect import Dialect
 from m2pem.mission.expression.feel_functions import FEEL_FUNCTIONS
-from m2pem.mission.expression.functions import FUNCTIONS, OWN
+from m2pem.mission.expression.functions import FUNCTIONS, XPATH_FUNCTIONS
 from m2pem.mission.expression.signatures import Function
 from m2pem.mission.expression.temporal import NOW
 from m2pem.mission.expression.tree import (
@@ -113,9 +113,9 @@ def method_call(receiver: Node, method: str, arguments: Arguments) -> Node:
 
 
 def _function(name: str, arguments: Arguments, dialect: Dialect = Dialect.JUEL) -> Node:
-    own = OWN.get(dialect.name, {})
+    own = XPATH_FUNCTIONS if dialect is Dialect.XPATH else {}
     functions = {**FUNCTIONS, **own}
-    prefix = f"{dialect.name} " if name in own else ""
+    prefix = "XPATH " if name in own else ""
     function = functions.get(name)
     if function is None:
         if "." in name:

@@ -95,14 +95,6 @@ def _contains(container: list[Computed] | str, item: Computed) -> Computed:
     return item in container
 
 
-def _upper(text: str) -> Computed:
-    return bounded_text(text.upper(), "upper()")
-
-
-def _lower(text: str) -> Computed:
-    return bounded_text(text.lower(), "lower()")
-
-
 def _number(value: int | float | str) -> Computed:
     if not isinstance(value, str):
         return value
@@ -190,8 +182,10 @@ FUNCTIONS = Function.table([
      "whether the text x begins with the text y"),
     ("ends_with(x: text, y: text) -> boolean", str.endswith,
      "whether the text x ends with the text y"),
-    ("upper(x: text) -> text", _upper, "the text in capital letters"),
-    ("lower(x: text) -> text", _lower, "the text in small letters"),
+    ("upper(x: text) -> text", lambda x: bounded_text(x.upper(), "upper()"),
+     "the text in capital letters"),
+    ("lower(x: text) -> text", lambda x: bounded_text(x.lower(), "lower()"),
+     "the text in small letters"),
     ("exists(x) -> boolean", lambda x: x is not None, "whether x is not null"),
     ("is_empty(x) -> boolean", lambda x: x is None or x in ("", [], {}),
      "whether x is null, an empty text, list or map"),
@@ -246,9 +240,6 @@ XPATH_FUNCTIONS = {
     ]).items()
 }  # fmt: skip
 """XPath's own, which convert what they take (XPath 1.0, clause 4)."""
-
-OWN: dict[str, dict[str, Function]] = {"XPATH": XPATH_FUNCTIONS}
-"""Functions that one language has, or has otherwise, by how their names begin in a tree."""
 
 LISTED: dict[str, Function] = {
     **FUNCTIONS,

@@ -134,7 +134,6 @@ class RoutedLink(VehicleLink):
         return {str(route.url): self._quality(route) for route in self._routes}
 
     def refused(self) -> list[RefusedFrames]:
-        """See `VehicleLink.refused`."""
         return [each for route in self._routes for each in route.refused()]
 
     def signing_time(self) -> int:

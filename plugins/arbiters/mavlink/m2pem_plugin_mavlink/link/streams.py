@@ -77,11 +77,9 @@ class ConnectingEndpoint(Endpoint):
     """Connects, and reconnects with growing pauses."""
 
     async def open(self) -> None:
-        """See `Endpoint.open`."""
         self._keeping = asyncio.create_task(self._keep())
 
     async def close(self) -> None:
-        """See `Endpoint.close`."""
         self._keeping.cancel()
         await asyncio.wait([self._keeping])
 
@@ -125,7 +123,6 @@ class TcpOutEndpoint(ConnectingEndpoint):
     url: SocketUrl
 
     async def connect(self, make: Callable[[], Connection]) -> Connection:
-        """See `ConnectingEndpoint.connect`."""
         loop = asyncio.get_running_loop()
         _, connection = await loop.create_connection(make, self.url.host, self.url.port)
         return connection
@@ -137,7 +134,6 @@ class SerialEndpoint(ConnectingEndpoint):
     url: SerialUrl
 
     async def open(self) -> None:
-        """See `Endpoint.open`."""
         try:
             import serial_asyncio_fast  # noqa: PLC0415  # few have a serial line
         except ImportError:
@@ -149,7 +145,6 @@ class SerialEndpoint(ConnectingEndpoint):
         await super().open()
 
     async def connect(self, make: Callable[[], Connection]) -> Connection:
-        """See `ConnectingEndpoint.connect`."""
         loop, url = asyncio.get_running_loop(), self.url
         try:
             transport, connection = await self._connect(
@@ -175,7 +170,6 @@ class TcpInEndpoint(Endpoint):
     _server: asyncio.Server
 
     async def open(self) -> None:
-        """See `Endpoint.open`."""
         loop = asyncio.get_running_loop()
         try:
             self._server = await loop.create_server(
@@ -185,7 +179,6 @@ class TcpInEndpoint(Endpoint):
             raise PluginError(f"{self.url}: {why_not(error)}") from None
 
     async def close(self) -> None:
-        """See `Endpoint.close`."""
         self._server.close()
         connections = [key for key in self.peers if isinstance(key, Connection)]
         for connection in connections:

@@ -197,7 +197,6 @@ class MavsdkLink(VehicleLink):
     # --- VehicleLink ----------------------------------------------------------------------------
 
     def send(self, message: Message) -> None:
-        """See `VehicleLink.send`."""
         if self._closed or not self.attached or not self.may_send():
             return
         self._unsent.append(message)
@@ -205,7 +204,6 @@ class MavsdkLink(VehicleLink):
             self._sender = _begin(self._send_all())
 
     def listen(self, ids: Iterable[int], listener: Listener) -> Callable[[], None]:
-        """See `VehicleLink.listen`."""
         ids = tuple(ids)
         for id_ in ids:
             self._listeners.setdefault(id_, []).append(listener)
@@ -220,7 +218,6 @@ class MavsdkLink(VehicleLink):
         return end
 
     async def perform(self, transaction: Transaction[T]) -> T:
-        """See `VehicleLink.perform`."""
         async with self._locks.locked(transaction.key):
             self._refuse_closed()
             if not self.attached:
