@@ -165,7 +165,6 @@ class Journal(Protocol):
     @property
     def identity(self) -> UUID:
         """A unique id of this journal; the same each time that it is opened."""
-        ...
 
     @property
     def file(self) -> Path | None:
@@ -173,7 +172,6 @@ class Journal(Protocol):
 
         Of a journal in a database elsewhere it is a file of this host, which names the journal.
         """
-        ...
 
     @property
     def lease_s(self) -> float | None:
@@ -181,7 +179,6 @@ class Journal(Protocol):
 
         None: as long as its process lives.
         """
-        ...
 
     @property
     def owned_until_s(self) -> float | None:
@@ -191,7 +188,6 @@ class Journal(Protocol):
         None: as long as its process lives, or no run was. When it is over, another executive may
         claim them, and `append` raises StaleEpochError until they are released.
         """
-        ...
 
     def abandon(self, fleet: str) -> FleetServer | None:
         """Let an executive that stands by for a fleet of this name have all runs and vehicles in a
@@ -202,7 +198,6 @@ class Journal(Protocol):
         Raises:
             JournalError: the journal cannot say who stands by.
         """
-        ...
 
     async def serve_fleet(
         self, fleet: str, resources: Collection[str], digest: str = "", page: str = ""
@@ -217,15 +212,12 @@ class Journal(Protocol):
                 and command are named.
             JournalError: the journal cannot say or note it.
         """
-        ...
 
     async def leave_fleet(self, fleet: str) -> None:
         """Let another executive serve what is served here of a fleet."""
-        ...
 
     async def fleet_server(self, fleet: str, resources: Collection[str]) -> FleetServer | None:
         """Return which executive serves one of these in a fleet of this name; None: none does."""
-        ...
 
     async def create(self, header: RunHeader, started: EntryChange | None = None) -> str:
         """Create a run, durable on return and claimed with epoch 1; the id is r1, r2, ...
@@ -238,7 +230,6 @@ class Journal(Protocol):
                 nothing is written.
             JournalError: it cannot be written, there is too little free space, or a loss is open.
         """
-        ...
 
     async def claim(self, run: str) -> int:
         """Claim a run: its epoch rises by one and is returned; older epochs cannot append.
@@ -246,7 +237,6 @@ class Journal(Protocol):
         Raises:
             JournalError: no such run, or a living executive holds it (its process is named).
         """
-        ...
 
     async def check_claim(self, run: str, epoch: int) -> None:
         """Return if the claim of a run with this epoch holds; nothing is written.
@@ -255,11 +245,9 @@ class Journal(Protocol):
             StaleEpochError: another executive has claimed the run since.
             JournalError: no such run, or the journal cannot say.
         """
-        ...
 
     async def release(self, run: str) -> None:
         """Release a run, so that another executive may claim it."""
-        ...
 
     async def append(self, entries: Sequence[Entry]) -> None:
         """Write entries; durable on return. Calls that wait at the same time share one commit.
@@ -269,7 +257,6 @@ class Journal(Protocol):
             JournalError: not written (disk full, ...); nothing of the call is written. Or the
                 files were removed or replaced: the journal writes no more.
         """
-        ...
 
     async def check(self) -> None:
         """Return if it can write now and runs may begin; nothing is written.
@@ -277,7 +264,6 @@ class Journal(Protocol):
         Raises:
             JournalError: as `append` and `create` would, and why.
         """
-        ...
 
     def read(self, run: str, after_seq: int = 0) -> AsyncIterator[Entry]:
         """Yield the entries whose first record comes after `after_seq`, in order, in constant
@@ -286,7 +272,6 @@ class Journal(Protocol):
         Raises:
             JournalError: no such run; or an entry is damaged or missing, by run and record.
         """
-        ...
 
     async def revisions(self, run: str) -> Sequence[Entry]:
         """Return the entries of a run whose input is a revision of its mission, also one that was
@@ -295,7 +280,6 @@ class Journal(Protocol):
         Raises:
             JournalError: no such run, or one of them is damaged.
         """
-        ...
 
     async def runs(self, *, files: bool = True) -> Sequence[RunInfo]:
         """Return every run, in order of its number.
@@ -303,7 +287,6 @@ class Journal(Protocol):
         `files`: with the files of its mission and its fleet; without, they are empty in the
         headers, and ten thousand runs are read in a moment.
         """
-        ...
 
     async def delete(self, runs: Sequence[str], *, by: str, unended: bool = False) -> None:
         """Delete runs with all that the journal has of them; their ids are not given again.
@@ -314,11 +297,9 @@ class Journal(Protocol):
             JournalError: a run is unknown, driven, not ended, or has lost entries; then nothing is
                 deleted.
         """
-        ...
 
     async def deletions(self) -> Sequence[Deletion]:
         """Return the runs that were deleted, in order of their numbers."""
-        ...
 
     # --- the schedule ---------------------------------------------------------------------------
 
@@ -328,7 +309,6 @@ class Journal(Protocol):
         Raises:
             JournalError: it cannot be written.
         """
-        ...
 
     async def change_entry(self, change: EntryChange, *, deletes: str = "") -> None:
         """Write the new state of an entry; durable on return.
@@ -339,11 +319,9 @@ class Journal(Protocol):
             StaleEntryError: the entry was changed since; nothing is written.
             JournalError: it cannot be written, or the run has begun, or is driven.
         """
-        ...
 
     async def entries(self) -> Sequence[ScheduleEntry]:
         """Return every entry of the schedule, of all fleets, in order of its number."""
-        ...
 
     async def schedule_revisions(self) -> Mapping[str, int]:
         """Return the revision of each entry of the schedule, by its id.
@@ -351,7 +329,6 @@ class Journal(Protocol):
         It is asked each second, and after each change, for what other executives have added,
         changed or removed, so it must cost little.
         """
-        ...
 
     async def changed(self, seen: int) -> int:
         """Return the number of changes of which this journal was notified, once it exceeds `seen`.
@@ -361,7 +338,6 @@ class Journal(Protocol):
         reached, so a follower looks from time to time, too. Where nothing notifies of changes, it
         does not return.
         """
-        ...
 
     async def remove_entries(self, entries: Sequence[str]) -> None:
         """Remove entries that can start nothing any more; their ids are not given again.
@@ -369,7 +345,6 @@ class Journal(Protocol):
         Raises:
             JournalError: one is active, or there is none of that id; nothing is removed.
         """
-        ...
 
     async def hold_schedule(self, fleet: str, hold: Hold | None) -> None:
         """Note that the whole schedule of a fleet is held; None: that it is not any more.
@@ -377,11 +352,9 @@ class Journal(Protocol):
         Raises:
             JournalError: it cannot be written.
         """
-        ...
 
     async def schedule_hold(self, fleet: str) -> Hold | None:
         """Return who holds the whole schedule of a fleet, and why; None: no operator."""
-        ...
 
     # --- approvals ------------------------------------------------------------------------------
 
@@ -391,7 +364,6 @@ class Journal(Protocol):
         Raises:
             JournalError: it cannot be written.
         """
-        ...
 
     async def withdraw_approval(self, approval: Approval) -> None:
         """Note that a person's approval of a content does not count any more; durable on return.
@@ -399,11 +371,9 @@ class Journal(Protocol):
         Raises:
             JournalError: it cannot be written.
         """
-        ...
 
     async def approvals(self, fleet: str) -> Sequence[Approval]:
         """Return the approvals for a fleet, the oldest first."""
-        ...
 
     async def note_edit(self, edit: Edit) -> None:
         """Note who has made a file what it is; durable on return. The first one counts.
@@ -411,11 +381,9 @@ class Journal(Protocol):
         Raises:
             JournalError: it cannot be written.
         """
-        ...
 
     async def edits(self, digests: Collection[str]) -> Mapping[str, Edit]:
         """Return who has edited these files, by their hashes, as far as it is known."""
-        ...
 
     # --- alerts ---------------------------------------------------------------------------------
 
@@ -432,11 +400,9 @@ class Journal(Protocol):
             StaleAlertsError: the greatest number is another one; nothing was written.
             JournalError: they cannot be written.
         """
-        ...
 
     async def alerts(self, fleet: str) -> Mapping[int, str]:
         """Return the alerts of a fleet by their numbers, which rise, as they were written."""
-        ...
 
     # --- drawings -------------------------------------------------------------------------------
 
@@ -453,13 +419,10 @@ class Journal(Protocol):
             StaleDrawingsError: the greatest number is another one; nothing was written.
             JournalError: they cannot be written.
         """
-        ...
 
     async def drawings(self, fleet: str) -> Mapping[int, str]:
         """Return the versions of drawings of a fleet by their numbers, which rise, as they were
         written."""
-        ...
 
     async def close(self) -> None:
         """Finish what is being written, and release all runs."""
-        ...

@@ -45,7 +45,6 @@ class Library(Protocol):
     @property
     def places(self) -> Sequence[str]:
         """The places in which `called` looks, for messages."""
-        ...
 
     def called(self, element: str, namespace: str) -> Source | None:
         """The file with the process or global task of that id; None: there is none.
@@ -55,7 +54,6 @@ class Library(Protocol):
         Raises:
             LibraryError: there are several.
         """
-        ...
 
     def imported(self, location: str, importer: str) -> Source:
         """The file at the `location` of an `import` in the file of that name.
@@ -63,7 +61,6 @@ class Library(Protocol):
         Raises:
             LibraryError: it cannot be read, or is no local file.
         """
-        ...
 
 
 class KeptLibrary:

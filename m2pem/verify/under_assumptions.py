@@ -39,13 +39,11 @@ class Checks(Protocol):
 
     def properties(self, assumed: Assumptions, limits: Limits) -> Report:
         """Check every property of missions."""
-        ...
 
     def requirements(
         self, report: Report, asked: Sequence[Requirement], assumed: Assumptions, limits: Limits
     ) -> Report:
         """Return the report with the results of requirements added."""
-        ...
 
 
 def check_under_assumptions(

@@ -13,7 +13,6 @@ class AlertControl(Protocol):
 
     async def incidents(self) -> Sequence[OpenIncident]:
         """The incidents of all runs that are open, in the order in which they opened."""
-        ...
 
     async def preview_incident(
         self,
@@ -29,7 +28,6 @@ class AlertControl(Protocol):
 
         Arguments as for `resolve_incident`. It is explored in a process of its own; no run waits.
         """
-        ...
 
     async def resolve_incident(
         self,
@@ -54,7 +52,6 @@ class AlertControl(Protocol):
                 error says what would be right.
             StuckError: the mission cannot complete after it, and that was not confirmed.
         """
-        ...
 
     async def alerts(self, *, over: bool = False) -> Sequence[OperatorAlert]:
         """What operators must know now (docs/operating.md): the alerts that are open, the most
@@ -62,7 +59,6 @@ class AlertControl(Protocol):
 
         `over`: then also the last ones that are over, the newest first.
         """
-        ...
 
     async def acknowledge_alert(self, alert: str, *, by: str = "") -> None:
         """Note that an operator has seen an alert: it calls no operator any more. One that was said
@@ -72,7 +68,6 @@ class AlertControl(Protocol):
             OperatorError: there is no such alert, it is over, or it is acknowledged already; or
                 the journal has not written it within 1.5 s.
         """
-        ...
 
     async def own_alert(self, alert: str, *, owner: str | None = None, by: str = "") -> None:
         """Note who takes care of an alert. None: `by` does; "": no operator any more.
@@ -81,4 +76,3 @@ class AlertControl(Protocol):
             OperatorError: there is no such alert, or it is over; or the journal has not written it
                 within 1.5 s.
         """
-        ...

@@ -29,7 +29,6 @@ class AuthoringControl(Protocol):
 
         `data`: names that are given at start.
         """
-        ...
 
     def estimate(self, mission: MissionSource, *, process: str | None = None) -> MissionEstimate:
         """What a mission takes as it is drawn: distance, time and battery of each vehicle.
@@ -39,7 +38,6 @@ class AuthoringControl(Protocol):
                 fleet cannot be simulated.
             OperatorError: this executive cannot estimate missions.
         """
-        ...
 
     async def simulate(self, mission: MissionSource, **options: Any) -> SimulationResult:
         """Rehearse a mission with this fleet on a virtual clock. Cancelling ends it.
@@ -52,7 +50,6 @@ class AuthoringControl(Protocol):
         Raises:
             FindingsError: the mission, the requirements or the answers cannot be used.
         """
-        ...
 
     async def verify(
         self,
@@ -78,7 +75,6 @@ class AuthoringControl(Protocol):
         Raises:
             FindingsError: the mission or the requirements cannot be used.
         """
-        ...
 
     def editable(self, mission: bytes, *, anew: bool = False) -> Editable:
         """The same mission as an editor takes it, with a diagram of everything in it.
@@ -88,7 +84,6 @@ class AuthoringControl(Protocol):
         Raises:
             MissionError: it is no BPMN 2.0.
         """
-        ...
 
     def outline(self, mission: bytes | Draft) -> Outline:
         """What a file has, also one with errors, as far as it can be read.
@@ -96,11 +91,9 @@ class AuthoringControl(Protocol):
         Raises:
             MissionError: it is no BPMN 2.0.
         """
-        ...
 
     def services(self) -> Mapping[str, Sequence[str]]:
         """The service-task classes that there are, with the names of data that each writes."""
-        ...
 
     async def approval(self, mission: MissionSource) -> MissionApproval:
         """Who has approved a mission, and who must before it may start (docs/approval.md).
@@ -108,7 +101,6 @@ class AuthoringControl(Protocol):
         Raises:
             MissionError: it cannot be read.
         """
-        ...
 
     async def approve(
         self, mission: MissionSource, *, digest: str = "", by: str = ""
@@ -121,7 +113,6 @@ class AuthoringControl(Protocol):
             MissionError: it cannot be read.
             OperatorError: the fleet asks for no approvals, or `by` may not approve this mission.
         """
-        ...
 
     async def withdraw_approval(self, mission: MissionSource, *, by: str = "") -> MissionApproval:
         """Withdraw the approval of a mission that `by` has given. What runs goes on.
@@ -130,11 +121,9 @@ class AuthoringControl(Protocol):
             MissionError: it cannot be read.
             OperatorError: `by` has not approved it.
         """
-        ...
 
     async def note_edit(self, digest: str, *, by: str = "") -> None:
         """Note who has made a file of a mission what it is, where the fleet asks for approvals.
 
         `digest`: the SHA-256 of the file, in hexadecimal. Editors call it before they save.
         """
-        ...

@@ -30,22 +30,18 @@ class DebugControl(Protocol):
         Raises:
             OperatorError: the mission has no such element, or a condition cannot be read.
         """
-        ...
 
     async def step(self, run: RunId, *, by: str = "") -> None:
         """Let a paused run execute one token: it is paused again before the next."""
-        ...
 
     async def set_data(
         self, run: RunId, data: Mapping[str, Value], *, scope: int = 0, by: str = ""
     ) -> None:
         """Change data of a paused run, where a scope sees it; 0: the process that it began with."""
-        ...
 
     async def data(self, run: RunId) -> Sequence[ScopeData]:
         """The data of a run that goes on: of its data stores, then of each active process,
         and of each active subprocess and task that has some, from the outside in."""
-        ...
 
     async def evaluate(self, run: RunId, expression: str, *, token: int = 0) -> ExpressionValue:
         """The value of an expression over the data of a run that goes on, as the element sees it
@@ -54,4 +50,3 @@ class DebugControl(Protocol):
         Raises:
             OperatorError: it cannot be read or evaluated, or there is no such token.
         """
-        ...

@@ -25,7 +25,6 @@ class ExecutiveControl(Protocol):
             OperatorError: there is no standby executive. Nothing has changed then.
             JournalError: the journal cannot say which one does.
         """
-        ...
 
     async def standbys(self) -> Sequence[ExecutiveAddress]:
         """The executives that stand by for the fleet of this one.
@@ -33,23 +32,18 @@ class ExecutiveControl(Protocol):
         Raises:
             JournalError: the journal cannot say it.
         """
-        ...
 
     def fleet(self) -> "Fleet":
         """The fleet in use."""
-        ...
 
     def catalogue(self) -> Mapping[ResourceId, Sequence[BehaviorSpec]]:
         """Return the behaviors of every resource."""
-        ...
 
     def simulated(self) -> bool:
         """Whether nothing real moves: all vehicles are simulated, or software in the loop."""
-        ...
 
     def speed(self) -> float:
         """Seconds of mission time in a real second."""
-        ...
 
     async def health(self) -> Sequence[HealthCheck]:
         """Whether this executive can do its work now: `journal`, `arbiters`, `event loop`.
@@ -57,12 +51,9 @@ class ExecutiveControl(Protocol):
         It answers within two seconds, whatever hangs. Vehicles do not count: their links are in
         the telemetry.
         """
-        ...
 
     async def statistics(self) -> ExecutiveStatistics:
         """What this executive has counted since it began, and how long its queues are now."""
-        ...
 
     def journal_file(self) -> Path | None:
         """The journal's file; None: the journal is in memory."""
-        ...

@@ -24,7 +24,6 @@ class GeometryControl(Protocol):
             OperatorError: it is no geometry; or it is handed over, and the journal has not written
                 it within 1.5 s.
         """
-        ...
 
     async def delete_geometry(self, name: str, *, by: str = "") -> None:
         """Delete a geometry that was handed over for all runs: later runs get that of the fleet
@@ -33,22 +32,18 @@ class GeometryControl(Protocol):
         Raises:
             OperatorError: no operator has handed it over; or as for `set_geometry`.
         """
-        ...
 
     async def geometry_versions(self, name: str) -> Sequence[GeometryVersion]:
         """The versions of a geometry that were handed over for all runs, the newest last."""
-        ...
 
     async def geometry_users(self, name: str) -> Sequence[RunId]:
         """The runs under way whose missions name a geometry that is not their own.
 
         Operators see them before they hand over another one of that name.
         """
-        ...
 
     def geometries(self) -> Mapping[str, HandedOver]:
         """The routes, areas and points that operators have handed over for all runs."""
-        ...
 
     def run_geometries(self) -> "Mapping[RunId, Mapping[str, Route | Area | Point]]":
         """The routes, areas and points that runs under way have alone, by run and name.
@@ -56,4 +51,3 @@ class GeometryControl(Protocol):
         They are those of its mission's files, those that were handed over to this run, and those
         of all runs that have changed since and that it keeps.
         """
-        ...

@@ -19,7 +19,6 @@ class OperatorControl(Protocol):
         Raises:
             OperatorError: no other operator has it, or one asks for it already.
         """
-        ...
 
     async def answer_control(self, resource: str, *, give: bool, by: str = "") -> None:
         """Give a vehicle or payload to the operator who asks for it, or refuse. Who has asked
@@ -28,11 +27,9 @@ class OperatorControl(Protocol):
         Raises:
             OperatorError: no operator asks for it, or `by` does not have it.
         """
-        ...
 
     async def control_requests(self) -> Sequence[OpenControlRequest]:
         """Who asks whom for which vehicle or payload now."""
-        ...
 
     async def announce_presence(
         self,
@@ -51,12 +48,9 @@ class OperatorControl(Protocol):
         `run`, `page`: what the unit shows; `editing`: the mission that is edited there; `role`:
         what it lets the operator do.
         """
-        ...
 
     async def end_presence(self, client: str) -> None:
         """The operator of the unit `client` has left."""
-        ...
 
     async def operators(self) -> Sequence[OperatorPresence]:
         """Which operators are present, at which units."""
-        ...

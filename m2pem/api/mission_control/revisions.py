@@ -18,7 +18,6 @@ class RevisionControl(Protocol):
         Raises:
             OperatorError: the journal has no such run.
         """
-        ...
 
     async def version_files(self, run: RunId, version: str) -> MissionFiles:
         """Return the files of a version that a run has had: to look at, or to revise it back.
@@ -26,7 +25,6 @@ class RevisionControl(Protocol):
         Raises:
             OperatorError: the journal has no such run, or it has not had that version.
         """
-        ...
 
     async def plan_revision(
         self, run: RunId, mission: MissionSource, *, moves: Mapping[str, str] | None = None
@@ -40,7 +38,6 @@ class RevisionControl(Protocol):
             MissionError: with every finding, when the new version cannot be read.
             OperatorError: the run has ended, or is one behavior that was commanded.
         """
-        ...
 
     async def revise(
         self,
@@ -64,4 +61,3 @@ class RevisionControl(Protocol):
             StuckError: the mission cannot complete after it, and that was not confirmed.
             OperatorError: it is refused, or the run has gone on so that the plan is another one.
         """
-        ...

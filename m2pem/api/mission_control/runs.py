@@ -31,7 +31,6 @@ class RunControl(Protocol):
             BusyError: they have some, and that was not confirmed; it says who has what.
             NotApprovedError: the fleet asks for approvals, and persons must give them before.
         """
-        ...
 
     async def execute_behavior(
         self,
@@ -55,14 +54,12 @@ class RunControl(Protocol):
             OperatorError: the fleet has no such resource; or a later call for it came, while this
                 one waited until the resource had stopped.
         """
-        ...
 
     async def missions(self) -> Sequence[str]:
         """The paths of the mission files that are found where the executive runs.
 
         They are in the folders of its search path, in its working folder, and in `missions` there.
         """
-        ...
 
     async def preview_start(
         self, mission: MissionSource, *, process: str | None = None, data: Iterable[str] = ()
@@ -71,18 +68,15 @@ class RunControl(Protocol):
 
         `data`: names that are given at start. Operators see this before they start a mission.
         """
-        ...
 
     async def pause(self, run: RunId, *, by: str = "") -> None:
         """Hold every commanded resource and freeze timers.
 
         The holds go to the arbiters at once, as the cancels of `stop` do; errors as there.
         """
-        ...
 
     async def resume(self, run: RunId, *, by: str = "") -> None:
         """Go on after a pause."""
-        ...
 
     async def signal(
         self,
@@ -93,18 +87,15 @@ class RunControl(Protocol):
         by: str = "",
     ) -> None:
         """Emit a signal, by its id or its name, to one run or (None) to all that have it."""
-        ...
 
     async def message(
         self, message: str, *, run: RunId, data: Mapping[str, Value] | None = None, by: str = ""
     ) -> None:
         """Send a message, by its id."""
-        ...
 
     async def answer(self, run: RunId, prompt: str, decision: str, *, by: str = "") -> None:
         """Answer a prompt. The first answer wins; a later one raises OperatorError, and so does one
         of an operator who has not the role of the prompt, where the fleet file says who has it."""
-        ...
 
     async def add_note(self, run: RunId, text: str, *, by: str = "") -> None:
         """Write a note into a run's log: a record, which every operator sees.
@@ -112,7 +103,6 @@ class RunControl(Protocol):
         Raises:
             OperatorError: it is empty or too long (`MAX_NOTE_CHARACTERS`), or the run has ended.
         """
-        ...
 
     async def stop(self, run: RunId, *, by: str = "", reason: str = "") -> None:
         """End every token, cancel every behavior.
@@ -124,7 +114,6 @@ class RunControl(Protocol):
             OperatorError: the run has ended; or the cancels are sent, and the journal has not
                 written the stop within 1.5 s.
         """
-        ...
 
     async def stop_all(self, *, by: str = "", reason: str = "") -> Sequence[RunId]:
         """Stop every run that has not ended, as `stop` does; returns them.
@@ -134,4 +123,3 @@ class RunControl(Protocol):
         Raises:
             OperatorError: as for `stop`; names each run concerned. The others are stopped.
         """
-        ...

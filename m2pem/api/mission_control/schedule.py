@@ -35,15 +35,12 @@ class ScheduleControl(Protocol):
                 not say that they may start unattended.
             OperatorError: this executive does not serve a schedule.
         """
-        ...
 
     async def scheduled(self) -> Schedule:
         """The schedule of this executive's fleet: what starts when, and what it waits for."""
-        ...
 
     async def unschedule(self, entry: EntryId, *, by: str = "") -> None:
         """Cancel an entry: it starts nothing any more. A run that it has started goes on."""
-        ...
 
     async def start_scheduled(self, entry: EntryId, *, by: str = "") -> RunId:
         """Start the mission of an entry now, whatever it waits for; no operator is warned.
@@ -56,7 +53,6 @@ class ScheduleControl(Protocol):
             BusyError: runs or operators have its vehicles; it says who has what.
             OperatorError: there is no such entry, it is over, or held, or its last run goes on.
         """
-        ...
 
     async def hold_schedule(
         self, entry: EntryId | None = None, *, by: str = "", reason: str = ""
@@ -70,8 +66,6 @@ class ScheduleControl(Protocol):
             OperatorError: there is no such entry, or the journal has not written the hold within
                 1.5 s.
         """
-        ...
 
     async def release_schedule(self, entry: EntryId | None = None, *, by: str = "") -> None:
         """Let an entry, or (None) the whole schedule, start missions again."""
-        ...

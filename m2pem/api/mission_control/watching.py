@@ -35,35 +35,27 @@ class WatchControl(Protocol):
         self, run: RunId | None = None, size: int = 10_000
     ) -> AsyncIterator[ControlEvent]:
         """Yield the prompts that are open, and then all events from this call on."""
-        ...
 
     def telemetry(self, size: int = 100) -> AsyncIterator[Telemetry]:
         """Telemetry from now on; the oldest waiting is dropped when a reader is slow."""
-        ...
 
     async def records(
         self, run: RunId, after_seq: int = 0, limit: int = 1000
     ) -> Sequence[StampedRecord]:
         """The records after `after_seq`, about `limit` of them: a page ends with all records of
         an input, so it may be longer. `after_seq` is 0, or the last of a page."""
-        ...
 
     async def runs(self) -> Sequence[RunSummary]:
         """Every run of the journal."""
-        ...
 
     def prompts(self) -> Sequence[OpenPrompt]:
         """The prompts that are open."""
-        ...
 
     async def mission(self, run: RunId) -> "Mission":
         """The mission of a run, also of one that has ended: its elements with their names."""
-        ...
 
     async def mission_time_s(self, run: RunId) -> float:
         """Seconds from the start of a run that has not ended; does not advance during a pause."""
-        ...
 
     async def wait(self, run: RunId) -> RunSummary:
         """Wait until the run has ended and its vehicles are released."""
-        ...

@@ -206,7 +206,7 @@ FEEL_FUNCTIONS = FeelFunction.table([
      "the arithmetic mean of the numbers"),
     ("median(list: list, ...) -> number", lib.of_numbers(statistics.median),
      "the middle one of the numbers"),
-    ("stddev(list: list, ...) -> number", lib.of_numbers(lib.deviation),
+    ("stddev(list: list, ...) -> number", lib.of_numbers(statistics.stdev),
      "the sample standard deviation of the numbers"),
     ("mode(list: list, ...) -> list",
      lambda values: sorted(statistics.multimode(lib.numbers(values))),

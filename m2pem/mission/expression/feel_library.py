@@ -349,14 +349,6 @@ def of_numbers(compute: Callable[[list[Decimal]], FeelValue]) -> Callable[..., F
     return of
 
 
-def deviation(values: list[Decimal]) -> Decimal:
-    if len(values) < 2:
-        raise NoValueError("it takes two numbers at least")
-    mean = sum(values, Decimal()) / len(values)
-    total = sum(((each - mean) ** 2 for each in values), Decimal())
-    return (total / (len(values) - 1)).sqrt()
-
-
 def truths(decisive: bool) -> Callable[[list[FeelValue]], bool | None]:
     def compute(values: list[FeelValue]) -> bool | None:
         if decisive in [each for each in values if isinstance(each, bool)]:

@@ -30,32 +30,25 @@ class LabelledSystem(Protocol):
     @property
     def propositions(self) -> Sequence[Proposition]:
         """The propositions of the labels' bits."""
-        ...
 
     @property
     def reduced(self) -> bool:
         """Whether successors are left out: not every enabled transition is among them."""
-        ...
 
     def initial(self) -> Sequence[int]:
         """The initial states."""
-        ...
 
     def is_open(self, state: int) -> bool:
         """Whether the successors of a state are unknown."""
-        ...
 
     def successors(self, state: int) -> Sequence[tuple[int, int]]:
         """The enabled transitions of a state, each with the state after it."""
-        ...
 
     def true_in(self, state: int) -> int:
         """The propositions that are true in a state."""
-        ...
 
     def true_when(self, transition: int) -> int:
         """The propositions that are true in the moment in which a transition fires."""
-        ...
 
 
 BYTES_A_NODE = 400

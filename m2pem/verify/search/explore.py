@@ -159,7 +159,6 @@ class Watch(Protocol):
 
     def look(self, found: Exploration) -> bool:
         """Whether there is a violation in what was found; called when there is more in it."""
-        ...
 
 
 def explore(

@@ -100,7 +100,6 @@ class Reduction(Protocol):
 
     def bind(self, encoding: Encoding) -> Choose:
         """Prepare the choice for one encoding of the net's states."""
-        ...
 
 
 class StubbornSets:

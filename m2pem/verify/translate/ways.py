@@ -37,20 +37,16 @@ class KnownWays(Protocol):
     @property
     def anywhere(self) -> Station:
         """The station of a vehicle of which it is not known where it stands."""
-        ...
 
     def home(self, vehicle: ResourceId) -> Station:
         """Return where a vehicle stands at first."""
-        ...
 
     def inside(self, station: Station, vehicle: ResourceId) -> Mapping[str, bool | None]:
         """Return, by shared space that counts the vehicle, whether it stands in it; None: not
         known."""
-        ...
 
     def moves(self, behavior: Behavior) -> bool:
         """Whether a behavior moves its vehicles."""
-        ...
 
     def way(
         self,
@@ -61,4 +57,3 @@ class KnownWays(Protocol):
     ) -> Way:
         """Return the way of any of some vehicles of one domain, which is one of the members
         `indexes` of the behavior's team (0 leads), or (0,)."""
-        ...

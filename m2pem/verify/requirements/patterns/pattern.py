@@ -45,11 +45,9 @@ class Surroundings(Protocol):
 
     def places_of(self, resource: str, behavior: str) -> Mapping[str, Sequence[str]]:
         """The tasks in which a resource does a behavior, by location."""
-        ...
 
     def store_of(self, task: str) -> str:
         """The name to which a user task's decision is written."""
-        ...
 
 
 class Words(Protocol):
@@ -57,15 +55,12 @@ class Words(Protocol):
 
     def of(self, formula: Formula) -> str:
         """A condition as a clause: "'Drive route' is completed"."""
-        ...
 
     def each(self, formulas: Sequence[Formula], word: str = "and") -> str:
         """Several, one after the other."""
-        ...
 
     def element(self, element: str) -> str:
         """The name of an element."""
-        ...
 
 
 Arguments: TypeAlias = Mapping[str, Any]
