@@ -78,9 +78,7 @@ class AlertConditions:
         lost, low, not_ready = [], [], []
         for resource in self._supervisor.arbiters.resources:
             state = self._bus.latest(resource)
-            if links is not None and links.is_lost(resource):
-                lost.append(resource)
-            elif state is None:
+            if state is None:
                 continue
             elif state.link is LinkState.LOST:
                 lost.append(resource)

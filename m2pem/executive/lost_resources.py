@@ -17,6 +17,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 from m2pem.api.arbiter import Arbiter, BehaviorId, reclaims
+from m2pem.api.bus import FleetBus
 from m2pem.api.clock import Clock
 from m2pem.api.telemetry import LinkState, PayloadState, VehicleState
 from m2pem.engine.state import OutOfReach
@@ -58,9 +59,9 @@ class LostResources:
 
     `epoch_of`: with which epoch the run of a behavior is driven here. `out_of_reach`: what a
     resource does that is being lost, by the runs that are driven here. `why_not_served`: "", or why
-    another executive may command the vehicles by now. `show`: to operators, how a resource is.
-    `returned`: is called when a resource has returned and stopped. `marks`: of what is lost, for
-    the next executive.
+    another executive may command the vehicles by now. `bus`: what faces, operators, metrics and
+    requirements read; it gets a state of all that is lost. `returned`: is called when a resource
+    has returned and stopped. `marks`: of what is lost, for the next executive.
     """
 
     def __init__(
@@ -72,7 +73,7 @@ class LostResources:
         epoch_of: Callable[[BehaviorId], int],
         out_of_reach: Callable[[ResourceId], OutOfReach | None],
         why_not_served: Callable[[], Awaitable[str]],
-        show: Callable[[VehicleState | PayloadState], None],
+        bus: FleetBus,
         returned: Callable[[ResourceId, str], None],
         marks: LostMarks,
     ) -> None:
@@ -83,7 +84,7 @@ class LostResources:
         self._epoch_of = epoch_of
         self._out_of_reach = out_of_reach
         self._why_not_served = why_not_served
-        self._show = show
+        self._bus = bus
         self._returned = returned
         self._marks = marks
         self._held: set[ResourceId] = set()
@@ -100,6 +101,7 @@ class LostResources:
         if stopping is not None:
             stopping.cancel()
         elif self._availability.reason(resource) and not self._availability.is_lent(resource):
+            self._publish_lost(resource)
             return  # an operator has it, or it is manned: what it does is theirs
         commands = self._is_commanded(resource)
         holder = self._availability.holder(resource)
@@ -108,6 +110,7 @@ class LostResources:
             if (was := self._out_of_reach(resource)) is not None:
                 self._mark(resource, was.behavior, was.native_ref)
         self._withdraw(resource, reason)
+        self._publish_lost(resource)
 
     def lost_before(
         self, resource: ResourceId, behavior: BehaviorId, native_ref: str | None
@@ -119,6 +122,7 @@ class LostResources:
         self._lost[resource] = _Lost(behavior, is_earlier=True, native_ref=native_ref)
         self._mark(resource, behavior, native_ref)
         self._withdraw(resource, _why_lost(behavior))
+        self._publish_as_before(resource)
 
     def take_up(self, resources: Iterable[ResourceId]) -> None:
         """Withdraw what the marks say that runs which are over have lost."""
@@ -129,6 +133,7 @@ class LostResources:
                 lost = _Lost(mark.behavior, is_earlier=True, native_ref=mark.native_ref)
                 self._lost[resource] = lost
                 self._withdraw(resource, mark.why)
+                self._publish_as_before(resource)
 
     def epoch_before(self, behavior: BehaviorId) -> int:
         """Return with which epoch the run of a behavior was driven that a lost resource may still
@@ -181,9 +186,7 @@ class LostResources:
         """Return the state as operators see it: not ready, and why, until it is free; then that it
         is held, until it is commanded again."""
         resource = state.resource
-        if resource not in self._why and resource not in self._held:
-            return state
-        why = self.shown(resource)
+        why = self.shown(resource) or ("lost" if state.link is LinkState.LOST else "")
         if resource in self._why:
             self._said[resource] = state
         if not why or not isinstance(state, VehicleState):
@@ -218,7 +221,7 @@ class LostResources:
         self._handover.restore(resource)
         self._returned(resource, f"it has ended {ended}")
         if (said := self._said.pop(resource, None)) is not None:
-            self._show(self.annotated(said))
+            self._bus.publish(self.annotated(said))
         now = self._availability.reason(resource) or "free"
         log.warning(
             "%s: its link is restored, it has ended what it did before, and is %s",
@@ -271,6 +274,23 @@ class LostResources:
             await arbiter.hold(resource)
         return ""
 
+    def _publish_lost(self, resource: ResourceId) -> None:
+        state = self._bus.latest(resource) or _nothing_received(resource, self._clock.now_us())
+        # What it said before the loss may have changed; its time stays that of its position.
+        if isinstance(state, VehicleState):
+            state = replace(state, link=LinkState.LOST, not_ready_reasons=())
+        else:
+            state = replace(state, link=LinkState.LOST, detections=())
+        self._bus.publish(self.annotated(state))
+
+    def _publish_as_before(self, resource: ResourceId) -> None:
+        """Publish what was lost before this executive began, unless it was received since then."""
+        state = self._bus.latest(resource)
+        if state is None:
+            self._publish_lost(resource)
+        else:
+            self._bus.publish(self.annotated(state))
+
     def _explain(self, resource: ResourceId, why: str) -> None:
         self._why[resource] = why
         if resource not in self._handover.taken:
@@ -285,6 +305,10 @@ class LostResources:
 
     def _what(self, resource: ResourceId) -> str:
         return self._lost[resource].behavior or "what it did before"
+
+
+def _nothing_received(resource: ResourceId, now_us: int) -> VehicleState | PayloadState:
+    return (PayloadState if "/" in resource else VehicleState)(resource, now_us)
 
 
 def _why_lost(behavior: BehaviorId) -> str:

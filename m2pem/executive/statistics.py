@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 from m2pem.api.clock import Clock
 from m2pem.api.statistics import ExecutiveStatistics, LinkStatistics
-from m2pem.api.telemetry import LinkState
 from m2pem.engine.state import RunStatus
 from m2pem.executive.control_events import RecordObservers
 from m2pem.executive.supervisor import Supervisor
@@ -66,6 +65,5 @@ class StatisticsReader:
             return LinkStatistics(None)
         received_us = None if monitor is None else monitor.received_us(resource)
         at_us = state.time_us if received_us is None else received_us
-        lost = monitor is not None and monitor.is_lost(resource)
         age_us = max(0, self._clock.now_us() - at_us)
-        return LinkStatistics(LinkState.LOST if lost else state.link, age_us / US_PER_S)
+        return LinkStatistics(state.link, age_us / US_PER_S)

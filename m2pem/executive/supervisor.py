@@ -19,7 +19,7 @@ from m2pem.api.epoch_fence import run_of
 from m2pem.api.people import OperatorsChanged
 from m2pem.api.runs import LEFT_ARMED, Alert, RunId
 from m2pem.api.service import ServiceContext
-from m2pem.api.telemetry import LinkState, TeamState, Telemetry, VehicleState
+from m2pem.api.telemetry import TeamState, Telemetry, VehicleState
 from m2pem.bpmn.one_task import is_one_task
 from m2pem.engine.inputs import GeometrySet, Input, MonitoredRequirement, ResourceFault
 from m2pem.engine.records import (
@@ -61,7 +61,7 @@ from m2pem.executive.handover import Handover
 from m2pem.executive.interrupted_runs import InterruptedRuns
 from m2pem.executive.journal_loss import JournalLossPrompts
 from m2pem.executive.lost_marks import LostMarks
-from m2pem.executive.lost_resources import RETURNED, LostResources
+from m2pem.executive.lost_resources import LostResources
 from m2pem.executive.outages import OUTAGE_S, Outages, StallMonitor
 from m2pem.executive.ownership import Ownership
 from m2pem.executive.presence import Presence
@@ -227,7 +227,7 @@ class Supervisor:
             self.epoch_of,
             self._out_of_reach,
             self._why_not_served,
-            bus.publish,
+            bus,
             self._returns.returned,
             LostMarks(journal.file, journal.identity, self.fleet),
         )
@@ -550,12 +550,8 @@ class Supervisor:
         return known(requirements, self._vehicle_state)
 
     def _vehicle_state(self, resource: str) -> VehicleState | None:
-        """The newest state of a vehicle, as one whose link is lost if it is."""
         state = self._bus.latest(ResourceId(resource))
-        if not isinstance(state, VehicleState):
-            return None
-        lost = self._lost_resources.shown(ResourceId(resource))
-        return replace(state, link=LinkState.LOST) if lost not in ("", RETURNED) else state
+        return state if isinstance(state, VehicleState) else None
 
     def unavailable(self) -> dict[ResourceId, str]:
         """Why missions get some resources not now; also which were lost and are held."""

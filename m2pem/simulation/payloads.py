@@ -97,6 +97,7 @@ class SimPayload:
         self.carrier = carrier_of(connection.resource)
         self.settings = settings
         self.detector = connection.detector or settings.kind == "gpr"
+        self._turns = settings.kind in ("", "ptz")
         self.behavior = ""
         self.doing = ""
         self.held = False
@@ -151,8 +152,8 @@ class SimPayload:
         return PayloadState(
             resource=self.id,
             time_us=now_us,
-            pan_rad=look.pan,
-            tilt_rad=look.tilt,
+            pan_rad=look.pan if self._turns else None,
+            tilt_rad=look.tilt if self._turns else None,
             zoom=look.zoom,
             detections=detections,
             link=LinkState.CONNECTED,

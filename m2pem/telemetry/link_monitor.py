@@ -1,9 +1,9 @@
 """Turns telemetry into faults: the telemetry of a resource stopped, or a battery is low.
 
 `LinkMonitor` decides and knows no clock; `monitor_links` feeds it from the bus. Each fault is
-reported once. Hysteresis: it is reported again only after the resource had recovered, that is,
-after its telemetry arrived again for as long as its bound, or its battery rose above the upper
-level. A payload is monitored by itself: its vehicle's link and battery are not its own.
+reported once: that of a link again when it was received again, as it may be commanded then, and
+that of a battery only after it rose above the upper level (hysteresis). A payload is monitored by
+itself: its vehicle's link and battery are not its own.
 """
 
 import asyncio
@@ -28,19 +28,13 @@ Arbiters publish a state when half of it has passed, with a degraded link."""
 
 @dataclass(slots=True)
 class _Link:
-    """`steady_since_us`: while lost, since when its telemetry has arrived again without a gap."""
-
     bound_us: int
     received_us: int
     never_received: bool = True
     lost: bool = False
-    steady_since_us: int | None = None
 
     def is_silent(self, now_us: int) -> bool:
-        """Whether nothing is received: one that returns counts as lost for a while, and is not."""
-        if self.lost and self.steady_since_us is None:
-            return True
-        return now_us - self.received_us > SILENT_SHARE * self.bound_us
+        return self.lost or now_us - self.received_us > SILENT_SHARE * self.bound_us
 
 
 class LinkMonitor:
@@ -88,12 +82,12 @@ class LinkMonitor:
         faults: list[ResourceFault] = []
         link = self._links.get(state.resource)
         if state.link is LinkState.LOST:
-            if link is not None:
-                link.steady_since_us = None
-                if not link.lost:
-                    faults.append(self._lose(state.resource, link, "its arbiter lost the link"))
+            # Of what was not received since connecting, an executive before may have lost the link:
+            # it has its bound to be received.
+            if link is not None and not (link.lost or link.never_received):
+                faults.append(self._lose(state.resource, link, "its arbiter lost the link"))
         elif link is not None:
-            self._receive(link, now_us)
+            link.received_us, link.never_received, link.lost = now_us, False, False
         if isinstance(state, VehicleState) and state.battery_fraction is not None:
             faults += self._battery(state.resource, state.battery_fraction)
         return faults
@@ -102,11 +96,6 @@ class LinkMonitor:
         """When a state of a resource was last received; None: its link is not watched."""
         link = self._links.get(resource)
         return None if link is None else link.received_us
-
-    def is_lost(self, resource: ResourceId) -> bool:
-        """Whether the link to a resource counts as lost."""
-        link = self._links.get(resource)
-        return link is not None and link.lost
 
     def has_low_battery(self, resource: ResourceId) -> bool:
         """Whether the battery of a resource counts as low."""
@@ -147,21 +136,9 @@ class LinkMonitor:
         self._next_check_us = self._first_due(now_us)
         return faults
 
-    def _receive(self, link: _Link, now_us: int) -> None:
-        gap_us = now_us - link.received_us
-        link.received_us = now_us
-        link.never_received = False
-        if not link.lost:
-            return
-        if link.steady_since_us is None or gap_us > link.bound_us:
-            link.steady_since_us = now_us
-        elif now_us - link.steady_since_us >= link.bound_us:
-            link.lost = False
-
     @staticmethod
     def _lose(resource: ResourceId, link: _Link, reason: str) -> ResourceFault:
         link.lost = True
-        link.steady_since_us = None
         return ResourceFault(resource, "LINK_LOST", reason, reachable=False)
 
     def _battery(self, resource: ResourceId, fraction: float) -> list[ResourceFault]:

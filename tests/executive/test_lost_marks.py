@@ -80,6 +80,8 @@ def test_a_vehicle_lost_by_a_run_that_has_ended_is_held_when_it_returns(play, jo
             world.fake.known["r1.b1"] = BehaviorReport("r1.b1", 2, BehaviorState.RUNNING)
         why = "lost: the link was lost before a restart, when it did r1.b1"
         assert await shown(world) == why
+        state = await anext(world.executive.control.telemetry())
+        assert (state.link, state.ready, state.not_ready_reasons) == (LinkState.LOST, False, (why,))
         assert why in await refused(world)
         assert not world.fake.calls
         says(world)

@@ -1,6 +1,9 @@
 """A lost vehicle whose link is restored stops before it is free."""
 
-from m2pem.api.telemetry import LinkState, VehicleState
+import asyncio
+from collections.abc import AsyncIterator
+
+from m2pem.api.telemetry import LinkState, Telemetry, VehicleState
 from m2pem.mission.catalogue import ResourceId
 from m2pem.testing.fake_arbiter import Call
 
@@ -49,8 +52,9 @@ def test_a_vehicle_that_returns_is_told_to_stop_before_it_is_free(play):
             "its link is restored, and it must first end r1.b1" in latest(world).not_ready_reasons
         )
         world.fake.hangs.clear()
-        await world.fake.until_called("hold", "ugv1", 2)
-        await world.clock.sleep(0.1)
+        while world.fake.count("hold", "ugv1") < 2:
+            says(world)
+            await world.clock.sleep(1)
         assert latest(world).ready is True
         again = await world.executive.control.start(DRIVE)
         await world.fake.until_called("start", f"{again}.b1")
@@ -125,3 +129,52 @@ def test_a_vehicle_that_is_given_back_while_it_is_lost_is_not_free(play):
         return await refusal(world)
 
     assert "ugv1 is unavailable: lost: " in play(story, "ugv1", watch_links=True)
+
+
+def test_a_vehicle_of_which_nothing_comes_is_lost_for_all_who_follow_its_telemetry(play):
+    async def story(world: World):
+        control, seen = world.executive.control, []
+
+        async def follow(states: AsyncIterator[Telemetry]) -> None:
+            async for state in states:
+                seen.append(state)
+
+        following = asyncio.create_task(follow(control.telemetry()))
+        await world.clock.sleep(0.1)
+        says(world)
+        run = await control.start(DRIVE)
+        await world.fake.until_called("start", f"{run}.b1")
+        assert "LINK_LOST" in (await control.wait(run)).detail
+        reasons = ("lost: no telemetry for 3.0 s",)
+        await world.clock.sleep(0.1)
+        said = seen[-1]
+        assert (said.link, said.ready, said.not_ready_reasons) == (LinkState.LOST, False, reasons)
+        assert said.time_us == seen[0].time_us, "the time of its last position"
+        later = control.telemetry()  # of a face that begins now
+        assert await anext(later) == said
+        assert (await control.statistics()).links[UGV1].state is LinkState.LOST
+        world.executive.look()
+        assert "LINK_LOST" in [each.code for each in await control.alerts()]
+        says(world)
+        await world.clock.sleep(0.1)
+        assert (latest(world).link, latest(world).ready) == (LinkState.CONNECTED, True)
+        assert (await control.statistics()).links[UGV1].state is LinkState.CONNECTED
+        await world.clock.sleep(4)  # and is silent again, at once
+        assert latest(world).link is LinkState.LOST
+        assert "lost: " in await refusal(world)
+        following.cancel()
+
+    play(story, "ugv1", watch_links=True)
+
+
+def test_a_vehicle_that_an_operator_has_is_lost_for_all_too(play):
+    async def story(world: World):
+        says(world)
+        await world.executive.control.take("ugv1", by="anna")
+        await world.clock.sleep(4)
+        assert (latest(world).link, latest(world).ready) == (LinkState.LOST, False)
+        says(world, LinkState.LOST)
+        await world.clock.sleep(0.1)
+        assert (latest(world).ready, latest(world).not_ready_reasons) == (False, ("lost",))
+
+    play(story, "ugv1", watch_links=True)

@@ -37,7 +37,8 @@ class WatchControl(Protocol):
         """Yield the prompts that are open, and then all events from this call on."""
 
     def telemetry(self, size: int = 100) -> AsyncIterator[Telemetry]:
-        """Telemetry from now on; the oldest waiting is dropped when a reader is slow."""
+        """Telemetry from now on, and first the states of what is lost, as the executive holds it.
+        The oldest waiting is dropped when a reader is slow."""
 
     async def records(
         self, run: RunId, after_seq: int = 0, limit: int = 1000

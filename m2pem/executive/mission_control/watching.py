@@ -5,7 +5,7 @@ from collections.abc import AsyncIterator, Sequence
 
 from m2pem.api.mission_control.watching import ControlEvent
 from m2pem.api.runs import OpenPrompt, RunId, RunSummary, StampedRecord, stamped_records
-from m2pem.api.telemetry import Telemetry
+from m2pem.api.telemetry import LinkState, Telemetry
 from m2pem.engine.state import RunStatus as EngineStatus
 from m2pem.errors import OperatorError
 from m2pem.executive.mission_control.parts import ControlParts
@@ -28,7 +28,12 @@ class WatchOperations(ControlParts):
         return subscription
 
     def telemetry(self, size: int = 100) -> AsyncIterator[Telemetry]:
-        return self._bus.subscribe(size)
+        states = self._bus.subscribe(size)
+        for resource in self._supervisor.arbiters.resources:
+            state = self._bus.latest(resource)
+            if state is not None and state.link is LinkState.LOST:
+                states.put(state)
+        return states
 
     async def records(
         self, run: RunId, after_seq: int = 0, limit: int = 1000

@@ -262,7 +262,7 @@ class Display(App[None], Listener, inherit_bindings=False):
             self._tree.update(mission_tree(view, self.logs[view.run].done, now, time_s, width))
         self._show_vehicles(now)
         if self.map_pane.display:
-            self.map_pane.draw(self._vehicles.silent(now))
+            self.map_pane.draw(self._vehicles.silent())
         self.prompt_pane.show(self.follower.prompts, self._label, self.run_shown, self._time_left)
         self._ring()
         self._notice.show()

@@ -20,9 +20,6 @@ from m2pem_plugin_terminal.formatting import shortened
 if TYPE_CHECKING:
     from m2pem.fleet.fleet import Fleet
 
-SILENT_AFTER_S = 3.0
-"""Default of `lost_after`, in seconds."""
-
 GREY = "#5f6771"
 DETAIL = "#9aa4af"
 LINKS = {
@@ -42,6 +39,8 @@ ASIDE_DEG, ZOOMED = 0.5, 1.05
 
 @dataclass(slots=True)
 class _Latest:
+    """`at`: when something was last received, which a lost resource does not send."""
+
     state: VehicleState | PayloadState
     at: float
 
@@ -69,15 +68,20 @@ class Vehicles:
         if isinstance(state, TeamState):
             self._marching.update({each.resource: (each, now) for each in state.members})
             return
+        if (
+            state.link is LinkState.LOST
+            and (before := self._latest.get(state.resource)) is not None
+        ):
+            now = before.at
         self._latest[state.resource] = _Latest(state, now)
 
-    def silent(self, now: float) -> set[str]:
-        """Return the vehicles that have sent nothing for their `lost_after`."""
+    def silent(self) -> set[str]:
+        """Return the vehicles whose links are lost."""
         return {
             vehicle.id
             for vehicle in self._fleet.vehicles.values()
             if (latest := self._latest.get(vehicle.id)) is not None
-            and (self._ended or now - latest.at > (vehicle.lost_after_s or SILENT_AFTER_S))
+            and (self._ended or latest.state.link is LinkState.LOST)
         }
 
     def table(
@@ -90,18 +94,17 @@ class Vehicles:
         """
         lines: list[Text] = []
         for vehicle in self._fleet.vehicles.values():
-            silent_s = vehicle.lost_after_s or SILENT_AFTER_S
             latest = self._latest.get(vehicle.id)
             holders = _taken((vehicle.id, *vehicle.payloads), taken, width)
             if latest is None or not isinstance(latest.state, VehicleState):
                 lines += [Text(f"○ {_name(vehicle.id)} no telemetry yet", GREY), *holders]
                 continue
-            age_s = now - latest.at
             payloads = [self._latest[p].state for p in vehicle.payloads if p in self._latest]
             if self._ended:
                 lines += _not_seen(latest.state, "○", "not watched now")
-            elif age_s > silent_s or latest.state.link is LinkState.LOST:
-                lines += _not_seen(latest.state, "✗", f"silent for {int(age_s * self._speed)} s")
+            elif latest.state.link is LinkState.LOST:
+                silent_s = int((now - latest.at) * self._speed)
+                lines += _not_seen(latest.state, "✗", f"silent for {silent_s} s")
             else:
                 lines += _vehicle(latest.state, payloads, width, named)
                 lines += self._place(vehicle.id, now)

@@ -1,5 +1,7 @@
 """What the other keys do, and what the screen shows of missions."""
 
+from dataclasses import replace
+
 import pytest
 from m2pem_plugin_terminal.mission_pane import mission_tree
 from m2pem_plugin_terminal.vehicles_pane import Vehicles
@@ -148,6 +150,7 @@ async def test_a_vehicle_that_falls_silent_is_greyed(world: World) -> None:
         world.fake.say(scout(0.75))
         await terminal.until_shown("● scout")
         world.hand.now_s += 4
+        world.fake.say(replace(scout(0.75), link=LinkState.LOST))
         await terminal.until_shown("✗ scout     silent for 4 s", "last at 38.10750")
         world.fake.say(scout(0.70))
         await terminal.until_shown("● scout      70%")
@@ -156,6 +159,7 @@ async def test_a_vehicle_that_falls_silent_is_greyed(world: World) -> None:
 def test_silence_counts_by_the_clock_of_the_executive(world: World) -> None:
     vehicles = Vehicles(world.control.fleet(), speed=10)
     vehicles.update(scout(0.75), now=1.0)
+    vehicles.update(replace(scout(0.75), link=LinkState.LOST), now=4.0)
     assert "silent for 40 s" in vehicles.table(5.0, 40, str, {}).plain
 
 

@@ -195,7 +195,7 @@ class Requests:
             return  # it is an answer itself
         now_s = self._streams.now_s()
         for vehicle in vehicles:
-            if vehicle.state is None or not vehicle.present(now_s) or not station.may_send(now_s):
+            if vehicle.state is None or not vehicle.present or not station.may_send(now_s):
                 continue
             own_ns = vehicle.state.time_us * 1000 + round((now_s - vehicle.received_s) * 1e9)
             changed = source.as_target if is_ping else {"tc1": own_ns}

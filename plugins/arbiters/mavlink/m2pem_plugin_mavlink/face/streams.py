@@ -135,7 +135,7 @@ class Streams:
             stations = [station]
         if not interval_s:
             return
-        if vehicle.present(now_s) and stations:
+        if vehicle.present and stations:
             for message, source in messages_of(vehicle, id_):
                 for each in stations:
                     each.send(message, source)

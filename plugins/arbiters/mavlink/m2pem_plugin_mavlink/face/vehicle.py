@@ -23,8 +23,6 @@ CAMERA = 100
 MOST_CAMERAS = 6
 AIRBORNE_M = 1.0
 NO_ADDRESS = Address(0, 0)
-SILENT_AFTER_S = 5.0
-"""Without telemetry for so long, a vehicle is not shown as present."""
 
 
 @dataclass(slots=True)
@@ -86,14 +84,11 @@ class ShownVehicle:
         height_m = self.state.altitude_above_home_m if self.state is not None else None
         return self.domain == "air" and height_m is not None and height_m > AIRBORNE_M
 
-    def present(self, now_s: float) -> bool:
-        """Return whether its telemetry arrives: as of a vehicle of its own, silence means that its
-        link is lost."""
-        return (
-            self.state is not None
-            and self.state.link is not LinkState.LOST
-            and now_s - self.received_s <= SILENT_AFTER_S
-        )
+    @property
+    def present(self) -> bool:
+        """Whether its link is not lost: of one that is, nothing is sent, as it would send nothing
+        itself."""
+        return self.state is not None and self.state.link is not LinkState.LOST
 
     def update(self, state: VehicleState, now_s: float) -> None:
         """New telemetry."""
