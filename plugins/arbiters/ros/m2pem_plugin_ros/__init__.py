@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from m2pem_plugin_ros.installation import require_interfaces as require_interfaces
     from m2pem_plugin_ros.interfaces import messages as messages
     from m2pem_plugin_ros.interfaces import set_stamp as set_stamp
+    from m2pem_plugin_ros.interfaces.data_values import check_float as check_float
     from m2pem_plugin_ros.interfaces.data_values import decode_data as decode_data
     from m2pem_plugin_ros.interfaces.data_values import mission_of as mission_of
     from m2pem_plugin_ros.interfaces.texts import asker as asker
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
     from m2pem_plugin_ros.onboard.target_bus import TargetBus as TargetBus
     from m2pem_plugin_ros.runtime import RosRuntime as RosRuntime
     from m2pem_plugin_ros.runtime import qos as qos
+    from m2pem_plugin_ros.sensors.health import OWN_STATUS as OWN_STATUS
     from m2pem_plugin_ros.settings import read_payloads as read_payloads
     from m2pem_plugin_ros.settings import read_settings as read_settings
 

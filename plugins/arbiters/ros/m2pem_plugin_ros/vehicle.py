@@ -124,6 +124,7 @@ class Vehicle:
         self._resolved = asyncio.Event()
         self._last_contact_us = setup.context.clock.now_us()
         self._contacts = 0
+        self._fixes = 0
         self._reported: tuple[object, ...] = ()
         self._work = LatestTask()
         connection, settings, context = setup.connection, setup.settings, setup.context
@@ -421,6 +422,7 @@ class Vehicle:
         `may_lose`: all messages until now were processed, so that silence means a lost link.
         """
         now_us = self._context.clock.now_us()
+        self._note_fix()
         silent_s = (now_us - self._last_contact_us) / 1e6
         bound_s = self._limits.lost_after_s
         is_silent = silent_s >= bound_s
@@ -456,6 +458,15 @@ class Vehicle:
         return replace(state, ready=False, not_ready_reasons=tuple(reasons))
 
     # --- inside ---------------------------------------------------------------------------------
+
+    def _note_fix(self) -> None:
+        """Before odometry has come, a satellite fix shows that a vehicle without a node of m2pem is
+        there, too."""
+        where, changes = self._sensors.localization, self._sensors.changes
+        if self.settings.driver is not DriverName.NODE and changes != self._fixes:
+            self._fixes = changes
+            if where.pose is None and where.position is not None:
+                self.alive()
 
     def _missing(self, request: BehaviorRequest) -> str:
         """Return what of the vehicle is not discovered yet, and needed; "" if nothing is."""

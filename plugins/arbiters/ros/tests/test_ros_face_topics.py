@@ -229,7 +229,7 @@ async def test_diagnostics_say_link_readiness_with_reasons_and_mode(ros_domain: 
     )
 
     def status(message: Any) -> Any:
-        return next((each for each in message.status if each.name == "/face: ugv1"), None)
+        return next((each for each in message.status if each.name == "m2pem: /face: ugv1"), None)
 
     async with faced(ros_domain) as world:
         array = await hears(

@@ -4,12 +4,11 @@ import asyncio
 import logging
 import math
 import time
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from m2pem_plugin_ros import RosRuntime, messages, one_line
+from m2pem_plugin_ros import OWN_STATUS, RosRuntime, messages, one_line
 
 from m2pem.api import (
     Fleet,
@@ -24,10 +23,8 @@ from m2pem.api import (
 )
 from m2pem.errors import M2pemError
 from m2pem_plugin_mocu.services import Services
+from m2pem_plugin_mocu.settings import DEFAULT_NAMESPACE
 from m2pem_plugin_mocu.topics import Topics
-
-SILENT_AFTER_S = 5.0
-"""For a vehicle of a fleet that does not say `lost_after`."""
 
 LOW_BATTERY = 0.2
 LATE_S = 1.0
@@ -63,16 +60,16 @@ class Health:
 
 
 class Vehicles:
-    """The latest state of each vehicle and payload, and when it was received."""
+    """The latest state of each vehicle and payload. `site`: see `site_of`."""
 
-    def __init__(self, fleet: Fleet, now_s: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, fleet: Fleet, site: str = "") -> None:
         self._fleet = fleet
-        self._now_s = now_s
-        self._last: dict[ResourceId, tuple[VehicleState | PayloadState, float]] = {}
+        self.site = site
+        self._last: dict[ResourceId, VehicleState | PayloadState] = {}
 
     def receive(self, state: VehicleState | PayloadState) -> None:
         """Keep a state."""
-        self._last[state.resource] = (state, self._now_s())
+        self._last[state.resource] = state
 
     def statuses(self) -> list[Any]:
         """One for each vehicle, and for each payload that has sent a state."""
@@ -80,11 +77,11 @@ class Vehicles:
         return [self._status(resource) for resource in [*self._fleet.vehicles, *mounted]]
 
     def _status(self, resource: ResourceId) -> Any:
-        name = f"m2pem: link {resource}"
+        hardware = f"{self.site}{resource}"
+        name = f"link {hardware}"
         if resource not in self._last:
-            return _status(name, resource, DiagnosticStatus.STALE, "nothing heard yet", {})
-        state, received_s = self._last[resource]
-        silent_s = self._now_s() - received_s
+            return _status(name, hardware, DiagnosticStatus.STALE, "nothing received yet", {})
+        state = self._last[resource]
         values = {"link": state.link.value, "behavior": state.behavior}
         problems: list[str] = []
         if isinstance(state, VehicleState):
@@ -97,13 +94,13 @@ class Vehicles:
             level, problems = DiagnosticStatus.WARN, ["link degraded", *problems]
         if state.link is LinkState.LOST:
             level, problems = DiagnosticStatus.ERROR, ["link lost", *problems]
-        elif silent_s > self._silent_after_s(resource):
-            level, problems = DiagnosticStatus.STALE, [f"silent for {silent_s:.0f} s", *problems]
-        return _status(name, resource, level, "; ".join(problems) or "heard", values)
+        return _status(name, hardware, level, "; ".join(problems) or "received", values)
 
-    def _silent_after_s(self, resource: ResourceId) -> float:
-        vehicle = self._fleet.vehicles[ResourceId(resource.partition("/")[0])]
-        return vehicle.lost_after_s or SILENT_AFTER_S
+
+def site_of(namespace: str) -> str:
+    """Return what tells names in /diagnostics from those of an executive in another namespace:
+    "team_a/m2pem/", or "" in the default one."""
+    return "" if namespace == DEFAULT_NAMESPACE else f"{namespace.strip('/')}/"
 
 
 def _of_vehicle(state: VehicleState) -> dict[str, str]:
@@ -134,7 +131,7 @@ def _problems(state: VehicleState) -> list[str]:
     return problems
 
 
-def _executive(health: Health) -> Any:
+def _executive(health: Health, site: str) -> Any:
     level, problems = DiagnosticStatus.OK, list[str]()
     if health.late_s > LATE_S or health.left_out:
         level = DiagnosticStatus.WARN
@@ -155,29 +152,30 @@ def _executive(health: Health) -> Any:
         "events left out": health.left_out,
         "late_s": f"{health.late_s:.3f}",
     }
-    return _status("m2pem: executive", health.name, level, "; ".join(problems) or "serves", values)
+    return _status(f"{site}executive", health.name, level, "; ".join(problems) or "serves", values)
 
 
-def _journal(health: Health) -> Any:
+def _journal(health: Health, site: str) -> Any:
     if health.journal_error:
         level, text = DiagnosticStatus.ERROR, health.journal_error
     else:
         level, text = DiagnosticStatus.OK, "readable"
     values = {"read_s": f"{health.journal_s:.3f}"}
-    return _status("m2pem: journal", health.name, level, text, values)
+    return _status(f"{site}journal", health.name, level, text, values)
 
 
 def diagnostics(health: Health, vehicles: Vehicles, now_us: int) -> Any:
     """All of it, as one message."""
-    statuses: Sequence[Any] = [_executive(health), _journal(health), *vehicles.statuses()]
-    message = DiagnosticArray(status=list(statuses))
+    site = vehicles.site
+    statuses = [_executive(health, site), _journal(health, site), *vehicles.statuses()]
+    message = DiagnosticArray(status=statuses)
     message.header.stamp = messages.time_of(now_us)
     return message
 
 
 def _status(name: str, hardware: str, level: bytes, text: str, values: dict[str, Any]) -> Any:
     return DiagnosticStatus(
-        name=name,
+        name=f"{OWN_STATUS}{name}",
         hardware_id=one_line(hardware),
         level=level,
         message=one_line(text),
@@ -202,7 +200,7 @@ class DiagnosticsPublisher:
         self._latest_run: RunId | None = None
         self._topics = topics
         self._services = services
-        self._vehicles = Vehicles(control.fleet())
+        self._vehicles = Vehicles(control.fleet(), site_of(ros.node.get_namespace()))
         self._publisher = ros.node.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self._warned = False
 

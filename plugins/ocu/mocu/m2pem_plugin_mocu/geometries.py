@@ -4,6 +4,8 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from m2pem_plugin_ros import check_float
+
 from m2pem.api import Value
 from m2pem.errors import OperatorError
 
@@ -90,6 +92,7 @@ def _position(point: Any, where: str) -> Position:
 
 
 def _within(number: float, limit: float, where: str) -> float:
+    check_float(where, number)
     if not abs(number) <= limit:
         raise OperatorError(f"{where} is {number:g}, which is not within -{limit:g} to {limit:g}")
     return number

@@ -5,7 +5,7 @@ from collections.abc import Awaitable, Callable
 from typing import Any
 
 import pytest
-from m2pem_plugin_mocu.diagnostics import SILENT_AFTER_S, Health, Vehicles, diagnostics
+from m2pem_plugin_mocu.diagnostics import Health, Vehicles, diagnostics, site_of
 from m2pem_plugin_mocu.publish_throttle import MAX_PERIOD_S, MIN_PERIOD_S, PublishThrottle
 from m2pem_plugin_mocu.settings import SettingError, namespace
 from m2pem_plugin_ros import one_line, sendable, stays_on_loopback
@@ -99,42 +99,35 @@ def test_texts_are_made_fit_for_messages() -> None:
 # --- diagnostics ----------------------------------------------------------------------------------
 
 
-class Watch:
-    """A clock that the test turns."""
-
-    def __init__(self) -> None:
-        self.now_s = 100.0
-
-    def __call__(self) -> float:
-        return self.now_s
+@pytest.mark.parametrize(
+    ("state", "level", "says"),
+    [
+        (VehicleState(UGV1, 0, battery_fraction=0.9), OK, "received"),
+        (VehicleState(UGV1, 0, battery_fraction=0.1), WARN, "battery at 10%"),
+        (VehicleState(UGV1, 0, ready=False, not_ready_reasons=("no GPS",)), WARN,
+         "not ready: no GPS"),
+        (VehicleState(UGV1, 0, link=LinkState.DEGRADED), WARN, "link degraded"),
+        (VehicleState(UGV1, 0, link=LinkState.LOST), ERROR, "link lost"),
+    ],
+)  # fmt: skip
+def test_a_vehicle_is_told_as_it_is(state: VehicleState, level: bytes, says: str) -> None:
+    vehicles = Vehicles(fleet())
+    vehicles.receive(state)
+    first, second = vehicles.statuses()
+    assert (first.level, first.message) == (level, says)
+    assert (second.level, second.message) == (STALE, "nothing received yet")
 
 
 @pytest.mark.parametrize(
-    ("state", "silent_s", "level", "says"),
-    [
-        (VehicleState(UGV1, 0, battery_fraction=0.9), 0.0, OK, "heard"),
-        (VehicleState(UGV1, 0, battery_fraction=0.1), 0.0, WARN, "battery at 10%"),
-        (
-            VehicleState(UGV1, 0, ready=False, not_ready_reasons=("no GPS",)),
-            0.0,
-            WARN,
-            "not ready: no GPS",
-        ),
-        (VehicleState(UGV1, 0, link=LinkState.DEGRADED), 0.0, WARN, "link degraded"),
-        (VehicleState(UGV1, 0, link=LinkState.LOST), 60.0, ERROR, "link lost"),
-        (VehicleState(UGV1, 0), SILENT_AFTER_S + 1, STALE, "silent for 6 s"),
-    ],
+    ("namespace", "site"), [("/m2pem", ""), ("/team_a/m2pem", "team_a/m2pem/"), ("/b", "b/")]
 )
-def test_a_vehicle_is_told_as_it_is(
-    state: VehicleState, silent_s: float, level: bytes, says: str
-) -> None:
-    now_s = Watch()
-    vehicles = Vehicles(fleet(), now_s)
-    vehicles.receive(state)
-    now_s.now_s += silent_s
-    first, second = vehicles.statuses()
-    assert (first.level, first.message) == (level, says)
-    assert (second.level, second.message) == (STALE, "nothing heard yet")
+def test_names_of_two_namespaces_differ(namespace: str, site: str) -> None:
+    health = Health("fleet", 0.0, 1, 0, 0, 0, 0, 0, 0.0)
+    statuses = diagnostics(health, Vehicles(fleet(), site_of(namespace)), 0).status
+    assert [each.name for each in statuses[:3]] == [
+        f"m2pem: {site}executive", f"m2pem: {site}journal", f"m2pem: link {site}ugv1"
+    ]  # fmt: skip
+    assert statuses[2].hardware_id == f"{site}ugv1"
 
 
 def test_two_executives_in_one_namespace_are_an_error() -> None:

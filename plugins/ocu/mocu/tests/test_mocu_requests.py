@@ -230,6 +230,9 @@ async def test_geometries_that_are_nowhere_are_refused(world: World, client: Cli
         ({**HERE, "latitude_deg": nan}, "waypoints[1].latitude_deg is nan"),
         ({**HERE, "longitude_deg": inf}, "waypoints[1].longitude_deg is inf"),
         ({**HERE, "altitude_m": -inf}, "waypoints[1].altitude_m is -inf"),
+        # rclpy 7.1.6 (Jazzy) reads the memory of an int as that of a float, without an error.
+        ({**HERE, "altitude_m": 20}, "waypoints[1].altitude_m is 4.94066e-324, as rclpy sends an"),
+        ({**HERE, "latitude_deg": 38}, "waypoints[1].latitude_deg is 4.94066e-324, as rclpy sends"),
     ):
         assert says in await refused(client, "set_route", waypoints=[HERE, point], **route)
     many = [HERE] * 10_001

@@ -213,13 +213,13 @@ def _last_status(
     """Return how a behavior ended, which `writes` data of these names. As ExecuteBehavior.action
     says, CANCELLED is only what its client has cancelled."""
     code = reason = ""
-    number, outputs = 1, dict[str, Value]()
+    number, outputs, rejected = 1, dict[str, Value](), False
     for record in records:
         match record:
             case r.BehaviorProgressed():
                 number += 1
-            case r.BehaviorEnded(code=failed, reason=why) if failed:
-                code, reason = failed, why
+            case r.BehaviorEnded(state=last, code=failed, reason=why) if failed:
+                code, reason, rejected = failed, why, last is BehaviorState.REJECTED
             case r.ErrorThrown(code=thrown, reason=why):
                 code, reason = thrown, why
             case r.DataWritten(key=key, value=value) if key in writes:
@@ -229,8 +229,9 @@ def _last_status(
     elif cancelled:
         state, code = BehaviorState.CANCELLED, ""
     else:
-        state = BehaviorState.FAILED
-        code = STOPPED if run.status is RunStatus.STOPPED else code
+        stopped = run.status is RunStatus.STOPPED
+        state = BehaviorState.REJECTED if rejected and not stopped else BehaviorState.FAILED
+        code = STOPPED if stopped else code
     text = sendable(reason or run.detail)[:LONGEST_REASON]
     return Status(id_, number, state, sendable(code), text, outputs=_sendable(outputs))
 

@@ -9,6 +9,7 @@ from rclpy.node import Node
 from m2pem.api import LinkState, PayloadState, ResourceId, VehicleState
 from m2pem_plugin_ros.interfaces.messages import time_of
 from m2pem_plugin_ros.interfaces.texts import one_line
+from m2pem_plugin_ros.sensors.health import OWN_STATUS
 
 QUEUE = 10
 
@@ -16,9 +17,10 @@ QUEUE = 10
 class DiagnosticsPublisher:
     """`publish` is called about once a second, as a diagnostic aggregator expects."""
 
-    def __init__(self, node: Node, resources: list[ResourceId]) -> None:
+    def __init__(self, node: Node, resources: list[ResourceId], namespace: str) -> None:
         self._resources = resources
-        self._prefix = node.get_fully_qualified_name()
+        self._prefix = f"{OWN_STATUS}{node.get_fully_qualified_name()}"
+        self._hardware = f"{namespace}/".lstrip("/")
         self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", QUEUE)
 
     def publish(
@@ -29,7 +31,7 @@ class DiagnosticsPublisher:
             return
         message = DiagnosticArray(
             status=[
-                _status(f"{self._prefix}: {each}", each, states.get(each))
+                _status(f"{self._prefix}: {each}", self._hardware + each, states.get(each))
                 for each in self._resources
                 if each in states or "/" not in each
             ]
@@ -38,8 +40,8 @@ class DiagnosticsPublisher:
         self._publisher.publish(message)
 
 
-def _status(name: str, resource: ResourceId, state: VehicleState | PayloadState | None) -> Any:
-    message = DiagnosticStatus(name=name, hardware_id=resource)
+def _status(name: str, hardware: str, state: VehicleState | PayloadState | None) -> Any:
+    message = DiagnosticStatus(name=name, hardware_id=hardware)
     if state is None:
         message.level, message.message = DiagnosticStatus.STALE, "no telemetry yet"
         return message

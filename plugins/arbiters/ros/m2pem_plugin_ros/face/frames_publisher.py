@@ -3,11 +3,14 @@
 The local frame of the fleet is `map`. m2pem knows one position of a vehicle, so that its `odom` is
 the same as `map`. Where `odom` of a ROS vehicle is, is left to the vehicle, whose odometry m2pem
 reads by tf: only map -> VEHICLE/base_link is published for it, and with `odom_frame: tf` nothing.
-Frames that another node publishes are left to it.
+Frames that another node publishes are left to it until it is gone.
 """
 
+import asyncio
 import logging
+import math
 from collections import deque
+from dataclasses import dataclass
 from typing import Any
 
 from rclpy.node import Node
@@ -33,10 +36,27 @@ LISTENED = 2
 """Calls of `watch` before frames are published where others publish some, too: a robot must not see
 its own frames twice."""
 
+GONE_AFTER_S = 5.0
+"""A transform on /tf that was not received from others for so long is left to them no more. What
+they publish on /tf_static stays, until no other node publishes there."""
+
+TOGETHER_S = 0.01
+"""Transforms of several vehicles that come within so short a time are one message."""
+
 NO_ROTATION = Quaternion(0.0, 0.0, 0.0, 1.0)
 NO_WAY = (0.0, 0.0, 0.0)
 
 log = logging.getLogger("m2pem.face.ros")
+
+
+@dataclass(slots=True)
+class _Left:
+    """A frame that is left to other nodes. `heard_s`: when they published it last, by the clock of
+    the event loop. `own`: the static transform that the face has for it."""
+
+    topic: str
+    heard_s: float
+    own: Any = None
 
 
 class FramesPublisher:
@@ -54,12 +74,14 @@ class FramesPublisher:
         self._topics: dict[ResourceId, VehicleTopics] = {}
         self._children: set[str] = set()
         """The frames `base_link` of the vehicles."""
-        self._left: set[str] = set()
-        """Frames that are left to other nodes."""
+        self._left: dict[str, _Left] = {}
         self._latest: dict[ResourceId, VehicleState] = {}
         self._failed: set[ResourceId] = set()
         self._sent: dict[str, deque[tuple[int, int]]] = {}
-        self._limiter: RateLimiter[None] = RateLimiter(rate_hz, self._publish)
+        self._loop = asyncio.get_running_loop()
+        self._rate_hz = rate_hz
+        self._limiters: dict[ResourceId, RateLimiter[VehicleState]] = {}
+        self._publishing: asyncio.TimerHandle | None = None
         self._is_wanted = self._namesake_said = False
         self._listened = 0
         self._subscriptions: dict[str, Any] = {}
@@ -72,6 +94,7 @@ class FramesPublisher:
     def add(self, vehicle: ResourceId, topics: VehicleTopics) -> None:
         """Publish the frames of a vehicle from now on; `publish_static` when all are added."""
         self._topics[vehicle] = topics
+        self._limiters[vehicle] = RateLimiter(self._rate_hz, self._collect)
         base = self._names.frame(vehicle, BASE)
         self._children.add(base)
         self._sent[base] = deque(maxlen=SENT)
@@ -79,7 +102,7 @@ class FramesPublisher:
         if odom_frame != map_frame:
             self._add_static(map_frame, odom_frame, NO_WAY, NO_ROTATION)
         if self._names.tells_frames(vehicle):
-            self._left.add(base)
+            self._left[base] = _Left("/tf", math.inf)
 
     def publish_static(self) -> None:
         """Publish the transforms that stay, latched."""
@@ -88,11 +111,12 @@ class FramesPublisher:
     def put(self, state: VehicleState) -> None:
         """Publish where a vehicle is, soon and with others."""
         if self._is_wanted and state.position is not None:
-            self._latest[state.resource] = state
-            self._limiter.put(None)
+            self._limiters[state.resource].put(state)
 
     def watch(self) -> None:
-        """Look who subscribes, and listen to other publishers if there are any."""
+        """Look who subscribes, listen to other publishers if there are any, and take back what they
+        publish no more."""
+        self._take_back()
         own = "/tf" in self._subscriptions
         self._listened += own
         is_alone = self._node.count_publishers(self._publisher.topic_name) <= 1
@@ -108,11 +132,20 @@ class FramesPublisher:
     def close(self) -> None:
         """Publish nothing more."""
         self._is_wanted = False
-        self._limiter.close()
+        for limiter in self._limiters.values():
+            limiter.clear()
+        if self._publishing is not None:
+            self._publishing.cancel()
 
     # --- inside ---------------------------------------------------------------------------------
 
-    def _publish(self, _: None) -> None:
+    def _collect(self, state: VehicleState) -> None:
+        self._latest[state.resource] = state
+        if self._publishing is None:
+            self._publishing = self._loop.call_later(TOGETHER_S, self._publish)
+
+    def _publish(self) -> None:
+        self._publishing = None
         transforms = []
         for vehicle, state in self._latest.items():
             try:
@@ -137,11 +170,12 @@ class FramesPublisher:
         """Messages of our own come, too: they have stamps that were sent."""
         for transform in message.transforms:
             child = transform.child_frame_id.removeprefix("/")
-            if child in self._left:
+            if (left := self._left.get(child)) is not None:
+                left.heard_s = max(left.heard_s, self._loop.time())
                 continue
             sent = self._sent.get(child)
             if child in self._statics or (sent is not None and _stamp(transform) not in sent):
-                self._leave(child, transform.header.frame_id)
+                self._leave(child, transform.header.frame_id, "/tf")
 
     def _hear_static(self, message: Any) -> None:
         for transform in message.transforms:
@@ -154,17 +188,31 @@ class FramesPublisher:
                 or transform.header.frame_id != own.header.frame_id
             )
             if differs or child in self._children:
-                self._leave(child, transform.header.frame_id)
+                self._leave(child, transform.header.frame_id, "/tf_static")
 
-    def _leave(self, child: str, parent: str) -> None:
+    def _leave(self, child: str, parent: str, topic: str) -> None:
         if self._may_be_namesake():
             return
-        self._left.add(child)
+        self._left[child] = _Left(topic, self._loop.time(), self._statics.pop(child, None))
         log.warning(
             "another node publishes the transform %r -> %r: it is left to that node", parent, child
         )
-        if self._statics.pop(child, None) is not None:
+        if self._left[child].own is not None:
             self.publish_static()
+
+    def _take_back(self) -> None:
+        for child, left in list(self._left.items()):
+            is_silent = left.topic == "/tf" and self._loop.time() - left.heard_s > GONE_AFTER_S
+            is_alone = left.heard_s < math.inf and self._node.count_publishers(left.topic) <= 1
+            if not (is_silent or is_alone):
+                continue
+            del self._left[child]
+            log.warning(
+                "the transform to %r is published by the face again: no other node does", child
+            )
+            if left.own is not None:
+                self._statics[child] = left.own
+                self.publish_static()
 
     def _may_be_namesake(self) -> bool:
         """Whether the face of another executive, which this one replaces, may have published it."""

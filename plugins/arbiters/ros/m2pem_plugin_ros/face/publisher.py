@@ -3,6 +3,7 @@ subscribes."""
 
 import logging
 from collections.abc import Callable
+from functools import partial
 from typing import Any, Generic, TypeVar
 
 from rclpy.node import Node
@@ -47,9 +48,14 @@ class TelemetryPublisher(Generic[T]):
     ) -> None:
         self._node = node
         self._make = make
-        self._publisher: Any = node.create_publisher(
-            message_type, topic, TELEMETRY, event_callbacks=NO_PUBLISHER_EVENTS
+        self._create = partial(
+            node.create_publisher,
+            message_type,
+            topic,
+            TELEMETRY,
+            event_callbacks=NO_PUBLISHER_EVENTS,
         )
+        self._publisher: Any = self._create()
         self.topic: str = self._publisher.topic_name
         """Its name after remapping."""
         self._limiter = RateLimiter(rate_hz, self._publish)
@@ -62,25 +68,29 @@ class TelemetryPublisher(Generic[T]):
             self._limiter.put(item)
 
     def watch(self) -> None:
-        """Look who subscribes, and who else publishes; to another publisher the topic is left."""
-        other = self._other()
-        if self._publisher is not None and other:
-            log.info("%s is left to the node %s, which publishes it", self.topic, other)
+        """Look who subscribes, and who else publishes: to another publisher the topic is left until
+        that is gone."""
+        if self._publisher is None:
+            if not self._node.count_publishers(self.topic):
+                self._publisher = self._create()
+                log.warning("%s is published by the face again: no other node does", self.topic)
+        elif other := self._other():
+            log.warning("%s is left to the node %s, which publishes it", self.topic, other)
             self.close()
             self._node.destroy_publisher(self._publisher)
             self._publisher = None
-        elif self._publisher is not None:
+        else:
             self._is_wanted = self._publisher.get_subscription_count() > 0
 
     def close(self) -> None:
-        """Publish nothing more."""
+        """Publish nothing until `watch` is called again."""
         self._is_wanted = False
-        self._limiter.close()
+        self._limiter.clear()
 
     def _other(self) -> str:
         """Return another node that publishes the topic; "" if there is none, or it has our name, as
         the face of an executive has that is replaced by this one."""
-        if self._node.count_publishers(self.topic) <= (self._publisher is not None):
+        if self._node.count_publishers(self.topic) <= 1:
             return ""
         own = self._node.get_fully_qualified_name()
         return next((name for name in publishers_of(self._node, self.topic) if name != own), "")

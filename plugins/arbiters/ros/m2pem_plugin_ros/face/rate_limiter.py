@@ -6,14 +6,14 @@ from typing import Generic, TypeVar
 
 T = TypeVar("T")
 
-
-def _drop(_: object) -> None:
-    return
+EARLY = 0.25
+"""Part of a period. What comes at most so much before its time is published when it comes: kept
+until then, it would be late, as what comes at the rate or faster comes a little before or after."""
 
 
 class RateLimiter(Generic[T]):
-    """Hands each item to `publish` at once, or, if the last one was less than a period ago, the
-    latest item when the period is over.
+    """Hands items to `publish` when they come, at most one in a period. The last one that came too
+    early for that is published a period after its time, if no other has come until then.
 
     It belongs to the running event loop.
     """
@@ -28,27 +28,26 @@ class RateLimiter(Generic[T]):
 
     def put(self, item: T) -> None:
         """Publish an item now, or later unless a newer one comes."""
-        if self._timer is not None:
-            self._waiting = item
-        elif (now_s := self._loop.time()) >= self._due_s:
-            self._send(item, now_s)
-        else:
-            self._waiting = item
-            self._timer = self._loop.call_at(self._due_s, self._send_waiting)
+        if self._loop.time() >= self._due_s - EARLY * self._period_s:
+            self._send(item)
+            return
+        self._waiting = item
+        if self._timer is None:
+            self._timer = self._loop.call_at(self._due_s + self._period_s, self._send_waiting)
 
-    def close(self) -> None:
-        """Publish nothing more."""
-        self._publish = _drop
+    def clear(self) -> None:
+        """Forget what waits."""
         if self._timer is not None:
             self._timer.cancel()
         self._timer = self._waiting = None
 
     def _send_waiting(self) -> None:
-        item, self._waiting, self._timer = self._waiting, None, None
-        if item is not None:
-            self._send(item, self._loop.time())
+        if self._waiting is not None:
+            self._send(self._waiting)
 
-    def _send(self, item: T, now_s: float) -> None:
+    def _send(self, item: T) -> None:
+        self.clear()
+        now_s = self._loop.time()
         # From when it was due, so that telemetry of that very rate keeps it.
         self._due_s = max(self._due_s + self._period_s, now_s + self._period_s / 2)
         self._publish(item)

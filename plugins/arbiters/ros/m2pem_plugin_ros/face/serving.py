@@ -9,6 +9,7 @@ from geographic_msgs.msg import GeoPoint, GeoPointStamped
 
 from m2pem.api import (
     Follower,
+    LinkState,
     LocalFrame,
     MissionControl,
     PayloadState,
@@ -70,7 +71,9 @@ class Serving:
         self._states: dict[ResourceId, VehicleState | PayloadState] = {}
         self._topics: dict[ResourceId, VehicleTopics] = {}
         self._frames = FramesPublisher(ros, self._frame, names, options.rates["tf"], self._now_us())
-        self._diagnostics = DiagnosticsPublisher(node, [*fleet.vehicles, *fleet.payloads])
+        self._diagnostics = DiagnosticsPublisher(
+            node, [*fleet.vehicles, *fleet.payloads], options.namespace
+        )
         self._markers = MarkersPublisher(node, fleet, self._frame, names)
         self._fleet_state = FleetStatePublisher(node, control, follower, names, options)
         self._origin = node.create_publisher(GeoPointStamped, "~/origin", qos.STATUS)
@@ -134,8 +137,9 @@ class Serving:
             state = replace(state, time_us=self._ros.stamp_us(state.time_us))
         if isinstance(state, VehicleState) and state.resource in self._topics:
             self._states[state.resource] = state
-            self._topics[state.resource].put(state)
-            self._frames.put(state)
+            if state.link is not LinkState.LOST:  # where it is now, is not known
+                self._topics[state.resource].put(state)
+                self._frames.put(state)
         elif isinstance(state, PayloadState):
             vehicle = ResourceId(state.resource.partition("/")[0])
             if vehicle in self._topics:

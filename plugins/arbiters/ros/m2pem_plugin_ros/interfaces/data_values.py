@@ -1,5 +1,6 @@
 """Missions in requests, and data: named values, each of them JSON."""
 
+import sys
 from collections.abc import Sequence
 from typing import Any
 
@@ -79,9 +80,26 @@ def _decode(place: str, text: str) -> Value:
     return value
 
 
+def check_float(place: str, number: float) -> None:
+    """Refuse what rclpy 7.1 (Jazzy) sends for an int that a client in Python has set in a field
+    for a float: a denormal number, whatever the int. rclpy itself refuses it only if
+    ROS_PYTHON_CHECK_FIELDS=1 was set before its import.
+
+    Raises:
+        OperatorError: it is denormal.
+    """
+    if 0.0 < abs(number) < sys.float_info.min:
+        raise OperatorError(
+            f"{place} is {number:g}, as rclpy sends an int that is set where a float must be: "
+            "write 20.0 for 20; ROS_PYTHON_CHECK_FIELDS=1 lets rclpy refuse it at once"
+        )
+
+
 def _check(place: str, value: Value, depth: int) -> None:
     if isinstance(value, int) and abs(value) > LARGEST_INTEGER:
         raise OperatorError(f"{place} has an integer of more than 64 bits: write {value}.0")
+    if isinstance(value, float):
+        check_float(place, value)
     if isinstance(value, list | dict):
         if depth > DEEPEST:
             raise OperatorError(f"{place} is nested more than {DEEPEST} deep")

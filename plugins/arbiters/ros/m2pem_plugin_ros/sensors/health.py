@@ -39,8 +39,8 @@ class Battery:
 OLD_AFTER_S = 5.0
 """Components report once a second. Older errors do not count."""
 
-OWN = "m2pem:"
-"""Prefix of the names of what m2pem itself publishes about vehicles. It is ignored."""
+OWN_STATUS = "m2pem: "
+"""Prefix of the names of what any executive publishes about vehicles. It is ignored."""
 
 _ERROR = 2
 MOST_PARTS = 1000
@@ -81,7 +81,7 @@ class Diagnostics:
         now_us = self._clock.now_us()
         for status in message.status:
             said = self._errors.get(status.hardware_id)
-            if said is None or status.name.startswith(OWN):
+            if said is None or status.name.startswith(OWN_STATUS):
                 continue
             if ord(status.level) < _ERROR:
                 said.pop(status.name, None)
