@@ -169,9 +169,7 @@ class LostResources:
     def on_telemetry(self, state: VehicleState | PayloadState) -> None:
         """A resource published its state. If its link was lost, stop it from now on."""
         resource = state.resource
-        if resource not in self._lost or state.link is LinkState.LOST:
-            return
-        if resource in self._stopping:
+        if resource not in self._lost or resource in self._stopping or _is_not_received(state):
             return
         about = {"resource": resource, "notice": True}
         what = self._what(resource)
@@ -186,6 +184,8 @@ class LostResources:
         """Return the state as operators see it: not ready, and why, until it is free; then that it
         is held, until it is commanded again."""
         resource = state.resource
+        if resource in self._silent and resource not in self._why:
+            state = replace(state, link=LinkState.LOST)
         why = self.shown(resource) or ("lost" if state.link is LinkState.LOST else "")
         if resource in self._why:
             self._said[resource] = state
@@ -305,6 +305,14 @@ class LostResources:
 
     def _what(self, resource: ResourceId) -> str:
         return self._lost[resource].behavior or "what it did before"
+
+
+def _is_not_received(state: VehicleState | PayloadState) -> bool:
+    """Whether the link is lost, or its arbiter still looks for a vehicle: the state says nothing
+    of it."""
+    if state.link is not LinkState.DEGRADED or not isinstance(state, VehicleState):
+        return state.link is LinkState.LOST
+    return state.position is state.battery_fraction is state.armed is None
 
 
 def _nothing_received(resource: ResourceId, now_us: int) -> VehicleState | PayloadState:

@@ -83,6 +83,9 @@ def test_a_vehicle_lost_by_a_run_that_has_ended_is_held_when_it_returns(play, jo
         state = await anext(world.executive.control.telemetry())
         assert (state.link, state.ready, state.not_ready_reasons) == (LinkState.LOST, False, (why,))
         assert why in await refused(world)
+        says(world, LinkState.DEGRADED)  # its arbiter still looks for it
+        await world.clock.sleep(0.1)
+        assert world.executive.bus.latest(UGV1).link is LinkState.LOST
         assert not world.fake.calls
         says(world)
         if goes_on:
