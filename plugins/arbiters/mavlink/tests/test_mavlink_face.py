@@ -2,13 +2,15 @@
 
 import asyncio
 import math
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from m2pem_plugin_mavlink.face.face import MavlinkFace
-from mavlink_gcs import HOME, gateway, ground_station
+from mavlink_gcs import FLEET, HOME, gateway, ground_station
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from m2pem.api import Route, RunStatus, as_geojson, distance_m
+from m2pem.api import LinkState, Route, RunStatus, as_geojson, distance_m
 from m2pem.plugins import PluginManager
 from m2pem.testing import scenarios
 
@@ -49,6 +51,37 @@ def test_every_vehicle_is_a_system_with_its_own_position(tmp_path: Path) -> None
             assert abs(fix.alt_ellipsoid - fix.alt + 33_970) < 20
             home = await station.hears("HOME_POSITION", lambda each: each.get_srcSystem() == ROVER1)
             assert distance_m((home.latitude / 1e7, home.longitude / 1e7), HOME) < 0.1
+
+    asyncio.run(main())
+
+
+def test_a_vehicle_that_the_executive_holds_as_lost_sends_nothing_until_it_is_received(
+    tmp_path: Path,
+) -> None:
+    at_home = "connection: {home: [38.1075, -77.3192]}"
+    cut = f"{at_home[:-1]}, link_lost: [{{at: 2 s, for: 8 s}}]}}"
+
+    async def main() -> None:
+        fleet = FLEET.replace(at_home, cut)
+        async with (
+            gateway(tmp_path, fleet=fleet) as (control, port),
+            ground_station(port) as station,
+        ):
+
+            def beats(system: int) -> Callable[[Any], bool]:
+                own = (system, 1)
+                return lambda each: (each.get_srcSystem(), each.get_srcComponent()) == own
+
+            await station.hears("HEARTBEAT", beats(ROVER1))
+            async for state in control.telemetry():
+                if state.resource == "rover1" and state.link is LinkState.LOST:
+                    break
+            since = len(station.received)
+            for _ in range(3):
+                await station.hears("HEARTBEAT", beats(UAV1), len(station.received))
+            sent = [each for each in station.received[since:] if each.get_type() == "HEARTBEAT"]
+            assert not [each for each in sent if beats(ROVER1)(each)]
+            await station.hears("HEARTBEAT", beats(ROVER1), since)
 
     asyncio.run(main())
 
