@@ -125,6 +125,8 @@ async def test_a_detection_is_where_it_says_or_else_where_its_vehicle_is(
     on_map = {**local, "header": {"frame_id": "map"}}
     on_arm = {**local, "header": {"frame_id": "arm"}}
     off_earth = {"position_kind": 1, "position_geographic": {"latitude_deg": NAN}}
+    # An int for a float, which rclpy 7.1.6 (Jazzy) sends as 4.94066e-324.
+    by_int = {"position_kind": 2, "position_local": {"x": 10.0, "y": 20}}
     async with (
         connected(domain, {GPR: {"topic": "detections"}}) as bench,
         sensors(domain) as teller,
@@ -143,6 +145,7 @@ async def test_a_detection_is_where_it_says_or_else_where_its_vehicle_is(
             detection("near", **on_map),
             detection("arm", **on_arm),
             detection("lost", **off_earth),
+            detection("int", **by_int),
             detection("", source="evsg1/gpr"),
             detection("x" * 1000),
             detection("others", source="evsg1/magnetometer"),
@@ -150,9 +153,9 @@ async def test_a_detection_is_where_it_says_or_else_where_its_vehicle_is(
         )
         await until(lambda: found(bench)[-1].type == "last", "all were heard")
         where = {d.type: d.position for d in found(bench)}
-        assert list(where) == ["early", "here", "there", "near", "arm", "lost", "last"]
+        assert list(where) == ["early", "here", "there", "near", "arm", "lost", "int", "last"]
         own = pytest.approx(ORIGIN, abs=1e-6)
-        for type_ in ("early", "here", "arm", "lost", "last"):
+        for type_ in ("early", "here", "arm", "lost", "int", "last"):
             at_ = where[type_]
             assert (at_.latitude_deg, at_.longitude_deg, at_.altitude_m) == own
         assert where["there"] == GeoPosition(38.2, -77.4, 5.0)

@@ -80,15 +80,20 @@ def _decode(place: str, text: str) -> Value:
     return value
 
 
+def is_denormal(number: float) -> bool:
+    """Whether a number is what rclpy 7.1 (Jazzy) sends for an int that a client in Python has set
+    in a field for a float, whatever the int. rclpy itself refuses that only if
+    ROS_PYTHON_CHECK_FIELDS=1 was set before its import."""
+    return 0.0 < abs(number) < sys.float_info.min
+
+
 def check_float(place: str, number: float) -> None:
-    """Refuse what rclpy 7.1 (Jazzy) sends for an int that a client in Python has set in a field
-    for a float: a denormal number, whatever the int. rclpy itself refuses it only if
-    ROS_PYTHON_CHECK_FIELDS=1 was set before its import.
+    """Check a number of a request.
 
     Raises:
         OperatorError: it is denormal.
     """
-    if 0.0 < abs(number) < sys.float_info.min:
+    if is_denormal(number):
         raise OperatorError(
             f"{place} is {number:g}, as rclpy sends an int that is set where a float must be: "
             "write 20.0 for 20; ROS_PYTHON_CHECK_FIELDS=1 lets rclpy refuse it at once"

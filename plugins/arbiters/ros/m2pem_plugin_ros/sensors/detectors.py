@@ -15,6 +15,7 @@ from m2pem.api import (
     mean_sea_level_m,
 )
 from m2pem_plugin_ros.frames import to_geodetic
+from m2pem_plugin_ros.interfaces.data_values import is_denormal
 from m2pem_plugin_ros.log_throttle import LogThrottle
 from m2pem_plugin_ros.sensors.localization import FARTHEST_M
 from m2pem_plugin_ros.sensors.tf_buffer import TransformError
@@ -150,15 +151,17 @@ class DetectorTopic:
     def _geographic(
         self, latitude_deg: float, longitude_deg: float, altitude_m: float
     ) -> GeoPosition | None:
-        if -90.0 <= latitude_deg <= 90.0 and -180.0 <= longitude_deg <= 180.0:
+        is_given = not any(map(is_denormal, (latitude_deg, longitude_deg, altitude_m)))
+        if is_given and abs(latitude_deg) <= 90.0 and abs(longitude_deg) <= 180.0:
             return GeoPosition(latitude_deg, longitude_deg, altitude_m)
         cause = "an invalid position of a detection"
-        self._log_throttle.log(cause, f"({latitude_deg:g}, {longitude_deg:g})")
+        numbers = f"({latitude_deg:g}, {longitude_deg:g}, {altitude_m:g})"
+        self._log_throttle.log(cause, numbers)
         return None
 
     def _local(self, header: Any, numbers: tuple[float, float, float]) -> GeoPosition | None:
         """Return a place in the frame of a header; None: `map`."""
-        if not all(abs(number) <= FARTHEST_M for number in numbers):
+        if not all(abs(each) <= FARTHEST_M and not is_denormal(each) for each in numbers):
             cause = "an invalid position of a detection"
             self._log_throttle.log(cause, f"({numbers[0]:g}, {numbers[1]:g}, {numbers[2]:g})")
             return None
