@@ -135,6 +135,12 @@ class LostResources:
                 self._withdraw(resource, mark.why)
                 self._publish_as_before(resource)
 
+    def is_lost_since_before(self, resource: ResourceId) -> bool:
+        """Whether a resource was lost before the executive was started again, and was not received
+        since then."""
+        lost = self._lost.get(resource)
+        return lost is not None and lost.is_earlier and resource not in self._stopping
+
     def epoch_before(self, behavior: BehaviorId) -> int:
         """Return with which epoch the run of a behavior was driven that a lost resource may still
         do, when it was lost; 0: none does it."""

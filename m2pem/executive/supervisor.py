@@ -510,11 +510,13 @@ class Supervisor:
 
     def fault(self, fault: ResourceFault) -> None:
         """Post the fault of a vehicle or payload, or its lost link, to the runs that command it."""
+        resource = ResourceId(fault.resource)
+        if not fault.reachable and self._lost_resources.is_lost_since_before(resource):
+            return
         about: dict[str, object] = {"resource": fault.resource}
         # The list of alerts has the lost link and the low battery as conditions, which end.
         about["unlisted"] = fault.code in (LINK_LOST, BATTERY_LOW)
         log.warning("%s: %s: %s", fault.resource, fault.code, fault.reason, extra=about)
-        resource = ResourceId(fault.resource)
         if not fault.reachable:
             self.lost(resource, fault.reason)
         with_team = self.arbiters.teams.fault(resource, fault.code, fault.reason)

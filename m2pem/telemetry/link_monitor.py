@@ -82,9 +82,7 @@ class LinkMonitor:
         faults: list[ResourceFault] = []
         link = self._links.get(state.resource)
         if state.link is LinkState.LOST:
-            # Of what was not received since connecting, an executive before may have lost the link:
-            # it has its bound to be received.
-            if link is not None and not (link.lost or link.never_received):
+            if link is not None and not link.lost:
                 faults.append(self._lose(state.resource, link, "its arbiter lost the link"))
         elif link is not None:
             link.received_us, link.never_received, link.lost = now_us, False, False

@@ -78,12 +78,6 @@ def test_a_link_that_was_received_again_is_lost_again_however_short_that_was() -
     assert run_checks(rules, 40 * S) == [lost(UGV, "no telemetry for 2.0 s")]
 
 
-def test_what_was_not_received_yet_has_its_bound_although_a_state_says_that_it_is_lost() -> None:
-    rules = LinkMonitor({UGV: 2.0}, since_us=0)
-    assert rules.received(vehicle(link=LinkState.LOST), 1 * S) == []
-    assert run_checks(rules, 3 * S) == [lost(UGV, "no telemetry since connecting, for 2.0 s")]
-
-
 def test_an_arbiter_that_lost_the_link_is_believed_at_once_and_once() -> None:
     rules = LinkMonitor({UGV: 30.0}, since_us=0)
     rules.received(vehicle(), 1 * S)
