@@ -281,8 +281,13 @@ def decode(payload: bytes, type_: type[T]) -> T:
     """
     if len(payload) > LARGEST_MESSAGE:
         raise MessageError(f"it has {len(payload)} bytes, more than {LARGEST_MESSAGE}")
+    decoder = _DECODERS[_BY_TYPE[type_]]
     try:
-        message = _DECODERS[_BY_TYPE[type_]].decode(payload)
+        try:
+            message = decoder.decode(payload)
+        except msgspec.ValidationError:
+            # JSON has no integers: 2.0 is the number 2 (JSON Schema 2020-12, Core, 4.2.3).
+            message = msgspec.convert(_ANY.decode(payload), decoder.type)
     except (msgspec.DecodeError, RecursionError, UnicodeDecodeError) as error:
         raise MessageError(str(error)) from None
     position = getattr(message, "agv_position", UNSET)
@@ -293,6 +298,14 @@ def decode(payload: bytes, type_: type[T]) -> T:
     if not all(abs(number) <= FURTHEST for number in numbers):
         raise MessageError(f"a position or velocity is beyond {FURTHEST:g} (SI)")
     return message  # type: ignore[return-value]  # its decoder was chosen by the type
+
+
+def _number(text: str) -> int | float:
+    value = float(text)
+    return int(value) if value.is_integer() else value
+
+
+_ANY = msgspec.json.Decoder(float_hook=_number)
 
 
 class _AnyHeader(Struct):
@@ -309,6 +322,16 @@ def other_version(payload: bytes) -> str:
     except (msgspec.DecodeError, RecursionError, UnicodeDecodeError):
         return ""
     return "" if version.startswith("2.") else version
+
+
+def seconds_of(timestamp_: str) -> float | None:
+    """Return an ISO 8601 time, of UTC if it does not say another zone, in seconds since the Unix
+    epoch; None: it is none."""
+    try:
+        moment = datetime.fromisoformat(timestamp_)
+    except ValueError:
+        return None
+    return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
 
 
 def timestamp(time_us: int) -> str:

@@ -3,6 +3,7 @@
 import asyncio
 import logging
 import math
+from collections import Counter
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
@@ -57,6 +58,7 @@ from m2pem_plugin_vda5050.messages import (
     Visualization,
     decode,
     other_version,
+    seconds_of,
 )
 from m2pem_plugin_vda5050.orders import OrderPlan, OrderProgress
 from m2pem_plugin_vda5050.reading import (
@@ -81,6 +83,11 @@ RECLAIM_WITHIN_S = 5.0
 
 QUERY_WITHIN_S = 3.0
 """In real time: so long a query waits for the first state of the vehicle."""
+
+RESTARTED_AFTER_S = 5.0
+RESTARTED_STATES = 3
+"""So many older states in their order, and none else for so long, are those of a vehicle whose
+clock was set back."""
 
 LOG_AGAIN_AFTER_S = 60.0
 OTHER_VERSION = "connection of another major version"
@@ -121,6 +128,8 @@ class Vehicle:
         self._factsheet: Factsheet | None = None
         self._state: State | None = None
         self._state_us = 0
+        self._older: list[float] = []
+        self._may_be_older = False
         self._place: AgvPosition | None = None
         self._velocity: Velocity | None = None
         self._contact_us = self._clock.now_us()
@@ -132,7 +141,8 @@ class Vehicle:
         self._left_us = 0
         self._resolved = asyncio.Event()
         self._is_held = False
-        self._logged: dict[str, int] = {}
+        self._logged_us: dict[str, int] = {}
+        self._unlogged: Counter[str] = Counter()
         self._invalid = self._broker_problem = self._other_version = ""
 
     # --- messages of the vehicle ----------------------------------------------------------------
@@ -156,10 +166,10 @@ class Vehicle:
         except MessageError as error:
             self._note_other_version(other_version(payload))
             self._invalid = f"its last message on {topic} was invalid: {text_of(error)}"
-            self._log(f"{topic}: {text_of(error)}")
+            self._log(f"invalid message: {topic}", text_of(error))
         return None
 
-    def _receive_state(self, payload: bytes) -> VehicleState:
+    def _receive_state(self, payload: bytes) -> VehicleState | None:
         state = decode(payload, State)
         if not state.version.startswith("2."):
             raise MessageError(f"its version is {text_of(state.version, 20)}, not 2.x")
@@ -172,6 +182,8 @@ class Vehicle:
             )
         if state.serial_number != self.settings.serial_number:
             raise MessageError(f"it is of the vehicle {text_of(state.serial_number, 60)!r}")
+        if self._is_late(state):
+            return None
         self._state, self._state_us = state, self._clock.now_us()
         self._place = None if state.agv_position is UNSET else state.agv_position
         if state.velocity is not UNSET:
@@ -183,6 +195,26 @@ class Vehicle:
         self._note_contact()
         self.step()
         return self.state()
+
+    def _is_late(self, state: State) -> bool:
+        """Whether a state is older than the last one: it was made and counted before it. A vehicle
+        that restarts counts from 0 again, and its clock may have been set back: it has sent ONLINE,
+        or sends nothing else."""
+        last, may_be_older = self._state, self._may_be_older
+        older, self._older, self._may_be_older = self._older, [], False
+        made_s = seconds_of(state.timestamp)
+        last_s = None if last is None else seconds_of(last.timestamp)
+        if last is None or may_be_older or made_s is None or last_s is None or made_s >= last_s:
+            return False
+        if 0 < (state.header_id - last.header_id) % 2**32 < 2**31:
+            return False
+        older = [*older, made_s] if not older or made_s > older[-1] else [made_s]
+        silent_s = (self._clock.now_us() - self._state_us) / 1e6
+        if len(older) >= RESTARTED_STATES and silent_s >= RESTARTED_AFTER_S:
+            return False
+        self._older = older[-RESTARTED_STATES:]
+        self._log("late state", f"it was made {last_s - made_s:.1f} s before the last one")
+        return True
 
     def _receive_visualization(self, payload: bytes) -> VehicleState | None:
         message = decode(payload, Visualization)
@@ -198,6 +230,7 @@ class Vehicle:
         match message.connection_state:
             case "ONLINE":
                 self._broken_us, self._is_offline = None, False
+                self._may_be_older = True
             case "OFFLINE":
                 self._is_offline = True
             case _ if self._broken_us is None:
@@ -217,6 +250,8 @@ class Vehicle:
         if self._broken_us is not None and self._contact_us > self._broken_us:
             self._broken_us = None  # its ONLINE is on the way: it has come back
         self._is_offline = False
+        # Before the state is published: the executive stops a vehicle that it says is lost.
+        self.link = LinkState.CONNECTED
         self.first_contact.set()
 
     # --- calls of the arbiter -------------------------------------------------------------------
@@ -621,15 +656,16 @@ class Vehicle:
         cos, sin = math.cos(place.theta), math.sin(place.theta)
         return (*self._frame.to_enu(ahead * cos - left * sin, ahead * sin + left * cos), 0.0)
 
-    def _log(self, text: str) -> None:
-        """Log a warning, the same one once in a while."""
+    def _log(self, cause: str, detail: str) -> None:
+        """Log a warning, one of each cause once in a while. `cause`: one of few texts."""
         now_us = self._clock.now_us()
-        key = text[:80]
-        if now_us - self._logged.get(key, -(10**18)) >= LOG_AGAIN_AFTER_S * 1e6:
-            if len(self._logged) > 100:
-                self._logged.clear()
-            self._logged[key] = now_us
-            self._logger.warning("%s: invalid message: %s", self.resource, text)
+        if now_us - self._logged_us.get(cause, -(10**18)) < LOG_AGAIN_AFTER_S * 1e6:
+            self._unlogged[cause] += 1
+            return
+        self._logged_us[cause] = now_us
+        more = self._unlogged.pop(cause, 0)
+        since = f" ({more} more before)" if more else ""
+        self._logger.warning("%s: %s: %s%s", self.resource, cause, detail, since)
 
 
 def _action(own: OwnBehavior, action_id: str, parameters: Mapping[str, ResolvedValue]) -> Action:

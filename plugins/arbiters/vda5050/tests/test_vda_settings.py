@@ -11,13 +11,20 @@ from m2pem_plugin_vda5050.broker import tls_context
 from m2pem_plugin_vda5050.catalogue import Scope
 from m2pem_plugin_vda5050.host_checks import check_brokers
 from m2pem_plugin_vda5050.map_frame import MapFrame, MapPoint
-from m2pem_plugin_vda5050.messages import Headers, MessageError, Visualization, decode
+from m2pem_plugin_vda5050.messages import (
+    Headers,
+    MessageError,
+    State,
+    Visualization,
+    decode,
+    encode,
+)
 from m2pem_plugin_vda5050.orders import OrderPlan, OrderProgress
 from m2pem_plugin_vda5050.settings import Settings, read_password, read_settings
-from m2pem_plugin_vda5050.simulator.agv import AgvSpec
+from m2pem_plugin_vda5050.simulator.agv import Agv, AgvSpec
 from m2pem_plugin_vda5050.simulator.factsheet import factsheet
 from m2pem_plugin_vda5050.simulator.simulation import read_specs
-from vda_world import child_environment, write_fleet
+from vda_world import child_environment, schemas, write_fleet
 
 from m2pem import load_fleet
 from m2pem.api import Connection, ResourceId, SystemClock
@@ -344,6 +351,18 @@ def test_a_place_that_is_not_on_earth_is_no_message(x: str) -> None:
     place = f'{{"x": {x}, "y": 0, "theta": 0, "mapId": "hall", "positionInitialized": true}}'
     with pytest.raises(MessageError, match="a position or velocity is beyond"):
         decode(f'{{"agvPosition": {place}}}'.encode(), Visualization)
+
+
+def test_a_counter_may_be_written_with_a_decimal_point() -> None:
+    """JSON Schema 2020-12, 6.1.1: `integer` matches any number with a zero fractional part."""
+    agv = Agv(AgvSpec("agv1", "KIT", "0001", "2.1.0", "hall"), str)
+    text = encode(agv.state(Headers("KIT", "0001"), 0))
+    written = text.replace(b'"orderUpdateId":0', b'"orderUpdateId":2.0')
+    assert not list(schemas()["state"].iter_errors(json.loads(written)))
+    number = decode(written, State).order_update_id
+    assert (number, type(number)) == (2, int)
+    with pytest.raises(MessageError, match="orderUpdateId"):
+        decode(text.replace(b'"orderUpdateId":0', b'"orderUpdateId":2.5'), State)
 
 
 def test_the_catalogue_needs_no_connection() -> None:

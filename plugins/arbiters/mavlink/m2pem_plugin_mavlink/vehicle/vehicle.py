@@ -140,6 +140,7 @@ class Vehicle:
         self._asking = False
         self._boots = 0
         self._unsupported = False
+        self._mistaken_s = -math.inf
         self._home_requested_s = -math.inf
 
     # --- life -----------------------------------------------------------------------------------
@@ -276,7 +277,9 @@ class Vehicle:
             return
         found = identity(message.autopilot, message.type)
         if self.identity is not None:
-            if found != self.identity:
+            now_s = self.link.now_s()
+            if found != self.identity and now_s - self._mistaken_s >= SAID_AGAIN_S:
+                self._mistaken_s = now_s
                 self._logger.warning(
                     "%s: was %s and now reports that it is %s; do two vehicles have system id %d?",
                     self.resource, self.identity, found or "an unknown vehicle", sender.system,
