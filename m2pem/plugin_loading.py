@@ -103,7 +103,9 @@ def find_plugins(built_in: Sequence[str], block: Collection[str]) -> Found:
             continue
         try:
             found.loaded.append(_checked(manager, origin, load()))
-        except (Exception, SystemExit) as error:
+        except KeyboardInterrupt:  # of the operator, not of the plugin
+            raise
+        except BaseException as error:
             found.failed.append((origin, failure(origin, error)))
     return found
 

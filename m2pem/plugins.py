@@ -231,7 +231,9 @@ class PluginManager:
             try:
                 returned = plugin.call(_CHECK, mission=mission, fleet=fleet)
                 findings += _all_of(Finding, "findings", returned)
-            except Exception as error:
+            except KeyboardInterrupt:
+                raise
+            except BaseException as error:
                 broken = self._failed(plugin.origin, error, _CHECK)
                 remedy = "ask its author; to check without it, block the plugin"
                 findings.append(
@@ -254,7 +256,9 @@ class PluginManager:
             try:
                 returned = plugin.call(_CHECK_HOST, fleet=fleet)
                 checks += _all_of(HealthCheck, "checks", returned)
-            except Exception as error:
+            except KeyboardInterrupt:
+                raise
+            except BaseException as error:
                 broken = str(self._failed(plugin.origin, error, _CHECK_HOST))
                 remedy = "ask its author; what it needs of this host was not checked"
                 name = f"plugin {plugin.origin.name}"
@@ -262,13 +266,18 @@ class PluginManager:
         return checks
 
     def records_committed(self, run_id: str, records: "Sequence[Record]") -> None:
-        """Call the observers; an exception of one is logged, and affects no other."""
+        """Call the observers; an exception of one is logged, the first time as an error, which
+        operators see, and affects no other."""
         for plugin in self._observers:
+            known = len(self.failures)
             try:
                 plugin.call(_OBSERVE, run_id=run_id, records=records)
-            except Exception as error:
+            except KeyboardInterrupt:
+                raise
+            except BaseException as error:  # no task is cancelled in a plain function
                 broken = self._failed(plugin.origin, error, _OBSERVE)
-                _logger.exception("run %s: the observer of %s", run_id, broken)
+                level = logging.ERROR if len(self.failures) > known else logging.DEBUG
+                _logger.log(level, "run %s: the observer of %s", run_id, broken, exc_info=True)
 
     def listing(self) -> list[PluginInfo]:
         """Every plugin with what it provides, those that broke or are blocked too."""
@@ -358,7 +367,9 @@ class PluginManager:
         """Call a hook that runs at start-up; `names`: what it has registered when it breaks."""
         try:
             plugin.call(hook, **arguments)
-        except (Exception, SystemExit) as error:
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:
             broken = self._failed(plugin.origin, error, hook, names)
             if plugin.origin.built_in:
                 raise InternalError(f"the built-in {broken}") from error

@@ -1,5 +1,6 @@
 """Plugins are real here: distributions with entry points in a folder on the path."""
 
+import asyncio
 import inspect
 import itertools
 import logging
@@ -14,7 +15,10 @@ import click
 import pytest
 
 from m2pem import hookspecs
+from m2pem.api.health import HealthStatus
+from m2pem.api.runs import Alert, RunId
 from m2pem.errors import InternalError, PluginError
+from m2pem.executive.control_events import ControlEvents, LoggedAlerts, RecordObservers
 from m2pem.findings import Finding, Severity
 from m2pem.mission.mission import Mission
 from m2pem.plugins import (
@@ -206,6 +210,7 @@ def test_listing_leaves_the_command_line_alone_when_commands_were_added(install:
     [
         ("import no_such_library", "ModuleNotFoundError: No module named 'no_such_library'"),
         ("raise SystemExit('cannot')", "SystemExit: cannot"),
+        ("raise BaseException('cannot')", "BaseException: cannot"),
         ("1 +", "SyntaxError: invalid syntax"),
         ("x = 1", "nothing is marked with @m2pem.hookimpl in the module that"),
         (
@@ -482,7 +487,7 @@ def test_a_plugin_whose_commands_break_adds_none(install: Install) -> None:
     )
 
 
-@pytest.mark.parametrize("body", ["1 / 0", "return 5", "return ['bad']"])
+@pytest.mark.parametrize("body", ["1 / 0", "return 5", "return ['bad']", "raise SystemExit(3)"])
 def test_a_check_that_breaks_is_a_warning(install: Install, body: str) -> None:
     install("boat", f"@hookimpl\ndef m2pem_check_mission(mission, fleet):\n    {body}")
     plugins = manager()
@@ -496,6 +501,43 @@ def test_a_check_that_breaks_is_a_warning(install: Install, body: str) -> None:
 def test_a_check_may_return_nothing(install: Install) -> None:
     install("boat", "@hookimpl\ndef m2pem_check_mission(): pass")
     assert manager().check_mission(MISSION, None) == []
+
+
+def test_a_check_of_the_host_that_exits_is_a_warning(install: Install) -> None:
+    install("boat", "@hookimpl\ndef m2pem_check_host(fleet):\n    raise SystemExit(3)")
+    plugins = manager()
+    (check,) = plugins.check_host(None)
+    assert (check.status, "SystemExit: 3" in check.message) == (HealthStatus.WARNING, True)
+
+
+def test_ctrl_c_while_a_plugin_is_asked_ends_the_program(install: Install) -> None:
+    install("boat", "@hookimpl\ndef m2pem_check_mission():\n    raise KeyboardInterrupt")
+    with pytest.raises(KeyboardInterrupt):
+        manager().check_mission(MISSION, None)
+
+
+@pytest.mark.parametrize("error", ["1 / 0", "raise SystemExit", "raise CancelledError"])
+async def test_of_an_observer_that_breaks_operators_get_one_alert_and_the_others_go_on(
+    install: Install, error: str
+) -> None:
+    code = "from asyncio import CancelledError\n@hookimpl\ndef m2pem_records_committed(run_id):"
+    install("abad", f"{code}\n    {error}")
+    observe = "def m2pem_records_committed(run_id, records):\n    records.append(run_id)"
+    install("zgood", f"@hookimpl\n{observe}")
+    events, heard = ControlEvents(), list[str]()
+    observers = RecordObservers(manager().records_committed, events)
+    alerts = events.subscribe(None, 10)
+    with LoggedAlerts(events):
+        observers.start()
+        for run in ("r7", "r8", "r9"):
+            observers.put(RunId(run), cast("Any", heard))
+        async with asyncio.timeout(20):
+            await observers.close()
+    events.end()
+    assert heard == ["r7", "r8", "r9"]
+    (alert,) = [each async for each in alerts]
+    assert isinstance(alert, Alert)
+    assert "run r7: the observer of plugin 'abad'" in alert.text
 
 
 def test_an_observer_that_breaks_is_logged_and_the_others_still_hear(

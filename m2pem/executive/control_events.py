@@ -207,6 +207,7 @@ LOGGERS = (
     "m2pem.dispatch",
     "m2pem.executive",
     "m2pem.face.events",
+    "m2pem.plugins",
     "m2pem.teams",
 )
 

@@ -11,11 +11,13 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class PanTiltZoom:
-    """In radians. `zoom` is a factor, 1 or more."""
+    """In radians. `zoom` is a factor, 1 or more. `moving`: it turns or zooms, and what it reports
+    may be where it will be."""
 
     pan_rad: float
     tilt_rad: float
     zoom: float = 1.0
+    moving: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,15 +2,18 @@
 
 import asyncio
 import math
+import re
 from contextlib import asynccontextmanager
 from pathlib import Path
 
+import pytest
 from m2pem_plugin_ptz.arbiter import PtzArbiter
+from m2pem_plugin_ptz.simulator.onvif.services import ptz as ptz_service
 from onvif_bench import ACCOUNT, camera, write_credentials
 from PIL import Image
 from ptz_fake_camera import at, rad, vehicle
 
-from m2pem.api import ArbiterContext, BehaviorState, Connection, Point, ResourceId
+from m2pem.api import ArbiterContext, BehaviorState, Connection, LinkState, Point, ResourceId
 from m2pem.testing.contracts.arbiter_harness import ArbiterHarness, context
 from m2pem.testing.loopback import loop_clock, on_loopback
 
@@ -149,3 +152,33 @@ def _ends(remaining):
     """The edges of what is left, in degrees."""
     heading, sector = (float(remaining[key].removesuffix(" deg")) for key in ("heading", "sector"))
     return heading - sector / 2, heading + sector / 2
+
+
+@on_loopback
+async def test_a_camera_that_reports_where_it_will_be_is_there_when_it_rests(tmp_path, monkeypatch):
+    def status(of, asked, base):
+        """Return its status as if its head were already where it goes to."""
+        said = truly(of, asked, base)
+        pan = of.gimbal.pan.at if of.gimbal.pan.goal is None else of.gimbal.pan.goal
+        return re.sub(r'PanTilt x="[^"]*"', f'PanTilt x="{math.degrees(pan):.4f}"', said)
+
+    truly = ptz_service.OPERATIONS["GetStatus"]
+    monkeypatch.setitem(ptz_service.OPERATIONS, "GetStatus", status)
+    slow = camera(rate_deg_s=20.0, drives=False)
+    async with slow as server, bench(server, tmp_path) as (found, _):
+        await found.start("r1.b1", "ptz_point_at", PTZ, bearing=rad(60), elevation=0.0)
+        end = await found.ended("r1.b1", 60)
+        assert end.state is BehaviorState.SUCCEEDED
+        assert math.degrees(server.camera.ptz[0]) == pytest.approx(60, abs=0.5)
+
+
+@on_loopback
+async def test_two_seconds_of_server_errors_are_no_lost_link(tmp_path):
+    async with camera() as server, bench(server, tmp_path) as (found, _):
+        await found.until(lambda: getattr(found.latest(PTZ), "pan_rad", None) is not None, 30)
+        server.faults.http(500)
+        await found.clock.sleep(2.0)
+        server.faults.http(0)
+        states = len(found.states)
+        await found.until(lambda: len(found.states) > states + 20, 60)
+        assert {state.link for state in found.states} == {LinkState.CONNECTED}

@@ -1,13 +1,16 @@
 """Cameras that are away, wrong passwords, wrong clocks, faults, stuck motors."""
 
 import asyncio
+import re
 import sys
 
 import pytest
 from m2pem_plugin_ptz.drivers.driver import CameraError
 from m2pem_plugin_ptz.drivers.onvif import session, steering
+from m2pem_plugin_ptz.gimbal import PanTiltZoom
 from m2pem_plugin_ptz.simulator.onvif.camera import CameraSpec
 from m2pem_plugin_ptz.simulator.onvif.server import OnvifServer
+from m2pem_plugin_ptz.simulator.onvif.services import device, ptz
 from onvif_bench import ACCOUNT, ANSWERS_S, camera, driven, until, write_credentials
 
 from m2pem.errors import PluginError
@@ -45,6 +48,31 @@ async def test_a_camera_that_reboots_with_another_clock_is_taken_up_again(tmp_pa
         await until(lambda: bench.heard > heard + 3)
         await until(lambda: server.camera.ptz[0] > 0.59)
         assert bench.driver.refusal("ptz_point_at") == ""
+
+
+@on_loopback
+async def test_a_camera_with_another_clock_that_checks_every_token_is_taken_up(
+    tmp_path, monkeypatch
+):
+    monkeypatch.setattr(device, "FREE", frozenset({"GetSystemDateAndTime"}))
+    wrong = camera(account=ACCOUNT, skew_s=7200.0)
+    async with wrong as server, driven(server, tmp_path) as bench:
+        await bench.ready()
+        assert server.camera.calls["GetServices"] == 1
+
+
+@on_loopback
+async def test_a_position_that_is_no_number_is_said_so(tmp_path, monkeypatch):
+    truly = ptz.OPERATIONS["GetStatus"]
+
+    def status(of, asked, base):
+        return re.sub(r'PanTilt x="[^"]*"', 'PanTilt x="NaN"', truly(of, asked, base))
+
+    async with camera() as server, driven(server, tmp_path) as bench:
+        await bench.ready()
+        monkeypatch.setitem(ptz.OPERATIONS, "GetStatus", status)
+        await until(lambda: "a position that is not finite" in bench.driver.refusal("zoom"))
+        assert bench.driver.ptz == PanTiltZoom(0.0, 0.0)
 
 
 @on_loopback

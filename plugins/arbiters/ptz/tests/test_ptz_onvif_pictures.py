@@ -69,6 +69,16 @@ async def test_what_is_no_picture_is_an_error(tmp_path):
 
 
 @on_loopback
+async def test_half_a_picture_is_an_error(tmp_path):
+    async with camera() as server, driven(server, tmp_path) as bench:
+        await bench.ready()
+        whole = (await bench.driver.take_picture()).content
+        server.camera.fault_state.picture = whole[: len(whole) // 2]
+        with pytest.raises(CameraError, match="cannot be decoded: image file is truncated"):
+            await bench.driver.take_picture()
+
+
+@on_loopback
 async def test_a_picture_has_a_largest_size(tmp_path, monkeypatch):
     monkeypatch.setattr(media, "LARGEST", 100_000)
     async with camera() as server, driven(server, tmp_path) as bench:

@@ -24,6 +24,9 @@ LEFT_S = 10.0
 STUCK_S = 10.0
 """A camera that comes no nearer to its target for this time is stuck."""
 
+STOPS_WITHIN_S = 30.0
+"""A camera that moves for this time at its target may report a direction that it does not have."""
+
 LONGEST_STEP_S = 0.5
 """Longest time that one step counts. After a longer one the process was suspended, and has not read
 the messages of the camera."""
@@ -153,7 +156,7 @@ class PointAt(_PointingAtTarget):
 
     def __init__(self, context: BehaviorContext) -> None:
         super().__init__(context)
-        self._moved_s = 0.0
+        self._moved_s = self._there_s = 0.0
         self._last = (math.inf, math.inf)
 
     async def step(self, elapsed_s: float) -> bool:
@@ -161,10 +164,19 @@ class PointAt(_PointingAtTarget):
         reachable = self.point_ahead()
         if not self.check_reach(reachable, elapsed_s):
             return False
-        pointing_error_rad = self.pointing_error_rad()
+        pointing_error_rad, ptz = self.pointing_error_rad(), self.driver.ptz
+        moving = ptz is not None and ptz.moving
+        if pointing_error_rad > COARSE_RAD:
+            self._there_s = elapsed_s
+        elif moving:
+            if elapsed_s - self._there_s >= STOPS_WITHIN_S:
+                raise BehaviorFailedError(
+                    "the camera reports the direction of its target, and for "
+                    f"{STOPS_WITHIN_S:g} s that it still moves"
+                )
+            return False
         if pointing_error_rad <= THERE_RAD:
             return True
-        ptz = self.driver.ptz
         now = (ptz.pan_rad, ptz.tilt_rad) if ptz else self._last
         if now != self._last:
             self._last, self._moved_s = now, elapsed_s
@@ -175,11 +187,10 @@ class PointAt(_PointingAtTarget):
 
     def state_after_restart(self) -> BehaviorState:
         """Return SUCCEEDED if the camera points there, else RUNNING: a repetition does no harm."""
-        return (
-            BehaviorState.SUCCEEDED
-            if self.pointing_error_rad() <= THERE_RAD
-            else BehaviorState.RUNNING
-        )
+        ptz = self.driver.ptz
+        rests = ptz is not None and not ptz.moving
+        is_there = rests and self.pointing_error_rad() <= THERE_RAD
+        return BehaviorState.SUCCEEDED if is_there else BehaviorState.RUNNING
 
 
 class Track(_PointingAtTarget):
@@ -248,4 +259,6 @@ class Zoom(Behavior):
 
     def _is_there(self) -> bool:
         ptz = self.driver.ptz
-        return ptz is not None and abs(ptz.zoom - self._level()) <= _ZOOM_ENOUGH * self._level()
+        if ptz is None or ptz.moving:
+            return False
+        return abs(ptz.zoom - self._level()) <= _ZOOM_ENOUGH * self._level()

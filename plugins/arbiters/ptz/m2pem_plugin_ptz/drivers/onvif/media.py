@@ -2,6 +2,7 @@
 
 import asyncio
 import base64
+import io
 from dataclasses import dataclass
 from typing import Any
 
@@ -121,7 +122,21 @@ async def fetch_snapshot(session: Session, url: str) -> tuple[bytes, str]:
     suffix = next((kind for start, kind in KINDS.items() if content.startswith(start)), None)
     if suffix is None:
         raise RefusedError(f"{camera(settings)} sent {len(content)} bytes that are not a picture")
+    try:
+        await asyncio.to_thread(_decode, content)
+    except Exception as error:  # each format of Pillow raises its own
+        raise RefusedError(
+            f"{camera(settings)} sent a picture of {len(content)} bytes that cannot be decoded: "
+            f"{error}"
+        ) from error
     return content, suffix
+
+
+def _decode(content: bytes) -> None:
+    from PIL import Image  # noqa: PLC0415  # comes with the extra
+
+    with Image.open(io.BytesIO(content), formats=("JPEG", "PNG")) as picture:
+        picture.load()
 
 
 async def _ask(client: Any, session: Session, url: str) -> bytes:

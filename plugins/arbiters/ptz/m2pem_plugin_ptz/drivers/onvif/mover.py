@@ -3,6 +3,7 @@
 import asyncio
 import logging
 import math
+from collections import deque
 from collections.abc import Callable
 
 from m2pem.api import Clock
@@ -27,9 +28,13 @@ RUNS_ON_S = 1.0
 
 LAGS_ON = 4.0
 SILENT_CALLS = 3
-"""After this many calls without an answer, the session ends."""
+SILENT_S = 3.0
+"""After this many calls and this time without an answer, the session ends."""
 
 BACKOFF_S = 0.5
+ON_ITS_WAY_RAD = math.radians(0.5)
+"""A position this far from all that were commanded, and from the last one, is on the way."""
+
 ZOOM_AGAIN_S = 3.0
 SAME_ZOOM = 0.02
 """Relative tolerance."""
@@ -54,6 +59,8 @@ class Mover:
         self._zoom: float | None = None
         self._zoomed_s = -math.inf
         self._halting = False
+        self._commanded: deque[tuple[float, float]] = deque(maxlen=8)
+        self._shows_its_way = False
         self._news = asyncio.Event()
         self._stops: set[asyncio.Task[None]] = set()
         self._session: Session | None = None
@@ -124,16 +131,16 @@ class Mover:
     # --- polling --------------------------------------------------------------------------------
 
     async def _watch(self, session: Session) -> None:
-        silent_error = 0
+        silent_calls, answered_s = 0, self._now_s
         while True:
             started_s = self._now_s
             try:
                 await self._ask(session)
-                silent_error, self.answered = 0, True
+                silent_calls, answered_s, self.answered = 0, self._now_s, True
                 self._on_contact()
             except SilentError:
-                silent_error += 1
-                if silent_error >= SILENT_CALLS:
+                silent_calls += 1
+                if silent_calls >= SILENT_CALLS and self._now_s - answered_s >= SILENT_S:
                     raise
             busy = self._request is not None or self._zoom is not None or self._halting
             await self._wait(started_s, self._interval_s(session) if busy else IDLE_S)
@@ -147,16 +154,32 @@ class Mover:
         status = await session.call("ptz", "GetStatus", ProfileToken=self._profile)
         at_s = (started_s + self._now_s) / 2
         position = getattr(status, "Position", None)
-        place = getattr(position, "PanTilt", None)
+        place, said = getattr(position, "PanTilt", None), getattr(position, "Zoom", None)
+        numbers = [] if place is None else [float(place.x), float(place.y)]
+        numbers += [] if said is None else [float(said.x)]
+        if not all(map(math.isfinite, numbers)):
+            raise RefusedError(f"{self._name} reports a position that is not finite: {numbers}")
         found = None
         if place is not None:
-            found = self._spaces.ptz(float(place.x), float(place.y), place.space or "")
+            found = self._spaces.ptz(numbers[0], numbers[1], place.space or "")
         self.says_position = found is not None
         if found is not None:
-            said = getattr(position, "Zoom", None)
-            zoom = self._spaces.zoom(float(said.x), said.space or "") if said is not None else None
+            zoom = None if said is None else self._spaces.zoom(numbers[-1], said.space or "")
             self._steering.observe(*found, at_s)
-            self.ptz = PanTiltZoom(*found, 1.0 if zoom is None else zoom)
+            moves = self._moves(getattr(status, "MoveStatus", None), found)
+            self.ptz = PanTiltZoom(*found, 1.0 if zoom is None else zoom, moves)
+
+    def _moves(self, status: object, found: tuple[float, float]) -> bool:
+        """Whether the camera moves, and may report where it will be: some report the commanded
+        position at once. One that was seen on its way reports where it is."""
+        if "MOVING" not in (getattr(status, "PanTilt", None), getattr(status, "Zoom", None)):
+            return False
+        last, apart = self.ptz, self._steering.target.apart
+        if last is not None:
+            others = [*self._commanded, (last.pan_rad, last.tilt_rad)]
+            if all(max(map(abs, apart(found, each))) > ON_ITS_WAY_RAD for each in others):
+                self._shows_its_way = True
+        return not self._shows_its_way
 
     # --- turning --------------------------------------------------------------------------------
 
@@ -207,6 +230,7 @@ class Mover:
         if move is None:
             return False
         if isinstance(move, AbsoluteMove):
+            self._commanded.append((move.pan_rad, move.tilt_rad))
             await self._call(session, "AbsoluteMove", **_absolute(spaces, move))
         else:
             await self._call(session, "ContinuousMove", **self._continuous(spaces, move))

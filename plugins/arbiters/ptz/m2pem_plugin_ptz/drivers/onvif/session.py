@@ -115,8 +115,11 @@ def translate_error(
         if require("onvif.util").is_auth_error(error):
             return unauthorized_error(settings, user)
         return RefusedError(f"{camera(settings)} refuses {operation}: {fault_text(error)}")
-    if isinstance(error, zeep.exceptions.TransportError) and error.status_code in (401, 403):
-        return unauthorized_error(settings, user)
+    if isinstance(error, zeep.exceptions.TransportError):
+        if error.status_code in (401, 403):
+            return unauthorized_error(settings, user)
+        if error.status_code >= 500:
+            return silent_error(settings, OSError(f"HTTP status {error.status_code}"))
     text = " ".join(str(error).split())[:200]
     return RefusedError(f"{camera(settings)} answers {operation} with invalid ONVIF: {text}")
 
@@ -177,10 +180,11 @@ class Session:
                 no_cache=True,
             )
         await self._read_clock()
+        # Made here, as the library drops the time difference when it requests the services.
+        await self._camera.create_devicemgmt_service()
         await self._bounded("GetServices", self._camera.update_xaddrs)
         found = self._camera.xaddrs
         self._camera.xaddrs = {uri: self.near(url) for uri, url in found.items()}
-        # The library dropped the time difference when it requested the services.
         self._camera.dt_diff = self._ahead
 
     async def close(self) -> None:
