@@ -1,7 +1,9 @@
 """One peer: whose frames are heard, counted and handed over."""
 
 import logging
+import random
 from collections.abc import Callable
+from itertools import pairwise
 
 import pytest
 from m2pem_plugin_mavlink.protocol.frames import encode
@@ -162,7 +164,56 @@ def test_frames_in_a_datagram_with_junk_must_be_right() -> None:
     assert ear.sender().sent == 4
     assert ear.sender().lost == 1
     assert len(ear.received) == 2
-    assert ear.inbound.junk_bytes == 3 + len(attitude(1))
+    assert ear.inbound.junk_bytes == 2 + len(attitude(1)), "the last byte may begin a frame"
+
+
+@pytest.mark.parametrize("size", [1, 7, 16, 30])
+def test_a_frame_that_is_cut_at_the_border_of_a_datagram_is_received(size: int) -> None:
+    ear = Ear()
+    frames = beat(0) + attitude(1) + beat(2) + attitude(3) + beat(4, mode=9)
+    for start in range(0, len(frames), size):
+        as_datagram(ear, frames[start : start + size])
+    assert (len(ear.received), ear.sender().lost, ear.inbound.junk_bytes) == (3, 0, 0)
+
+
+def test_what_is_missing_of_a_cut_frame_costs_no_other() -> None:
+    ear = Ear()
+    as_datagram(ear, beat(0) + attitude(1)[:9])
+    as_datagram(ear, beat(2))
+    as_datagram(ear, attitude(3)[9:] + beat(4))
+    assert (len(ear.received), ear.sender().lost) == (3, 2)
+
+
+@pytest.mark.parametrize("late_s", [1.4, 6.0, 25.0])
+@pytest.mark.parametrize("loss", [0.0, 0.05])
+def test_frames_that_come_late_over_a_second_way_are_not_handed_over(
+    late_s: float, loss: float
+) -> None:
+    """50 frames a second, every tenth a heartbeat whose mode is its number."""
+    ear, rng = Ear(), random.Random(4)
+    coming = []
+    for number in range(3000):
+        frame = beat(number & 255, mode=number) if number % 10 == 0 else attitude(number & 255)
+        coming.append((number * 0.02 + late_s, frame))
+        if rng.random() >= loss or number < 100:
+            coming.append((number * 0.02, frame))
+    for now_s, frame in sorted(coming):
+        ear.inbound.datagram(frame, now_s)
+    modes = [message.custom_mode for message, _ in ear.received]
+    back = sum(after < before for before, after in pairwise(modes))
+    assert back <= len(modes) * 0.01 if loss else back == 0
+    assert len(set(modes)) >= 300 * (1 - 2 * loss)
+
+
+def test_a_slow_way_counts_when_the_fast_one_is_gone() -> None:
+    ear = Ear()
+    coming = [(n * 0.02 + 1.5, beat(n & 255, mode=n)) for n in range(600)]
+    coming += [(n * 0.02, beat(n & 255, mode=n)) for n in range(300)]
+    for now_s, frame in sorted(coming):
+        ear.inbound.datagram(frame, now_s)
+    modes = [message.custom_mode for message, _ in ear.received]
+    assert modes == sorted(modes)
+    assert modes[-1] == 599
 
 
 def test_a_stream_may_come_byte_by_byte() -> None:

@@ -144,3 +144,14 @@ def test_a_height_above_ground_that_is_not_known_is_none() -> None:
     into = intake()
     assert take(into, "ALTITUDE", bottom_clearance=-1.0).altitude_above_terrain_m is None
     assert take(into, "ALTITUDE", bottom_clearance=7.5).altitude_above_terrain_m == 7.5
+
+
+def test_a_message_that_is_half_a_minute_late_is_no_restart() -> None:
+    into = intake()
+    heard = take(into, "GLOBAL_POSITION_INT", now_s=2.0, **at(20.0, boot_ms=160_000))
+    height_m = heard.altitude_above_home_m
+    heard = take(into, "GLOBAL_POSITION_INT", now_s=2.3, **at(5.0, boot_ms=130_000))
+    assert (heard.boots, heard.altitude_above_home_m) == (1, height_m)
+    # An autopilot cannot have run for longer than since its last message.
+    heard = take(into, "GLOBAL_POSITION_INT", now_s=9.0, **at(0.0, boot_ms=4_000))
+    assert heard.boots == 2

@@ -10,6 +10,7 @@ from m2pem_plugin_mavlink.link import udp
 from m2pem_plugin_mavlink.link.hub import shared_hub
 from m2pem_plugin_mavlink.link.routed_link import RoutedLink, open_link
 from m2pem_plugin_mavlink.link.udp import UdpEndpoint
+from m2pem_plugin_mavlink.protocol.frames import encode
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
 from m2pem_plugin_mavlink.protocol.url import parse_url
 from mavlink_wire import GROUND_STATION, FarEnd, HandClock, udp_end, until
@@ -49,6 +50,17 @@ def heard(link: RoutedLink) -> list[int]:
     modes: list[int] = []
     link.listen([0], lambda message, _: modes.append(message.custom_mode))
     return modes
+
+
+async def test_a_bridge_that_cuts_every_frame_is_received() -> None:
+    """As a radio that sends 8 bytes at a time: no datagram ever has a whole frame."""
+    async with opened(1) as (_, [link]):
+        modes = heard(link)
+        frame = encode(message_type("HEARTBEAT").make(custom_mode=7), 0, VEHICLE)
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as bridge:
+            for start in range(0, len(frame), 8):
+                bridge.sendto(frame[start : start + 8], ("127.0.0.1", endpoint().port))
+            await until(lambda: modes == [7])
 
 
 async def test_a_vehicle_is_heard_and_answered_where_it_is() -> None:

@@ -22,6 +22,7 @@ AT_ONCE = 256
 """Datagrams that are read before other tasks run: about a millisecond."""
 
 MAX_PEERS = 1_024
+MAX_UNKNOWN_PEERS = 16
 FORGOTTEN_S = 60.0
 
 
@@ -34,6 +35,7 @@ class UdpEndpoint(Endpoint):
 
     async def open(self) -> None:
         """See `Endpoint.open`."""
+        self._unknown: dict[Any, Peer] = {}
         self._socket = await _opened(self.url)
         asyncio.get_running_loop().add_reader(self._socket, self._readable)
         if self.url.way is Way.UDP_OUT:
@@ -81,10 +83,15 @@ class UdpEndpoint(Endpoint):
                     tap(self, peer, data)
 
     def _receive_from_new_peer(self, data: bytes, address: Any, now_s: float) -> None:
-        """Add a peer for an address that has sent a valid frame; nothing is kept of others."""
-        peer = self._peer(address, now_s)
+        """Add a peer for an address that has sent a valid frame; of others that have sent the begin
+        of one, the last few are kept."""
+        peer = self._unknown.pop(address, None) or self._peer(address, now_s)
         peer.inbound.datagram(data, now_s)
         if not peer.inbound.senders:
+            if peer.inbound.is_waiting:
+                self._unknown[address] = peer
+                if len(self._unknown) > MAX_UNKNOWN_PEERS:
+                    del self._unknown[next(iter(self._unknown))]
             if peer.inbound.greeting is not None:
                 self.greet(peer, (peer.inbound.greeting,))
             return

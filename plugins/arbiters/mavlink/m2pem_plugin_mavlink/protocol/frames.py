@@ -42,7 +42,7 @@ _CRC = Struct("<H")
 class Frame(NamedTuple):
     """The header of a frame. `sender`: system + 256 * component; `checked`: its checksum is
     right (False: the message is unknown, or it was not checked); `signed`: the whole frame, if it
-    has a signature, else nothing."""
+    has a signature, else nothing; `checksum`: its two bytes."""
 
     sequence: int
     sender: int
@@ -50,6 +50,7 @@ class Frame(NamedTuple):
     payload: bytes
     checked: bool
     signed: bytes = b""
+    checksum: bytes = b""
 
 
 def right(frame: bytes, id_: int) -> bool:
@@ -103,12 +104,13 @@ def read(frame: bytes) -> Frame | None:
     """Return the header of a frame of `clean`; None if it has an unknown flag."""
     if frame[0] == V1:
         _, sequence, sender, id_ = HEADER_V1.unpack_from(frame)
-        return Frame(sequence, sender, id_, frame[6:-2], False)
+        return Frame(sequence, sender, id_, frame[6:-2], False, b"", frame[-2:])
     _, flags, sequence, sender, low, high = HEADER_V2.unpack_from(frame)
     if flags & ~SIGNED:
         return None
-    end, signed = (-2 - SIGNATURE, frame) if flags else (-2, b"")
-    return Frame(sequence, sender, low | high << 16, frame[10:end], False, signed)
+    end, signed = (len(frame) - 2 - (SIGNATURE if flags else 0)), (frame if flags else b"")
+    id_, checksum = low | high << 16, frame[end : end + 2]
+    return Frame(sequence, sender, id_, frame[10:end], False, signed, checksum)
 
 
 def scan(data: bytes, unfinished_from: int = NEVER) -> tuple[list[Frame], int, int]:
@@ -152,15 +154,15 @@ def scan(data: bytes, unfinished_from: int = NEVER) -> tuple[list[Frame], int, i
         after = end + 2 + SIGNATURE if flags & SIGNED else end + 2
         if after <= size:
             extra = None if flags & ~SIGNED else EXTRA.get(id_)
-            signed = data[position:after] if flags & SIGNED else b""
+            rest = (data[position:after] if flags & SIGNED else b""), data[end : end + 2]
             if extra is not None:
                 sum_ = mcrf4xx(extra, mcrf4xx(data[position + 1 : end], CRC_START))
                 if data[end] == sum_ & 255 and data[end + 1] == sum_ >> 8:
-                    found.append(Frame(sequence, sender, id_, data[begin:end], True, signed))
+                    found.append(Frame(sequence, sender, id_, data[begin:end], True, *rest))
                     position, doubt_end = after, 0
                     continue
             elif not doubt_end and (after == size or data[after] in (V1, V2)):
-                made = Frame(sequence, sender, id_, data[begin:end], False, signed)
+                made = Frame(sequence, sender, id_, data[begin:end], False, *rest)
                 doubt = None if flags & ~SIGNED else made
                 doubt_end, junk_before = after, junk
         elif position >= unfinished_from and not doubt_end:

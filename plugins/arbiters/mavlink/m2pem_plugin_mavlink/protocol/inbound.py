@@ -2,6 +2,7 @@
 listeners."""
 
 import logging
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
@@ -23,7 +24,7 @@ from m2pem_plugin_mavlink.protocol.frames import (
     scan,
 )
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, MessageType
-from m2pem_plugin_mavlink.protocol.quality import Reception
+from m2pem_plugin_mavlink.protocol.quality import RESTART_S, Reception
 from m2pem_plugin_mavlink.signing.signature import SignatureCheck, Signing
 
 _logger = logging.getLogger(__name__)
@@ -33,6 +34,15 @@ UNFINISHED_S = 1.0
 
 MOST_SENDERS = 1_024
 """Most senders of one peer; those that were silent for longest are forgotten first."""
+
+KEPT_S = 60.0
+MOST_KEPT = 8_192
+"""So long, and so many, are frames known that were received, to know their copies."""
+
+LATE_S = 0.5
+LATE_FRAMES = 16
+"""Copies that come later than this belong to a slow second way. So does a frame by which it goes on
+after at most so many that it has lost."""
 
 Listener: TypeAlias = Callable[[Message, Address], None]
 """Called with a message and its sender."""
@@ -53,9 +63,10 @@ NOTHING: WantedById = {}
 
 class Sender(Reception):
     """One component of a system, as one peer sends it; messages in `wanted` are decoded and passed
-    on. `check` None: its frames need no signature."""
+    on. `check` None: its frames need no signature. `kept`: when each was received, by its sequence
+    number and checksum. `next_copy`: the number after the last late copy."""
 
-    __slots__ = ("address", "check", "wanted")
+    __slots__ = ("_copied_s", "address", "check", "kept", "next_copy", "wanted")
 
     def __init__(
         self, address: Address, sequence: int, now_s: float, check: SignatureCheck | None = None
@@ -64,6 +75,42 @@ class Sender(Reception):
         self.address = address
         self.check = check
         self.wanted: WantedById = NOTHING
+        self.kept: dict[int, float] = {}
+        self.next_copy = -1
+        self._copied_s = -math.inf
+
+    def is_copy(self, sequence: int, key: int, now_s: float) -> bool:
+        """Whether a frame that is out of sequence, or follows a copy, was received before, or comes
+        over a second way on which frames come late. It is counted."""
+        late_s = now_s - self.kept.get(key, -math.inf)
+        ahead = (sequence - self.expected) & 255
+        if late_s <= KEPT_S:
+            if ahead in (0, 255) and (
+                sequence != self.next_copy or now_s - self._copied_s > RESTART_S
+            ):
+                return False  # the same after 256 others; a sender that numbers none of its frames
+            follows = late_s >= LATE_S
+        else:
+            follows = (
+                (sequence - self.next_copy) & 255 < LATE_FRAMES <= ahead
+                and now_s - self._copied_s <= LATE_S
+                and now_s - self.received_s < RESTART_S
+            )
+            if not follows:
+                return False
+        if follows:
+            self.next_copy, self._copied_s = (sequence + 1) & 255, now_s
+        self.doubled += 1
+        return True
+
+    def keep(self, key: int, now_s: float) -> None:
+        """Note a frame as received."""
+        kept = self.kept
+        if len(kept) >= MOST_KEPT:
+            newest = list(kept.items())[MOST_KEPT // 2 :]
+            self.kept = kept = {each: at_s for each, at_s in newest if now_s - at_s <= KEPT_S}
+        kept.pop(key, None)  # the dictionary is in the order of the times
+        kept[key] = now_s
 
 
 AdmitSender: TypeAlias = Callable[[Sender], bool]
@@ -101,6 +148,11 @@ class Inbound:
         self.junk_bytes = 0
         self.greeting: Signing | None = None
 
+    @property
+    def is_waiting(self) -> bool:
+        """Whether the begin of a frame was received, and its end was not."""
+        return bool(self._rest)
+
     def datagram(self, data: bytes, now_s: float) -> None:
         """Receive a datagram."""
         size = len(data)
@@ -113,7 +165,8 @@ class Inbound:
                 sender = self.senders.get(source)
                 if sender is None or (not flags and sender.check is not None):
                     signed = data if flags else b""
-                    frame = Frame(sequence, source, id_, data[10 : end - 2], False, signed)
+                    payload, checksum = data[10 : end - 2], data[end - 2 : end]
+                    frame = Frame(sequence, source, id_, payload, False, signed, checksum)
                     self._frame(frame, data[:end], now_s)
                     return
                 check = sender.check
@@ -124,20 +177,22 @@ class Inbound:
                     sum_ = mcrf4xx(EXTRA[id_], mcrf4xx(data[1 : end - 2], CRC_START))
                     if data[end - 2] != sum_ & 255 or data[end - 1] != sum_ >> 8:
                         return
-                if sequence == sender.expected & 255:
+                key = sequence | data[end - 2] << 8 | data[end - 1] << 16
+                if sequence == sender.expected & 255 and sequence != sender.next_copy:
                     sender.expected += 1
+                elif sender.is_copy(sequence, key, now_s):
+                    return
                 else:
-                    sender.astray(sequence, now_s)
+                    sender.count(sequence, now_s)
                 sender.received_s = now_s
+                if sender.wanted:
+                    sender.keep(key, now_s)
                 if wanted is not None:
                     self._hand_over(wanted, data[10 : end - 2], sender.address)
                 return
         frames = clean(data)
-        if frames is None:
-            found, junk, _ = scan(data)
-            self.junk_bytes += junk
-            for frame in found:
-                self._frame(frame, b"", now_s)
+        if frames is None:  # radios and bridges cut frames at the border of a datagram
+            self.stream(data, now_s)
             return
         for each in frames:
             header = read(each)
@@ -160,7 +215,7 @@ class Inbound:
 
     def _frame(self, frame: Frame, raw: bytes, now_s: float) -> None:
         """Process a frame. `raw`: its bytes without a signature, if it has not been checked."""
-        sequence, source, id_, payload, checked, _ = frame
+        sequence, source, id_, payload, checked, _, checksum = frame
         sender = self.senders.get(source)
         check = self._check_of(source) if sender is None else sender.check
         if sender is None or check is not None:
@@ -183,7 +238,13 @@ class Inbound:
         wanted = sender.wanted.get(id_)
         if wanted is not None and not checked and not right(raw, id_):
             return
+        key = sequence | checksum[0] << 8 | checksum[1] << 16
+        in_order = sequence == sender.expected & 255 and sequence != sender.next_copy
+        if not in_order and sender.is_copy(sequence, key, now_s):
+            return
         sender.count(sequence, now_s)
+        if sender.wanted:
+            sender.keep(key, now_s)
         if wanted is not None:
             self._hand_over(wanted, payload, sender.address)
 

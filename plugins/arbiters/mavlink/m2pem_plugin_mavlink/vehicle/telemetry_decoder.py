@@ -15,6 +15,10 @@ BOOT_TIME_BACK_MS = 10_000
 """Messages overtake each other by less than this, also in simulated time that passes ten times as
 fast. No autopilot is ready so soon after it was switched on."""
 
+FASTEST = 10.0
+"""An autopilot has not restarted if its clock runs for longer than this many times the time since
+its last message, and `BOOT_TIME_BACK_MS`: that message is late."""
+
 STANDS_BELOW_M, STANDS_BELOW_M_S = 0.5, 0.3
 
 _UNKNOWN_UINT16 = 0xFFFF
@@ -80,11 +84,16 @@ class TelemetryDecoder:
         return frozenset(self._takers)
 
     def take(self, message: Message, now_s: float) -> None:
-        """Decode a message."""
+        """Decode a message, unless it is late."""
         state = self.state
         id_ = message.TYPE.id
         if state.boot_s is None:
             self._booted(now_s)
+        if (boot_ms := getattr(message, "time_boot_ms", None)) is not None:
+            if self._is_late(boot_ms, now_s):
+                return
+            self._boot_ms = max(boot_ms, self._boot_ms)
+            state.clock_s = now_s
         state.at_s = state.messages_s[id_] = now_s
         self._takers[id_](message)
         if id_ == dialect.MAVLINK_MSG_ID_HEARTBEAT:
@@ -101,12 +110,16 @@ class TelemetryDecoder:
         self.state.boots += 1
         self._boot_ms = 0
 
-    def _clock(self, message: Any) -> None:
-        boot_ms: int = message.time_boot_ms
-        if boot_ms + BOOT_TIME_BACK_MS < self._boot_ms and self.state.at_s is not None:
-            self._booted(self.state.at_s)
-        self.state.clock_s = self.state.at_s
-        self._boot_ms = max(boot_ms, self._boot_ms)
+    def _is_late(self, boot_ms: int, now_s: float) -> bool:
+        """Whether a message was made long before others that came. A clock that has gone back as it
+        does by a restart is that of another boot."""
+        if boot_ms + BOOT_TIME_BACK_MS >= self._boot_ms:
+            return False
+        since_s = now_s - (now_s if self.state.clock_s is None else self.state.clock_s)
+        if boot_ms > FASTEST * since_s * 1e3 + BOOT_TIME_BACK_MS:
+            return True
+        self._booted(now_s)
+        return False
 
     def _heartbeat(self, message: Any) -> None:
         self.state.custom_mode = message.custom_mode
@@ -130,7 +143,6 @@ class TelemetryDecoder:
         self.state.gps_fix = message.fix_type
 
     def _attitude(self, message: Any) -> None:
-        self._clock(message)
         if all(map(math.isfinite, (message.roll, message.pitch, message.yaw))):
             state = self.state
             # NED to ENU turns the axes of the body from forward-right-down to forward-left-up.
@@ -138,13 +150,11 @@ class TelemetryDecoder:
             state.yaw_rad = enu_yaw(message.yaw)
 
     def _local_position(self, message: Any) -> None:
-        self._clock(message)
         north, east, down = message.vx, message.vy, message.vz
         if all(map(math.isfinite, (north, east, down))):
             self.state.velocity_enu_m_s = (east, north, -down)
 
     def _global_position(self, message: Any) -> None:
-        self._clock(message)
         state = self.state
         position = _place(message.lat, message.lon, message.alt)
         if position is None:
