@@ -1,5 +1,6 @@
 """Opens the journal that a command names, and finds runs in it."""
 
+import os
 import shutil
 import tempfile
 from collections.abc import AsyncIterator, Mapping, Sequence
@@ -77,7 +78,8 @@ async def _copy_of(path: Path, why: JournalError) -> AsyncIterator[Journal]:
             ) from error
         try:
             async with journal_at(str(copy)) as journal:
-                click.echo(f"m2pem: {why}; a copy of it is read", err=True)
+                unknown = "" if _has_locks(path) else "; whether a run is driven is not known"
+                click.echo(f"m2pem: {why}; a copy of it is read{unknown}", err=True)
                 yield journal
         except JournalError as error:
             raise JournalError(str(error).replace(str(copy), str(path))) from error
@@ -90,8 +92,14 @@ def _copied(path: Path, folder: Path) -> Path:
         beside = path.with_name(path.name + what)
         if beside.exists():
             shutil.copyfile(beside, copy.with_name(copy.name + what))
-    copy.with_name(f"{copy.name}-lock").symlink_to(f"{path}-lock")
+    if _has_locks(path):
+        copy.with_name(f"{copy.name}-lock").symlink_to(f"{path}-lock")
     return copy
+
+
+def _has_locks(path: Path) -> bool:
+    """Whether the locks of a journal can be asked: its file of them must be open for writing."""
+    return os.access(f"{path}-lock", os.W_OK)
 
 
 @asynccontextmanager

@@ -11,6 +11,7 @@ from pydantic import ValidationError
 
 from m2pem.errors import FleetError
 from m2pem.findings import Finding, Severity
+from m2pem.fleet.approval import person_of
 from m2pem.fleet.fleet import (
     Domain,
     Fleet,
@@ -187,6 +188,17 @@ def _check_roles(source: YamlSource) -> None:
             hint = suggest(role, operators, "roles")
             message = f"'operators' names no operator with the role '{role}'"
             source.error(path, "no-operator", message, hint)
+    asked, role = (source.mapping("approval").get(each) for each in ("persons", "role"))
+    listed = operators.values() if role is None else [operators.get(role)]
+    names = [name for each in listed if isinstance(each, list) for name in each]
+    persons = {person_of(name) for name in names if isinstance(name, str)}
+    if isinstance(asked, int) and 0 < len(persons) < asked:
+        message = (
+            f"{asked} persons must approve, and 'operators' names {', '.join(map(str, names))}"
+        )
+        same = ", some of whom are the same person" if len(persons) < len(names) else ""
+        remedy = f"name {asked - len(persons)} more, or ask for fewer"
+        source.error(("approval", "persons"), "approval-persons", f"{message}{same}", remedy)
 
 
 def _check_videos(source: YamlSource) -> None:

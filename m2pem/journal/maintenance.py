@@ -7,13 +7,13 @@ in the copy, or was lost before.
 import os
 import sqlite3
 from collections.abc import Callable
-from contextlib import closing
+from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
 from m2pem.errors import JournalError
-from m2pem.journal.database import explained, open_for_reading, open_for_writing
+from m2pem.journal.database import explained, open_for_writing, open_unchanged
 from m2pem.journal.marks import beside, identity_in
 from m2pem.journal.migrations import MIGRATIONS, check
 from m2pem.units import US_PER_S
@@ -45,7 +45,11 @@ def file_info(path: Path) -> FileInfo:
     Raises:
         JournalError: it cannot be read, or is not a journal.
     """
-    with explained(path), closing(open_for_reading(path)) as connection:
+    with (
+        explained(path),
+        ExitStack() as stack,
+        closing(open_unchanged(path, stack)) as connection,
+    ):
         check(connection, path)
         version, free_pages, page_size = (
             connection.execute(f"PRAGMA {name}").fetchone()[0]
@@ -118,7 +122,11 @@ def back_up(path: Path, copy: Path, progress: Callable[[int, int], None]) -> Non
 
 
 def _copy_tables(path: Path, copy: Path, progress: Callable[[int, int], None]) -> None:
-    with closing(open_for_reading(path)) as source, closing(sqlite3.connect(copy)) as target:
+    with (
+        ExitStack() as stack,
+        closing(open_unchanged(path, stack)) as source,
+        closing(sqlite3.connect(copy)) as target,
+    ):
         check(source, path)
         # One reading transaction: SQLite would begin again after each commit of an executive.
         source.execute("BEGIN")

@@ -25,6 +25,10 @@ DRIVE = mission(
 )
 """A drive of some 80 m, in which a timer has more written than a small disk takes."""
 
+QUICK = (
+    '<process id="P" isExecutable="true"><startEvent id="S"/><endEvent id="E"/>'
+    f"{flow('S', 'E')}</process>"
+)
 WITHIN_S = 60.0
 
 
@@ -113,3 +117,31 @@ def test_a_stop_of_a_service_on_a_full_disk_reaches_its_vehicles_and_the_run_sta
     again.send(signal.SIGTERM)
     assert again.rest()[0] == 0
     assert [effect.kind for effect in recorded_effects(state)].count(EffectKind.START) == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (("runs", "--journal", "{}"), "r1   completed"),
+        (("replay", "r1", "--journal", "{}"), "r1 completed"),
+        (("schedule", "--journal", "{}"), "nothing is scheduled"),
+        (("journal", "info", "{}"), "all entries are there and unchanged"),
+        (("journal", "backup", "{}", "--to", "copy.db"), "copy.db"),
+    ],
+)
+def test_a_journal_on_a_read_only_file_system_is_read(
+    m2pem: CommandLine, tmp_path: Path, small_disk: SmallDisk, words: tuple[str, ...], says: str
+) -> None:
+    assert small_disk.mount("16m", "remount")
+    (tmp_path / "quick.bpmn").write_bytes(mission(QUICK))
+    fleet, _ = fleet_with_state(tmp_path)
+    journal = small_disk.folder / "journal.db"
+    run = ("run", "quick.bpmn", "--fleet", fleet, "--ocu", "none", "--journal", journal)
+    status, _, errors = m2pem.run(*run, M2PEM_MIN_FREE_MB="0")
+    assert status == 0, errors
+    assert small_disk.mount("16m", "remount", "ro")
+    status, printed, errors = m2pem.run(*(word.format(journal) for word in words))
+    assert (status, says in printed) == (0, True), errors
+    assert "backup" in words or "a copy of it is read" in errors
+    status, _, errors = m2pem.run("journal", "backup", journal)
+    assert (status, "Read-only file system" in errors) == (1, True), errors

@@ -87,3 +87,31 @@ def test_a_role_of_the_fleet_file_that_nobody_has_is_a_finding(tmp_path: Path) -
     (finding,) = refused.value.findings
     assert (finding.line, finding.element) == (3, "incident_role")
     assert "did you mean 'pilot'?" in finding.remedy
+
+
+@pytest.mark.parametrize(
+    ("operators", "approval", "says"),
+    [
+        ("{reviewer: [anna, ben]}", "{persons: 5, role: reviewer}", "names anna, ben"),
+        (
+            "{reviewer: [anna, Anna@gcs1]}",
+            "{persons: 2, role: reviewer}",
+            "names anna, Anna@gcs1, some of whom are the same person",
+        ),
+        ("{reviewer: [anna], pilot: [otto]}", "{persons: 3}", "names anna, otto"),
+        ("{reviewer: [anna], pilot: [otto]}", "{persons: 2}", ""),
+    ],
+)
+def test_an_approval_that_no_operators_can_give_is_named(
+    tmp_path: Path, operators: str, approval: str, says: str
+) -> None:
+    file = tmp_path / "fleet.yaml"
+    file.write_text(f"{VEHICLES}operators: {operators}\napproval: {approval}\n")
+    if not says:
+        assert load_fleet(file).approval_persons == 2
+        return
+    with pytest.raises(FleetError) as raised:
+        load_fleet(file)
+    (finding,) = raised.value.findings
+    assert (finding.rule, finding.line) == ("approval-persons", 4)
+    assert says in finding.message

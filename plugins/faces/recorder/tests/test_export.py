@@ -206,7 +206,8 @@ def test_parquet_has_the_same_rows_with_types(folder: Path) -> None:
 
 def test_telemetry_that_was_not_recorded_is_said_to_be_missing(folder: Path) -> None:
     printed = export(folder, "r4", "--to", "csv", "--table", "telemetry")
-    assert "m2pem: r4: there is no recording, so there is no telemetry" in printed
+    where = f"r4: there is no recording in {folder / 'journal.db-recordings'} (--recordings names"
+    assert f"m2pem: {where} another folder); there is no telemetry" in printed
 
 
 def test_tracks_of_the_web_page_stand_in_for_a_recording(folder: Path, tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from m2pem.errors import PluginError
 from m2pem_plugin_recorder.channels import PICTURES, PROMPTS, RECORDS
 from m2pem_plugin_recorder.diagrams import diagram_of
 from m2pem_plugin_recorder.export.places import geometries_of
-from m2pem_plugin_recorder.export.states import files_of
+from m2pem_plugin_recorder.export.states import files_of, no_recording
 from m2pem_plugin_recorder.fleets import fleet_json
 from m2pem_plugin_recorder.foxglove_messages import scene_messages
 from m2pem_plugin_recorder.reading import messages_of
@@ -56,7 +56,8 @@ class McapExporter:
             for found in encoder.messages(StampedRecord(summary.run, seq, t_s, record)):
                 file.write(found)
         if not paths:
-            self._remarks.append(f"{summary.run}: there is no recording; telemetry is left out")
+            missing = no_recording(run, self._options.recordings)
+            self._remarks.append(f"{missing}; telemetry is left out")
             if fleet is not None:
                 frame = LocalFrame(fleet.origin)
                 for found in scene_messages(

@@ -44,6 +44,15 @@ def files_of(run: ExportedRun, folder: Path | None) -> list[Path]:
     return [each.path for each in recording_files(folder, stem)]
 
 
+def no_recording(run: ExportedRun, folder: Path | None) -> str:
+    """Say that a run has no recording, and where it was looked for."""
+    if folder is None and run.journal is not None:
+        where = f" in {folder_beside(run.journal)} (--recordings names another folder)"
+    else:
+        where = "" if folder is None else f" in {folder}"
+    return f"{run.summary.run}: there is no recording{where}"
+
+
 class States:
     """The states of runs; `remarks` says where they come from, if not from a recording."""
 
@@ -57,7 +66,6 @@ class States:
         Raises:
             OSError: a file cannot be read.
         """
-        name = run.summary.run
         files = files_of(run, self._folder)
         if files:
             yield from telemetry_of(files)
@@ -66,12 +74,12 @@ class States:
         for state in _tracked(run):
             found = True
             yield state
-        self.remarks.append(
-            f"{name}: there is no recording; positions are those that the web page kept"
+        rest = (
+            "positions are those that the web page kept"
             if found
-            else f"{name}: there is no recording, so there is no telemetry "
-            "(the face `recorder` makes recordings)"
+            else "there is no telemetry (the face `recorder` makes recordings)"
         )
+        self.remarks.append(f"{no_recording(run, self._folder)}; {rest}")
 
 
 def _tracked(run: ExportedRun) -> Iterator[Telemetry]:
