@@ -26,7 +26,9 @@ TYPES = {"air": "a-f-A-M-H-Q", "ground": "a-f-G-E-V", "surface": "a-f-S-C-U", "s
 """By the domain of a vehicle, friendly: an unmanned rotary-wing aircraft, a ground vehicle, an
 unmanned surface vehicle, something under water."""
 SPOT, ROUTE, SHAPE, WAYPOINT = "b-m-p-s-m", "b-m-r", "u-d-f", "b-m-p-w"
+CONTACT, CHAT = "a-f-G-U-C", "b-t-f"
 DELETION = "t-x-d-d"
+CHAT_STALE_S = 86_400.0
 LATEST_US = 4_102_444_800 * US_PER_S
 """A device whose clock is wrong must not end the face: no calendar has all of its times."""
 MACHINE, ENTERED = "m-g", "h-e"
@@ -94,6 +96,57 @@ def deletion_event(uid: str, now_us: int) -> bytes:
     return etree.tostring(event)
 
 
+def contact_event(
+    uid: str,
+    callsign: str,
+    team: str,
+    software: tuple[str, str, str, str],
+    at: tuple[float, float, float],
+    now_us: int,
+    stale_s: float,
+) -> bytes:
+    """Return the event of a contact. `software`: its name, version, system and device. `at`: its
+    latitude, longitude and altitude above mean sea level."""
+    event, detail = _event(uid, CONTACT, ENTERED, now_us, stale_s, _placed(*at))
+    platform, version, system, device = software
+    _add(detail, "takv", platform=platform, version=version, os=system, device=device)
+    # The address by which a server sends to it over its connection.
+    _add(detail, "contact", callsign=callsign, endpoint="*:-1:stcp")
+    _add(detail, "uid", Droid=callsign)
+    _add(detail, "__group", name=team, role="HQ")
+    return etree.tostring(event)
+
+
+def chat_event(
+    uid: str, callsign: str, to: tuple[str, str], number: int, text: str, now_us: int
+) -> bytes:
+    """Return a message of chat. `uid`, `callsign`: who sends it; `to`: those of the contact, or
+    twice the name of the room, to whom."""
+    to_uid, to_callsign = to
+    message = f"{uid}.{now_us}.{number}"
+    nowhere = (0.0, 0.0, None)
+    event, detail = _event(
+        f"GeoChat.{uid}.{to_uid}.{message}", CHAT, "h-g-i-g-o", now_us, CHAT_STALE_S, nowhere
+    )
+    chat = _add(
+        detail,
+        "__chat",
+        parent="RootContactGroup",
+        groupOwner="false",
+        messageId=message,
+        chatroom=_printable(to_callsign),
+        id=_printable(to_uid),
+        senderCallsign=callsign,
+    )
+    _add(chat, "chatgrp", uid0=uid, uid1=_printable(to_uid), id=_printable(to_uid))
+    _add(detail, "link", uid=uid, type=CONTACT, relation="p-p")
+    remarks = {"source": f"BAO.F.ATAK.{uid}", "to": _printable(to_uid), "time": _written(now_us)}
+    _add(detail, "remarks", **remarks).text = _printable(text)
+    if to_uid != to_callsign:
+        _add(_add(detail, "marti"), "dest", callsign=_printable(to_callsign))
+    return etree.tostring(event)
+
+
 def _shape(
     uid: str,
     type_: str,
@@ -153,8 +206,8 @@ def _event(
     return event, _add(event, "detail")
 
 
-def _add(parent: etree._Element, name: str, **attributes: str) -> etree._Element:
-    return etree.SubElement(parent, name, attributes)
+def _add(parent: etree._Element, tag: str, /, **attributes: str) -> etree._Element:
+    return etree.SubElement(parent, tag, attributes)
 
 
 def _course(degrees: float) -> str:

@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+import time
 from collections.abc import Mapping
 from typing import ClassVar
 
@@ -21,6 +22,7 @@ from m2pem.api import (
     shown_geometries,
 )
 from m2pem.errors import M2pemError
+from m2pem_plugin_cot.contact import CONTACT_EVERY_S, Chat, Contact
 from m2pem_plugin_cot.events import (
     TYPES,
     deletion_event,
@@ -44,6 +46,8 @@ MAX_WAITING = 100
 RECEIVED_PER_S = 20
 CHANGES_EVERY_S = 1.0
 SAY_EVERY_S = 60.0
+FROM_MAP = "cot "
+"""How names begin of those who have handed over what a map has sent."""
 
 
 class CotFace:
@@ -63,6 +67,10 @@ class CotFace:
         """What becomes of a geometry, by its name: the newest event."""
         self._given: dict[str, Point | Route | Area] = {}
         self._refused: dict[str, int] = {}
+        self._contact = contact = self._settings.contact
+        self._chat: Chat | None = None
+        if contact is not None and contact.chat:
+            self._chat = Chat(control, contact, self._link.send, self._now_us)
 
     async def serve(self) -> None:
         """Send and receive until cancelled.
@@ -71,7 +79,11 @@ class CotFace:
             PluginError: an address of this host cannot be used.
         """
         works = [self._link.run(), self._follow(), self._send(), self._send_geometries()]
-        if self._settings.receive:
+        if self._contact is not None:
+            works.append(self._introduce(self._contact))
+        if self._chat is not None:
+            works.append(self._chat.follow())
+        if self._settings.receive or self._chat is not None:
             works += [self._take_in(), self._change()]
         works.append(self._say())
         tasks = [asyncio.create_task(work) for work in works]
@@ -96,6 +108,18 @@ class CotFace:
                     number += 1
                     uid = self._uid("detection", f"{found.source}.{found.time_us}.{number}")
                     self._link.send(detection_event(uid, found, GEOMETRY_STALE_S))
+
+    async def _introduce(self, contact: Contact) -> None:
+        """Send the contact now and then, and what is asked to a server that is new."""
+        connections = 0
+        while True:
+            if self._link.is_open:
+                self._link.send(contact.event(self._fleet.origin, self._now_us()))
+            if self._link.connections != connections:
+                if self._chat is not None:
+                    self._chat.repeat()
+                connections = self._link.connections
+            await self._link.until_connected(CONTACT_EVERY_S)
 
     async def _send(self) -> None:
         """Send the vehicles that were received since the last time; others become stale."""
@@ -132,10 +156,10 @@ class CotFace:
         gone: dict[str, int] = {}
         left_s = 0.0
         while True:
-            geometries = shown_geometries(self._control)
+            geometries = self._own_geometries()
             again = left_s <= 0
-            now_us = max((state.time_us for state in self._states.values()), default=0)
-            if now_us:  # the clock of the executive, which may be faster than that of the wall
+            now_us = self._now_us()
+            if self._states:
                 for name, geometry in geometries.items():
                     if again or sent.get(name) != geometry:
                         uid = self._uid("geometry", name)
@@ -150,11 +174,26 @@ class CotFace:
             await asyncio.sleep(self._settings.period_s)
             left_s -= self._settings.period_s
 
+    def _own_geometries(self) -> dict[str, Point | Route | Area]:
+        """Return what is shown, without what came from a map: it is there already."""
+        given = self._control.geometries()
+        return {
+            name: geometry
+            for name, geometry in shown_geometries(self._control).items()
+            if name not in given or not given[name].by.startswith(FROM_MAP)
+        }
+
+    def _now_us(self) -> int:
+        """Return the time of the executive's clock, which may be faster than that of the wall."""
+        return max(
+            (state.time_us for state in self._states.values()), default=time.time_ns() // 1000
+        )
+
     # --- in -------------------------------------------------------------------------------------
 
     def _received(self, content: bytes, source: str) -> None:
         """Let an event wait; drop it if too many do. It never blocks."""
-        if not self._settings.receive:
+        if not (self._settings.receive or self._chat is not None):
             return
         if self._waiting.full():
             self._refuse("too many at once")
@@ -169,7 +208,14 @@ class CotFace:
             except EventError as error:
                 self._refuse(f"{source.rpartition(':')[0]}: {error}")
                 received = None
-            if received is not None and not received.uid.startswith(self._uid("", "")):
+            if received is None or received.uid.startswith(self._uid("", "")):
+                pass
+            elif received.to and not (self._contact and self._contact.is_meant(received)):
+                pass  # it is for others
+            elif received.geometry is None:
+                if self._chat is not None:
+                    await self._chat.take(received, source)
+            elif self._settings.receive:
                 if received.name in self._fleet.handed_over:
                     self._next[received.name] = received, source
                 else:
@@ -185,16 +231,17 @@ class CotFace:
             await asyncio.sleep(CHANGES_EVERY_S)
 
     async def _hand_over(self, name: str, received: Received, source: str) -> None:
-        if self._given.get(name) == received.geometry:
+        drawn = received.geometry
+        if drawn is None or self._given.get(name) == drawn:
             return
-        by = f"cot {received.uid} at {source}"
-        geometry: dict[str, Value] = as_geojson(received.geometry)
+        by = f"{FROM_MAP}{received.uid} at {source}"
+        geometry: dict[str, Value] = as_geojson(drawn)
         try:
             await self._control.set_geometry(name, geometry, by=by)
         except M2pemError as error:
             self._refuse(str(error))
         else:
-            self._given[name] = received.geometry
+            self._given[name] = drawn
             log.warning("%s was handed over by %s", name, by)
 
     def _refuse(self, why: str) -> None:

@@ -22,9 +22,11 @@ MAX_TAK_BYTES = MAX_EVENT_BYTES - 16
 
 MAX_CORNERS = 1000
 MAX_NAME = 100
+MAX_CHAT = 500
 END = b"</event>"
 TAK_MAGIC = b"\xbf"
 TAK_HEADER = b"\xbf\x01\xbf"
+_NAMES = ("callsign", "uid")
 _TAK_IN_STREAM = re.compile(rb"\s*\xbf([\x80-\xff]{0,3}[\x00-\x7f])")
 """Magic byte and length, a varint; perhaps after the end of a line."""
 
@@ -35,15 +37,19 @@ class EventError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Received:
-    """A marker, route or shape. `name`: its callsign on the map. `uid`: of the event."""
+    """A marker, route or shape; or, with `text`, a message of chat. `name`: its callsign on the
+    map, or that of the sender; `uid`: of the event, or of the sender. `to`: the callsigns or uids
+    of those to whom it is sent; empty: to all."""
 
     uid: str
     name: str
-    geometry: Point | Route | Area
+    geometry: Point | Route | Area | None
+    text: str = ""
+    to: tuple[str, ...] = ()
 
 
 def read_event(content: bytes) -> Received | None:
-    """Return what an event draws; None if it draws nothing, such as the position of a person.
+    """Return what an event draws or says; None if it does neither, as the position of a person.
 
     Raises:
         EventError: it is too long, neither XML nor of the TAK protocol, or its positions make no
@@ -69,8 +75,22 @@ def read_event(content: bytes) -> Received | None:
     type_, uid = event.get("type", ""), printable(event.get("uid", ""))
     contact = event.find("detail/contact")
     name = "" if contact is None else contact.get("callsign", "")[:MAX_NAME]
+    sent_to = [dest.get(key) for dest in event.findall("detail/marti/dest") for key in _NAMES]
+    to = tuple(each for each in sent_to if each)
+    if type_ == "b-t-f":
+        return _chat(event)
     geometry = _geometry(type_, event)
-    return None if geometry is None else Received(uid, name, geometry)
+    return None if geometry is None else Received(uid, name, geometry, to=to)
+
+
+def _chat(event: etree._Element) -> Received | None:
+    """Return a message to one contact; None for one to a room or a team."""
+    chat, link = event.find("detail/__chat"), event.find("detail/link")
+    text = (event.findtext("detail/remarks") or "")[:MAX_CHAT]
+    if chat is None or link is None or not text.strip():
+        raise EventError("chat without its sender or a text")
+    name, uid = printable(chat.get("senderCallsign", "")), printable(link.get("uid", ""))
+    return Received(uid, name, None, text, (chat.get("id", ""),))
 
 
 def _xml_of_tak(content: bytes) -> bytes:

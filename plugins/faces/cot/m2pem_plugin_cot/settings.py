@@ -9,9 +9,18 @@ from urllib.parse import urlsplit
 
 from m2pem.api import Dimension, FaceSettings, Fleet
 from m2pem.errors import PluginError
+from m2pem_plugin_cot.contact import Contact
+from m2pem_plugin_cot.received import MAX_NAME
 
 SCHEMES = ("udp", "tcp", "tls")
-KNOWN = ("url", "listen", "interface", "rate", "stale", "types", "receive", "tls")
+KNOWN = (
+    *("url", "listen", "interface", "rate", "stale", "types", "receive", "tls"),
+    *("callsign", "team", "chat"),
+)
+TEAMS = (
+    *("White", "Yellow", "Orange", "Magenta", "Red", "Maroon", "Purple", "Dark Blue", "Blue"),
+    *("Cyan", "Teal", "Green", "Dark Green", "Brown"),
+)
 TYPE = re.compile(r"[a-z](-[A-Za-z0-9.]+)+")
 
 
@@ -33,6 +42,7 @@ class Settings:
     from which they come. `interface`: of multicast, an address of this host. `period_s`: between
     two events of a vehicle. `stale_s`: for how long an event is valid. `types`: of Cursor on Target
     by vehicle, where they are not those of its domain. `receive`: whether events become geometries.
+    `contact`: as which m2pem is known; None: as none.
     """
 
     url: Address
@@ -43,6 +53,7 @@ class Settings:
     receive: bool
     types: dict[str, str] = field(default_factory=dict)
     tls: ssl.SSLContext | None = None
+    contact: Contact | None = None
 
 
 def read_settings(given: FaceSettings, fleet: Fleet) -> Settings:
@@ -78,7 +89,22 @@ def read_settings(given: FaceSettings, fleet: Fleet) -> Settings:
         receive,
         _types(given, fleet),
         _tls(given, fleet) if url.scheme == "tls" else None,
+        _contact(given, fleet, url),
     )
+
+
+def _contact(given: FaceSettings, fleet: Fleet, url: Address) -> Contact | None:
+    callsign, chat = given.text("callsign", ""), given.flag("chat", False)
+    team = given.text("team", "Cyan")
+    if team not in TEAMS:
+        raise given.error("team", f"{team!r} is no team of TAK: {', '.join(TEAMS)}")
+    if chat and not callsign:
+        raise given.error("chat", "it needs a `callsign`: answers are sent to a contact")
+    if chat and url.scheme != "tls":
+        raise given.error("chat", "it needs a tls:// url: over UDP and TCP anyone could answer")
+    if callsign and not (callsign.isprintable() and len(callsign) <= MAX_NAME):
+        raise given.error("callsign", f"{callsign!r} is no callsign: at most {MAX_NAME} characters")
+    return Contact(f"m2pem.{fleet.name}.contact", callsign, team, chat) if callsign else None
 
 
 def _address(given: FaceSettings, key: str, schemes: tuple[str, ...]) -> Address | None:
