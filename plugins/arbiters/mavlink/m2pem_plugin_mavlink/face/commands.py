@@ -232,15 +232,6 @@ def _of_mode(mode: modes.Mode, vehicle: ShownVehicle) -> Order:
     return Order(vehicle.resource, mode.behavior)
 
 
-def _arm(command: Command, vehicle: ShownVehicle) -> None:
-    arms = command.params[0] == 1
-    if arms == vehicle.armed:
-        return
-    if arms:
-        raise RefusedCommandError("m2pem arms it when it sets out: send a takeoff or a target")
-    raise RefusedCommandError("m2pem does not disarm: send a landing or a hold")
-
-
 def _gimbal_of(vehicle: ShownVehicle, device: float) -> Camera:
     gimbals = [each for each in vehicle.cameras if each.gimbal_device]
     wanted = int(device) if math.isfinite(device) else 0
@@ -313,7 +304,6 @@ _READ: Mapping[int, Read] = {
     dialect.MAV_CMD_NAV_LOITER_UNLIM: _loiter,
     dialect.MAV_CMD_DO_SET_MODE: _set_mode,
     262: _set_standard_mode,  # MAV_CMD_DO_SET_STANDARD_MODE
-    dialect.MAV_CMD_COMPONENT_ARM_DISARM: _arm,
     dialect.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW: _pitch_yaw,
     dialect.MAV_CMD_DO_SET_ROI_LOCATION: _roi,
 }

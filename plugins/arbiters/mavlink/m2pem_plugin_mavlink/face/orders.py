@@ -9,6 +9,7 @@ import asyncio
 from collections import OrderedDict
 from collections.abc import Callable, Collection, Coroutine
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -31,6 +32,12 @@ from m2pem_plugin_mavlink.protocol.messages import Address, message_type
 FAILED: int = dialect.MAV_RESULT_FAILED
 IN_PROGRESS: int = dialect.MAV_RESULT_IN_PROGRESS
 CONFIGURE_GIMBAL: int = dialect.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE
+ARM: int = dialect.MAV_CMD_COMPONENT_ARM_DISARM
+ARMED_S = 10.0
+"""An armed vehicle waits so long for what follows, as autopilots do (PX4: COM_DISARM_PRFLT,
+ArduCopter: DISARM_DELAY)."""
+
+SETTING_OUT = frozenset({"goto", "takeoff", "single_vehicle_routing"})
 
 PROGRESS_EVERY_S = 0.5
 REPEATED_S = 3.0
@@ -189,6 +196,8 @@ class Orders:
             for each in vehicle.cameras:
                 each.controller = request.source
             return None
+        if command.id == ARM and request.camera is None:
+            return self._arm(pending)
         order = order_of(command, vehicle, request.camera)
         if order is None:
             return None
@@ -243,14 +252,59 @@ class Orders:
         else:
             self._end(pending, ACCEPTED)
 
+    def _arm(self, pending: _Pending) -> Coroutine[Any, Any, None] | None:
+        vehicle, arms = pending.request.vehicle, pending.command.params[0] == 1
+        if arms:
+            return None if vehicle.armed else self._await_departure(pending)
+        if vehicle.arm_requested and not vehicle.behavior and not vehicle.airborne:
+            vehicle.arm_requested = False
+        elif vehicle.armed:
+            raise RefusedCommandError("m2pem does not disarm: send a landing or a hold")
+        return None
+
+    async def _await_departure(self, pending: _Pending) -> None:
+        """Accept ARM if the vehicle could set out now. m2pem arms it when it does."""
+        vehicle = pending.request.vehicle
+        try:
+            reason = await self._why_it_stays(vehicle, pending.by)
+        except M2pemError as error:
+            reason = str(error)
+        if reason:
+            self._refuse(pending, RefusedCommandError(reason, REJECTED))
+            return
+        vehicle.arm_requested = True
+        self._end(pending, ACCEPTED)
+        tell = partial(self._say, pending.request.station, vehicle)
+        if vehicle.arms_itself:
+            tell("it arms when it sets out: send a takeoff, a target or a mission")
+        departed = False
+        end_s = self._now_s() + ARMED_S
+        while vehicle.arm_requested and not departed and (left_s := end_s - self._now_s()) > 0:
+            await asyncio.sleep(min(left_s, PROGRESS_EVERY_S))
+            departed = bool(vehicle.behavior)
+        if vehicle.arm_requested and not departed:
+            tell(f"disarmed: nothing followed within {ARMED_S:g} s")
+        vehicle.arm_requested = False
+
+    async def _why_it_stays(self, vehicle: ShownVehicle, by: str) -> str:
+        """Return why a vehicle could not set out for a station now; "": it could."""
+        if SETTING_OUT.isdisjoint(vehicle.behaviors):
+            return f"{vehicle.resource} has no behavior that moves it"
+        if vehicle.state is not None and vehicle.state.ready is False:
+            return ", ".join(vehicle.state.not_ready_reasons) or "it is not ready"
+        holder = (await self._control.holders()).get(vehicle.resource, "")
+        if holder == by:
+            return ""
+        if holder:
+            return f"{holder} has it"
+        return (await self._control.unavailable()).get(vehicle.resource, "")
+
     async def _carry_out(self, pending: _Pending, order: Order) -> None:
         executing = asyncio.ensure_future(self._execute(order, pending.by))
         try:
-            while True:
+            # Simple programs take the first acknowledgement for the last one.
+            while not (await asyncio.wait([executing], timeout=PROGRESS_EVERY_S))[0]:
                 pending.acknowledge(IN_PROGRESS)
-                done, _ = await asyncio.wait([executing], timeout=PROGRESS_EVERY_S)
-                if done:
-                    break
             result, reason = executing.result()
         except asyncio.CancelledError:
             executing.cancel()

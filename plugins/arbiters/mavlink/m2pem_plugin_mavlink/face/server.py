@@ -104,6 +104,7 @@ class FaceServer:
                 cameras_of(name, fleet, behaviors),
                 type=TYPES.get(fleet.vehicles[name].domain, dialect.MAV_TYPE_GENERIC),
                 fence=Connection.of(fleet, name).fence,
+                arms_itself=fleet.vehicles[name].arbiter == "mavlink",
             )
             for name, system in self._settings.systems.items()
             if name not in self._settings.forwarded

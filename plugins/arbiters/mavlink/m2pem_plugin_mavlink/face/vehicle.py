@@ -44,7 +44,8 @@ class ShownVehicle:
     """`behaviors`: the names of those that it has. `received_s`: the time of the last telemetry, by
     the clock of the event loop. `behavior`: the name of what it carries out, and `behavior_id`.
     `operator`: who has taken it. `home`: where it was first seen on the ground. `type`: MAV_TYPE.
-    `fence`: the fleet's."""
+    `fence`: the fleet's. `arms_itself`: it has motors that it arms, and says whether it did.
+    `arm_requested`: a station has armed it, and what it is to do has not come yet."""
 
     resource: ResourceId
     domain: str
@@ -60,6 +61,8 @@ class ShownVehicle:
     plan: Plan = field(default_factory=Plan)
     type: int = 0
     fence: Fence | None = None
+    arms_itself: bool = False
+    arm_requested: bool = False
 
     @property
     def autopilot(self) -> Address:
@@ -73,7 +76,10 @@ class ShownVehicle:
 
     @property
     def armed(self) -> bool:
-        """Whether it is armed; of vehicles that do not say: whether it carries something out."""
+        """Whether it is armed; of vehicles that do not say, or have nothing to arm: whether it
+        carries something out, or a station has armed it."""
+        if self.arm_requested and not self.arms_itself:
+            return True
         if self.state is None or self.state.armed is None:
             return bool(self.behavior)
         return self.state.armed
