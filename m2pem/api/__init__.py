@@ -180,6 +180,8 @@ if TYPE_CHECKING:
     from m2pem.api.telemetry import Telemetry as Telemetry
     from m2pem.api.telemetry import VehicleState as VehicleState
     from m2pem.bpmn import parse_mission as parse_mission
+    from m2pem.bpmn.one_task import TaskOf as TaskOf
+    from m2pem.bpmn.one_task import tasks_in_a_row as tasks_in_a_row
     from m2pem.engine.records import Record as Record
     from m2pem.findings import Finding as Finding
     from m2pem.findings import Severity as Severity
@@ -189,6 +191,8 @@ if TYPE_CHECKING:
     from m2pem.fleet.behaviors import SHARED as SHARED
     from m2pem.fleet.behaviors import takeoff_first as takeoff_first
     from m2pem.fleet.endurance import lasts_s as lasts_s
+    from m2pem.fleet.fence import own_areas as own_areas
+    from m2pem.fleet.fence import own_fences as own_fences
     from m2pem.fleet.fleet import Fleet as Fleet
     from m2pem.geo.cameras import KNOWN_CAMERAS as KNOWN_CAMERAS
     from m2pem.geo.cameras import ImagePlan as ImagePlan
@@ -212,6 +216,11 @@ if TYPE_CHECKING:
     from m2pem.geo.geometry_files import NamedGeometry as NamedGeometry
     from m2pem.geo.geometry_files import read_geometry_file as read_geometry_file
     from m2pem.geo.geometry_files import write_geometry_file as write_geometry_file
+    from m2pem.geo.geometry_files.mission_items import MissionItem as MissionItem
+    from m2pem.geo.geometry_files.mission_tasks import MissionTask as MissionTask
+    from m2pem.geo.geometry_files.mission_tasks import MissionTasks as MissionTasks
+    from m2pem.geo.geometry_files.mission_tasks import read_fence_items as read_fence_items
+    from m2pem.geo.geometry_files.mission_tasks import read_mission_tasks as read_mission_tasks
     from m2pem.geo.local_frame import EastNorth as EastNorth
     from m2pem.geo.local_frame import LatLon as LatLon
     from m2pem.geo.local_frame import LocalFrame as LocalFrame

@@ -18,6 +18,7 @@ from m2pem.engine.commands import AdjustBehavior, CancelBehavior, StartBehavior
 from m2pem.errors import StaleCommandError
 from m2pem.executive.behavior_lifecycle import DispatcherView
 from m2pem.executive.fleet_connections import FleetArbiters
+from m2pem.executive.own_fences import OwnFences
 from m2pem.executive.separation import VehicleSeparation
 from m2pem.fleet.allocation import Availability
 from m2pem.fleet.parameters import ParameterError, resolve
@@ -102,6 +103,7 @@ class Dispatcher:
     _post: Callable[[BehaviorReport], None]
     _replaced: Callable[[StaleCommandError], None]
     _claims: Claims
+    _fences: OwnFences
     _clearance: VehicleSeparation | None = None
     _active: dict[str, _Active] = field(default_factory=dict)
     _tails: dict[str, asyncio.Task[None]] = field(default_factory=dict)
@@ -463,6 +465,9 @@ class Dispatcher:
             request = self.request(command, spec)
         except ParameterError as error:
             self._refuse(command.behavior, "REJECTED", str(error))
+            return
+        if left := self._fences.refusal(request):
+            self._refuse(command.behavior, "REJECTED", left)
             return
         if self._clearance is not None:
             near = await self._clearance.refusal(request, spec)

@@ -63,6 +63,7 @@ from m2pem.executive.journal_loss import JournalLossPrompts
 from m2pem.executive.lost_marks import LostMarks
 from m2pem.executive.lost_resources import LostResources
 from m2pem.executive.outages import OUTAGE_S, Outages, StallMonitor
+from m2pem.executive.own_fences import OwnFences
 from m2pem.executive.ownership import Ownership
 from m2pem.executive.presence import Presence
 from m2pem.executive.recovery import look_again, replaced_by
@@ -175,6 +176,7 @@ class Supervisor:
             self._post_report,
             self._refused,
             self.ownership,
+            OwnFences(lambda: self.drawings.geometries, bus),
             self._separation,
         )
         self.allocator = Allocator(

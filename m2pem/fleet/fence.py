@@ -1,12 +1,15 @@
 """Where the vehicles of a fleet may be, by their domain: the one fence that all checks ask."""
 
+import re
+from collections.abc import Mapping
 from functools import lru_cache
 
 from m2pem.fleet.fleet import Domain, Fleet
 from m2pem.geo.fence import Fence, rings_of
+from m2pem.geo.geometry_files import KEEP_OUT
 from m2pem.geo.lazy_imports import shapely
 from m2pem.geo.local_frame import LocalFrame
-from m2pem.mission.geometry import Area, Route
+from m2pem.mission.geometry import Area, Point, Route
 
 
 def fence_of(fleet: Fleet, domain: Domain) -> Fence | None:
@@ -39,3 +42,20 @@ def _corridor(route: Route, width_m: float) -> Area:
     line = shapely.LineString([frame.to_local(each[:2]) for each in route.waypoints])
     rings = rings_of(line.buffer(width_m / 2))
     return Area(tuple(tuple((*frame.to_latlon(at), None) for at in ring) for ring in rings))
+
+
+def own_areas(vehicle: str, geometries: Mapping[str, Point | Route | Area]) -> dict[str, Area]:
+    """Return the areas, among those that were handed over, that bound one vehicle alone, by their
+    names: VEHICLE.fence, which it may not leave, VEHICLE.keep_out, and more with a number."""
+    is_own = re.compile(rf"{re.escape(vehicle)}\.(fence|{KEEP_OUT})(_\d+)?").fullmatch
+    return {
+        name: area for name, area in geometries.items() if isinstance(area, Area) and is_own(name)
+    }
+
+
+def own_fences(vehicle: str, geometries: Mapping[str, Point | Route | Area]) -> list[Fence]:
+    """Return the fences of one vehicle alone: it must be within each."""
+    areas = own_areas(vehicle, geometries)
+    closed = {name: area for name, area in areas.items() if f".{KEEP_OUT}" in name}
+    fences = [Fence(area) for name, area in areas.items() if name not in closed]
+    return [*fences, *([Fence(None, closed)] if closed else [])]

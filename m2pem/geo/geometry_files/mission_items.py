@@ -97,10 +97,12 @@ class MissionReader:
     """Adds what a mission's items are to the contents of a file.
 
     `zero_is_north`: a waypoint's heading of 0 is one; else it means that there is none.
+    `has_tasks`: tasks do what a route cannot, and warnings have no remedy.
     """
 
     contents: Contents
     zero_is_north: bool = False
+    has_tasks: bool = False
     _places: list[Coordinate] = field(default_factory=list)
     _frames: list[str] = field(default_factory=list)
     _speeds_m_s: dict[int, float] = field(default_factory=dict)
@@ -117,8 +119,8 @@ class MissionReader:
     _first_corner: str = ""
     _notes: dict[tuple[Severity, str, str], list[str]] = field(default_factory=dict)
 
-    def add(self, item: MissionItem) -> None:
-        """Add the next item.
+    def add(self, item: MissionItem) -> tuple[Coordinate, str] | None:
+        """Add the next item; return the waypoint that it is, with its altitude frame.
 
         Raises:
             GeometryError: its frame is unknown, or its place out of range.
@@ -129,7 +131,8 @@ class MissionReader:
         ended = any(each.is_over for each in self._endings)
         if self._landing or (ended and item.command in LANDING_SECTION):
             self._landing.append(item.number)
-            return
+            return None
+        before = len(self._places)
         match command.treatment:
             case Treatment.FENCE:
                 with self.contents.feature(item.where):
@@ -148,14 +151,16 @@ class MissionReader:
             case _:
                 message = f"{command.title} cannot be flown as part of a route"
                 self._note(Severity.ERROR, label, message, command.remedy)
+        is_place = len(self._places) > before
+        return (self._places[-1], self._frames[-1]) if is_place else None
 
     def add_pattern(self, number: int, name: str) -> None:
         """Add an item that is flown by waypoints of its own, which are not read."""
         if self._places:
             self._endings.append(_Ending(str(number), name, "do that by a task"))
 
-    def finish(self) -> None:
-        """Add the route, if there is one, and say what was left out of it."""
+    def finish(self) -> Route | None:
+        """Add the route, if there is one, and say what was left out of it; return it."""
         self._end_polygon()
         for each in self._endings:
             if each.says:
@@ -171,7 +176,10 @@ class MissionReader:
         if self._places and not refused:
             own = self._speeds_m_s
             speeds = tuple(own.get(index) for index in range(len(self._places))) if own else ()
-            self.contents.add("", Route.of(self._places, self._frames, speeds))
+            route = Route.of(self._places, self._frames, speeds)
+            self.contents.add("", route)
+            return route
+        return None
 
     def _add_place(self, item: MissionItem, command: Command, label: str) -> None:
         for each in self._endings:
@@ -180,7 +188,7 @@ class MissionReader:
             self._note(Severity.ERROR, each.label, message, remedy)
         self._endings.clear()
         latitude, longitude, altitude = item.params[4:]
-        place, frame = None, _frame(item)
+        place, frame = None, frame_of(item)
         if latitude or longitude:
             place = coordinate(latitude, longitude, altitude, item.where)
             if altitude == 0 and frame != "amsl" and self._is_up:
@@ -252,7 +260,7 @@ class MissionReader:
             self.contents.add(name, circle(place[:2], item.params[0], name == "fence"))
         else:
             name = "rally" if item.command == RALLY_POINT else "fence_return"
-            self.contents.add(name, Point(place, _frame(item)))
+            self.contents.add(name, Point(place, frame_of(item)))
 
     def _end_polygon(self) -> None:
         if self._corners:
@@ -266,10 +274,16 @@ class MissionReader:
         self._note(Severity.WARNING, label, message, remedy)
 
     def _note(self, severity: Severity, label: str, message: str, remedy: str) -> None:
+        remedy = "" if self.has_tasks else remedy
         self._notes.setdefault((severity, message, remedy), []).append(label)
 
 
-def _frame(item: MissionItem) -> str:
+def frame_of(item: MissionItem) -> str:
+    """Return the altitude frame of an item.
+
+    Raises:
+        GeometryError: its MAV_FRAME has none.
+    """
     if not isinstance(item.frame, int) or item.frame not in _FRAMES:
         raise GeometryError(
             f"{item.where}: MAV_FRAME {item.frame!r} is not global, relative or terrain"

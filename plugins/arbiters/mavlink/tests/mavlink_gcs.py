@@ -87,13 +87,17 @@ class GroundStation(asyncio.DatagramProtocol):
             await asyncio.sleep(0.3)
 
     async def hears(
-        self, name: str, true: Callable[[Any], bool] = lambda _: True, since: int = 0
+        self,
+        name: str | tuple[str, ...],
+        true: Callable[[Any], bool] = lambda _: True,
+        since: int = 0,
     ) -> Any:
-        """Wait for a message; `since`: the number of messages before it."""
+        """Wait for a message of one of some types; `since`: the number of messages before it."""
+        names = (name,) if isinstance(name, str) else name
         async with asyncio.timeout(WITHIN_S):
             while True:
                 for message in self.received[since:]:
-                    if message.get_type() == name and true(message):
+                    if message.get_type() in names and true(message):
                         return message
                 self._news.clear()
                 await self._news.wait()

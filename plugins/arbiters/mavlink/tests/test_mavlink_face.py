@@ -258,7 +258,7 @@ def test_the_plan_is_what_the_mission_does_now_and_uploads_are_denied(tmp_path: 
             station.mav.mission_count_send(ROVER1, 1, 5, 0)
             answer = await station.hears("MISSION_ACK")
             assert answer.type == dialect.MAV_MISSION_DENIED
-            await station.told("read-only")
+            await station.told("commands of ground stations are off")
             await control.stop(run)
 
     asyncio.run(main())

@@ -32,6 +32,9 @@ _FRAMES: Mapping[int, str] = {
 POSITION_IGNORED = 1 | 2 | 4
 """POSITION_TARGET_TYPEMASK of the three coordinates."""
 
+ENDLESS_TURNS = 10_000
+"""DO_ORBIT without a number of turns goes on until another command."""
+
 YAW_LOCK = 16
 """GIMBAL_MANAGER_FLAGS: the yaw is from north."""
 
@@ -129,6 +132,7 @@ def order_of(command: Command, vehicle: ShownVehicle, camera: Camera | None) -> 
         )
     order = read(command, vehicle)
     is_own = order is not None and order.resource == vehicle.resource
+    is_own = is_own and order is not None and order.behavior != modes.RUN_PLAN
     if order is not None and is_own and order.behavior not in vehicle.behaviors:
         raise RefusedCommandError(
             f"{vehicle.resource} has no behavior {order.behavior}",
@@ -180,9 +184,38 @@ def _speed(command: Command, vehicle: ShownVehicle) -> Order:
 
 
 def _pause(command: Command, vehicle: ShownVehicle) -> Order:
-    if command.params[0] != 0:
-        raise RefusedCommandError("m2pem's operators continue a mission")
-    return Order(vehicle.resource, "hold")
+    if command.params[0] == 0:
+        return Order(vehicle.resource, "hold")
+    if not vehicle.runs_plan:
+        raise RefusedCommandError("no run of an uploaded plan is paused")
+    return Order(vehicle.resource, modes.RUN_PLAN)
+
+
+def _start_plan(command: Command, vehicle: ShownVehicle) -> Order:
+    first, last = command.params[:2]
+    end = len(vehicle.uploaded.items) - 1
+    if (math.isfinite(first) and first > 0) or (math.isfinite(last) and 0 < last < end):
+        raise RefusedCommandError("a plan is carried out as a whole")
+    return Order(vehicle.resource, modes.RUN_PLAN)
+
+
+def _orbit(command: Command, vehicle: ShownVehicle) -> Order:
+    radius_m, speed, _, turned_rad = command.params
+    place = command.place
+    if place is None and vehicle.state is not None and vehicle.state.position is not None:
+        place = vehicle.state.position.latlon
+    if place is None or not command.altitude_frame:
+        raise RefusedCommandError("DO_ORBIT needs a place in a global frame")
+    if radius_m < 0:
+        raise RefusedCommandError("it circles clockwise only: the radius is above 0")
+    parameters = _target(vehicle, place, command.z, command.altitude_frame)
+    if math.isfinite(radius_m) and radius_m > 0:
+        parameters["radius"] = f"{radius_m} m"
+    if math.isfinite(speed) and speed > 0:
+        parameters["speed"] = f"{speed} m/s"
+    endless = not math.isfinite(turned_rad) or turned_rad == 0
+    parameters["turns"] = ENDLESS_TURNS if endless else turned_rad / math.tau
+    return Order(vehicle.resource, "orbit", parameters)
 
 
 def _loiter(command: Command, vehicle: ShownVehicle) -> Order:
@@ -301,6 +334,8 @@ _READ: Mapping[int, Read] = {
     ),
     dialect.MAV_CMD_DO_CHANGE_SPEED: _speed,
     dialect.MAV_CMD_DO_PAUSE_CONTINUE: _pause,
+    dialect.MAV_CMD_MISSION_START: _start_plan,
+    dialect.MAV_CMD_DO_ORBIT: _orbit,
     dialect.MAV_CMD_NAV_LOITER_UNLIM: _loiter,
     dialect.MAV_CMD_DO_SET_MODE: _set_mode,
     262: _set_standard_mode,  # MAV_CMD_DO_SET_STANDARD_MODE

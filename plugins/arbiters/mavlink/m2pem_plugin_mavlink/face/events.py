@@ -27,6 +27,7 @@ from m2pem.api.records import (
 from m2pem.errors import M2pemError
 from m2pem_plugin_mavlink.face.orders import Orders
 from m2pem_plugin_mavlink.face.plan import plan_of
+from m2pem_plugin_mavlink.face.plan_runs import PlanRuns
 from m2pem_plugin_mavlink.face.texts import TextSeverity
 from m2pem_plugin_mavlink.face.vehicle import ShownVehicle
 
@@ -49,8 +50,10 @@ class Events(Listener):
         vehicles: Mapping[ResourceId, ShownVehicle],
         control: MissionControl,
         orders: Orders,
+        plans: PlanRuns,
         say: Say,
     ) -> None:
+        self._plans = plans
         self._vehicles = vehicles
         self._control = control
         self._orders = orders
@@ -69,6 +72,7 @@ class Events(Listener):
                 for vehicle in concerned:
                     if vehicle.resource in record.resources:
                         vehicle.behavior, vehicle.behavior_id = record.name, record.behavior
+                        self._plans.requested(vehicle, stamped.run, record.element)
                         find = partial(self._geometry, stamped.run)
                         vehicle.plan.replace(plan_of(record.name, record.parameters, find))
             case BehaviorProgressed() if is_new:
@@ -81,6 +85,10 @@ class Events(Listener):
                     if vehicle.behavior_id == record.behavior:
                         vehicle.behavior = vehicle.behavior_id = ""
                         vehicle.plan.replace(())
+                    if record.state is BehaviorState.SUCCEEDED:
+                        known = view.behavior(record.behavior)
+                        element = known.element if known is not None else ""
+                        self._plans.task_ended(vehicle, stamped.run, element)
                 if is_new:
                     reason = record.reason or record.code or record.state.value.lower()
                     self._orders.ended(stamped.run, record.state, reason)
@@ -98,6 +106,10 @@ class Events(Listener):
                 severity = TextSeverity.WARNING
             for vehicle in concerned:
                 self._say(vehicle, severity, f"{stamped.run} {sentence.text}")
+
+    def status_changed(self, view: RunView) -> None:
+        """See `Listener`."""
+        self._plans.status_changed(self._vehicles.values(), view.run, view.status)
 
     def _geometry(self, run: RunId, name: str) -> object:
         """Return what a task of a run gets by the name of a geometry; None: there is none."""

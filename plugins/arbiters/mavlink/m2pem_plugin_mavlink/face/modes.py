@@ -33,7 +33,8 @@ NOT_USER_SELECTABLE = 2
 @dataclass(frozen=True, slots=True)
 class Mode:
     """`number`: PX4's. `standard`: MAV_STANDARD_MODE, 0: none. `purpose`: by which ArduPilot's
-    number is found. `behavior`: what commanding it means; "": it cannot be commanded."""
+    number is found. `behavior`: what commanding it means, `RUN_PLAN`: the run of its
+    plan; "": it cannot be commanded."""
 
     number: int
     name: str
@@ -42,8 +43,10 @@ class Mode:
     behavior: str = ""
 
 
+RUN_PLAN = "run_plan"
+
 HOLD = Mode(px4_mode(PX4_AUTO, 3), "Hold", 0, FlightMode.HOLD, "hold")
-MISSION = Mode(px4_mode(PX4_AUTO, 4), "Mission", 6, FlightMode.MISSION)
+MISSION = Mode(px4_mode(PX4_AUTO, 4), "Mission", 6, FlightMode.MISSION, RUN_PLAN)
 RETURN = Mode(px4_mode(PX4_AUTO, 5), "Return", 5, FlightMode.RETURN, "return_to_launch")
 LAND = Mode(px4_mode(PX4_AUTO, 6), "Land", 7, FlightMode.LAND, "land")
 TAKEOFF = Mode(px4_mode(PX4_AUTO, 2), "Takeoff", 8, FlightMode.TAKEOFF)

@@ -8,13 +8,14 @@ does, and what the run did there ends.
 import asyncio
 from collections import OrderedDict
 from collections.abc import Callable, Collection, Coroutine
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from m2pem.api import BehaviorState, MissionControl, ResourceId, RunId, distance_m
+from m2pem.api import BehaviorState, MissionControl, ResourceId, RunId, RunStatus, distance_m
 from m2pem.errors import BusyError, M2pemError, MissionError, OperatorError
 from m2pem_plugin_mavlink.face.commands import (
     REQUEST_OPERATOR_CONTROL,
@@ -23,8 +24,19 @@ from m2pem_plugin_mavlink.face.commands import (
     RefusedCommandError,
     order_of,
 )
-from m2pem_plugin_mavlink.face.requests import ACCEPTED, DENIED, REJECTED, Request, Say
+from m2pem_plugin_mavlink.face.modes import RUN_PLAN
+from m2pem_plugin_mavlink.face.plan_runs import PlanRuns
+from m2pem_plugin_mavlink.face.requests import (
+    ACCEPTED,
+    DENIED,
+    REJECTED,
+    Request,
+    Say,
+    acknowledge_plan,
+    name_of,
+)
 from m2pem_plugin_mavlink.face.stations import Station
+from m2pem_plugin_mavlink.face.uploads import Uploads
 from m2pem_plugin_mavlink.face.vehicle import ShownVehicle
 from m2pem_plugin_mavlink.link.route import Peer
 from m2pem_plugin_mavlink.protocol.messages import Address, message_type
@@ -67,6 +79,7 @@ class _Pending:
     request: Request
     result: int = IN_PROGRESS
     ended_s: float = 0.0
+    runs_plan: bool = False
 
     @property
     def key(self) -> _Key:
@@ -77,7 +90,7 @@ class _Pending:
     @property
     def by(self) -> str:
         """Who commands, for the journal."""
-        return name_of(self.request.source, self.request.station)
+        return self.request.by
 
     def acknowledge(self, result: int) -> None:
         """Send the result."""
@@ -92,21 +105,25 @@ class Orders:
         self,
         control: MissionControl,
         allowed: Collection[ResourceId],
+        plans: PlanRuns,
         say: Say,
         now_s: Callable[[], float],
     ) -> None:
         self._control = control
         self._allowed = allowed
+        self._plans = plans
         self._say = say
         self._now_s = now_s
         self._pending: OrderedDict[_Key, _Pending] = OrderedDict()
         self._latest: dict[ResourceId, _Key] = {}
         self._last: dict[ResourceId, Order] = {}
+        self._runs: dict[ResourceId, tuple[RunId, str]] = {}
         self._budgets: dict[tuple[Peer, ResourceId, bool], tuple[float, float]] = {}
         self._began: OrderedDict[RunId, asyncio.Future[tuple[int, str]]] = OrderedDict()
         self._targets: dict[tuple[Peer, Address, int], Order] = {}
         self._followed: set[tuple[Peer, Address, int]] = set()
         self._tasks: set[asyncio.Task[None]] = set()
+        self._uploads = Uploads(plans.store, self._begin, say)
 
     async def close(self) -> None:
         """Follow no order any more. What vehicles do goes on: the executive has it."""
@@ -176,6 +193,8 @@ class Orders:
             return False
         if known.result == IN_PROGRESS:
             return True
+        if known.runs_plan and not again.request.vehicle.runs_plan:
+            return False  # its run has ended since
         recent = self._now_s() - known.ended_s <= REPEATED_S
         latest = self._latest.get(again.request.vehicle.resource) in (again.key, None)
         return recent and latest and (command.confirmation > 0 or known.result == ACCEPTED)
@@ -203,7 +222,10 @@ class Orders:
             return None
         self._count(order, request.station)
         order = self._with_speed(order, vehicle)
+        if order.behavior == "set_speed" and vehicle.runs_plan:
+            raise RefusedCommandError("its plan goes on at the speeds of its items", REJECTED)
         self._latest[vehicle.resource] = pending.key
+        pending.runs_plan = order.behavior == RUN_PLAN
         return self._carry_out(pending, order)
 
     def _with_speed(self, order: Order, vehicle: ShownVehicle) -> Order:
@@ -300,7 +322,7 @@ class Orders:
         return (await self._control.unavailable()).get(vehicle.resource, "")
 
     async def _carry_out(self, pending: _Pending, order: Order) -> None:
-        executing = asyncio.ensure_future(self._execute(order, pending.by))
+        executing = asyncio.ensure_future(self._execute(order, pending.by, pending.request.vehicle))
         try:
             # Simple programs take the first acknowledgement for the last one.
             while not (await asyncio.wait([executing], timeout=PROGRESS_EVERY_S))[0]:
@@ -314,8 +336,12 @@ class Orders:
         else:
             self._refuse(pending, RefusedCommandError(reason, result))
 
-    async def _execute(self, order: Order, by: str) -> tuple[int, str]:
+    async def _execute(self, order: Order, by: str, vehicle: ShownVehicle) -> tuple[int, str]:
         """Carry an order out, and note it as the last one unless it is refused."""
+        if order.resource == vehicle.resource:
+            done = await self._about_plan(order, by, vehicle)
+            if done is not None:
+                return done
         before = self._last.get(order.resource)
         self._last[order.resource] = order
         result, reason = await self._outcome_of(order, by)
@@ -324,6 +350,43 @@ class Orders:
             if before is not None:
                 self._last[order.resource] = before
         return result, reason
+
+    async def _about_plan(
+        self, order: Order, by: str, vehicle: ShownVehicle
+    ) -> tuple[int, str] | None:
+        """Begin a plan, go on with it, pause it, or end it for another order of its station; None:
+        the order is to be carried out."""
+        run = vehicle.plan_run
+        own = run is not None and vehicle.runs_plan and run.by == by
+        try:
+            if order.behavior == RUN_PLAN:
+                if not vehicle.runs_plan:
+                    await self._end_last(vehicle.resource, by)
+                await self._plans.start(vehicle, by)
+                return ACCEPTED, ""
+            if run is None or not own:
+                return None
+            if order.behavior == "hold":
+                if run.status is not RunStatus.PAUSED:
+                    await self._control.pause(run.run, by=by)
+                return ACCEPTED, ""
+            await self._control.stop(run.run, by=by, reason=f"{order.behavior} takes its place")
+            await self._control.wait(run.run)
+        except RefusedCommandError as error:
+            return error.result, error.reason
+        except MissionError as error:
+            return DENIED, _first(error)
+        except M2pemError as error:
+            return REJECTED, str(error)
+        return None
+
+    async def _end_last(self, resource: ResourceId, by: str) -> None:
+        """End the behavior that a station has commanded before, as another one would."""
+        run, own = self._runs.get(resource, ("", ""))
+        if own == by:
+            with suppress(OperatorError):  # it has ended
+                await self._control.stop(run, by=by, reason="its plan takes its place")
+            await self._control.wait(run)
 
     async def _outcome_of(self, order: Order, by: str) -> tuple[int, str]:
         """Begin a behavior; return when it is under way or has ended: MAV_RESULT and reason."""
@@ -337,6 +400,7 @@ class Orders:
             return REJECTED, str(error)
         except M2pemError as error:
             return FAILED, str(error)
+        self._runs[order.resource] = run, by
         began = self._outcome(run)
         ending = asyncio.ensure_future(self._control.wait(run))
         try:
@@ -348,6 +412,36 @@ class Orders:
         finally:
             ending.cancel()
             self._began.pop(run, None)
+
+    # --- plans ------------------------------------------------------------------------------------
+
+    def upload(self, request: Request) -> bool:
+        """Take a message that uploads or clears a plan; return False if it is of another kind."""
+        match request.message.TYPE.name:
+            case "MISSION_ACK":
+                self._uploads.cancelled(request)
+            case "MISSION_ITEM" | "MISSION_ITEM_INT":
+                self._uploads.item(request)
+            case "MISSION_COUNT" if self._may_upload(request):
+                self._uploads.count(request)
+            case "MISSION_CLEAR_ALL" if self._may_upload(request):
+                self._begin(self._plans.clear(request))
+            case "MISSION_WRITE_PARTIAL_LIST":
+                acknowledge_plan(request, dialect.MAV_MISSION_UNSUPPORTED)
+            case "MISSION_SET_CURRENT" if request.message.seq:
+                self._say(request.station, request.vehicle, "a plan is carried out as a whole")
+            case "MISSION_COUNT" | "MISSION_CLEAR_ALL" | "MISSION_SET_CURRENT":
+                pass
+            case _:
+                return False
+        return True
+
+    def _may_upload(self, request: Request) -> bool:
+        if request.vehicle.resource in self._allowed:
+            return True
+        acknowledge_plan(request, dialect.MAV_MISSION_DENIED)
+        self._say(request.station, request.vehicle, OFF)
+        return False
 
     # --- targets that are sent again and again ----------------------------------------------------
 
@@ -377,7 +471,7 @@ class Orders:
                     else:
                         done = order
                         by = name_of(request.source, station)
-                        result, reason = await self._execute(order, by)
+                        result, reason = await self._execute(order, by, vehicle)
                         if result != ACCEPTED:
                             self._say(station, vehicle, reason)
                 await asyncio.sleep(TARGET_EVERY_S)
@@ -409,11 +503,6 @@ def acknowledgement(command: int, result: int, to: Address) -> Any:
         progress=UNKNOWN_PROGRESS if result == IN_PROGRESS else 0,
         **to.as_target,
     )
-
-
-def name_of(source: Address, station: Station) -> str:
-    """Return who asks, for the journal."""
-    return f"mavlink {source.system}/{source.component} at {station.name}"
 
 
 def _same(order: Order, other: Order) -> bool:

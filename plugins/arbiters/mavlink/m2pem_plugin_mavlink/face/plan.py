@@ -1,8 +1,9 @@
-"""What a vehicle carries out now, as a read-only plan of the mission protocol."""
+"""The plan of a vehicle by the mission protocol: what a station has uploaded and the run of it, or
+what the vehicle carries out now."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple, TypeAlias
 
 from m2pem.api import (
@@ -10,8 +11,11 @@ from m2pem.api import (
     Dimension,
     LatLon,
     LocalFrame,
+    MissionTask,
     Point,
     Route,
+    RunId,
+    RunStatus,
     SurveyTracks,
     UnitError,
     Value,
@@ -20,6 +24,8 @@ from m2pem.api import (
     quantity,
 )
 from m2pem.errors import M2pemError
+from m2pem_plugin_mavlink.face.plan_messages import plan_id
+from m2pem_plugin_mavlink.protocol.messages import Message
 
 MOST_ITEMS = 1_000
 REACHED_M = 5.0
@@ -60,6 +66,39 @@ class Plan:
             if not reached and distance_m(position, after[:2]) >= max(leg_m - REACHED_M, REACHED_M):
                 return
             self.current += 1
+
+
+@dataclass(slots=True)
+class UploadedPlan:
+    """`items`: as they were uploaded; `tasks`: what they are."""
+
+    items: Sequence[Message] = ()
+    tasks: Sequence[MissionTask] = ()
+    id: int = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.id = plan_id(self.items)
+
+
+@dataclass(slots=True)
+class PlanRun:
+    """A run of a plan. `tasks`: by the ids of the mission's elements. `element`: the task under
+    way. `done`: items that are behind the vehicle, in their order."""
+
+    run: RunId
+    by: str
+    plan: UploadedPlan
+    tasks: Mapping[str, MissionTask]
+    element: str = ""
+    done: list[int] = field(default_factory=list)
+    status: RunStatus = RunStatus.RUNNING
+
+    @property
+    def current(self) -> int:
+        """The number of the item that is under way."""
+        task = self.tasks.get(self.element)
+        left = [each for each in (task.items if task is not None else ()) if each not in self.done]
+        return left[0] if left else (self.done[-1] if self.done else 0)
 
 
 def plan_of(behavior: str, parameters: Mapping[str, Value], geometries: Geometries) -> list[Item]:

@@ -1,4 +1,4 @@
-"""What ground stations ask vehicles for: messages, intervals, parameters, the plan. Nothing here
+"""What ground stations ask vehicles for: messages, intervals, parameters, plans. Nothing here
 changes what a vehicle does; what would is refused."""
 
 import math
@@ -12,6 +12,7 @@ from m2pem_plugin_mavlink.face import modes
 from m2pem_plugin_mavlink.face.commands import Command
 from m2pem_plugin_mavlink.face.components import CAMERA_MAKERS
 from m2pem_plugin_mavlink.face.plan import Item
+from m2pem_plugin_mavlink.face.plan_messages import plan_id, plan_message
 from m2pem_plugin_mavlink.face.stations import HEARTBEAT, Station
 from m2pem_plugin_mavlink.face.streams import Streams, is_known, messages_of
 from m2pem_plugin_mavlink.face.telemetry import heartbeat
@@ -54,9 +55,19 @@ class Request:
         own = self.camera.component if self.camera is not None else AUTOPILOT
         return Address(self.vehicle.system, own)
 
+    @property
+    def by(self) -> str:
+        """Who asks, for the journal."""
+        return name_of(self.source, self.station)
+
     def answer(self, message: Message) -> None:
         """Send a message of the component to the sender."""
         self.station.send(message, self.component)
+
+
+def name_of(source: Address, station: Station) -> str:
+    """Return who asks, for the journal."""
+    return f"mavlink {source.system}/{source.component} at {station.name}"
 
 
 _ONE_MESSAGE: Mapping[int, int] = {
@@ -102,17 +113,6 @@ class Requests:
             "MISSION_REQUEST_LIST": self._list_items,
             "MISSION_REQUEST": self._send_item,
             "MISSION_REQUEST_INT": self._send_item,
-            **dict.fromkeys(
-                (
-                    "MISSION_COUNT",
-                    "MISSION_ITEM",
-                    "MISSION_ITEM_INT",
-                    "MISSION_WRITE_PARTIAL_LIST",
-                    "MISSION_CLEAR_ALL",
-                    "MISSION_SET_CURRENT",
-                ),
-                self._refuse_upload,
-            ),
         }
 
     def command(self, command: Command, request: Request) -> int | None:
@@ -246,8 +246,9 @@ class Requests:
         if len(self._downloads) >= MOST_DOWNLOADS:
             del self._downloads[next(iter(self._downloads))]
         self._downloads[key] = items
-        make = message_type("MISSION_COUNT").make
-        request.answer(make(**request.source.as_target, count=len(items), mission_type=type_))
+        make = plan_message("MISSION_COUNT").make
+        own = {"count": len(items), "mission_type": type_, "opaque_id": plan_id(items)}
+        request.answer(make(**request.source.as_target, **own))
 
     def _send_item(self, request: Request) -> None:
         items = self._downloads.get(_download(request))
@@ -258,14 +259,18 @@ class Requests:
         if request.message.seq < len(items):
             request.answer(items[request.message.seq])
         else:
-            _acknowledge(request, dialect.MAV_MISSION_INVALID_SEQUENCE)
-
-    def _refuse_upload(self, request: Request) -> None:
-        _acknowledge(request, dialect.MAV_MISSION_DENIED)
-        text = "the plan is read-only here: missions are m2pem's"
-        self._say(request.station, request.vehicle, text)
+            acknowledge_plan(request, dialect.MAV_MISSION_INVALID_SEQUENCE)
 
     def _items(self, type_: int, to: dict[str, int], vehicle: ShownVehicle) -> list[Message]:
+        uploads = vehicle.uploaded, vehicle.uploaded_fence, vehicle.rally_points
+        uploaded = uploads[type_].items if 0 <= type_ < len(uploads) else ()
+        if uploaded and (type_ != MISSION or vehicle.shows_upload):
+            run = vehicle.plan_run
+            current = run.current if vehicle.runs_plan and run is not None else 0
+            return [
+                as_item(each, to, current=type_ == MISSION and number == current)
+                for number, each in enumerate(uploaded)
+            ]
         if type_ == MISSION:
             plan, command = vehicle.plan, dialect.MAV_CMD_NAV_WAYPOINT
             return [
@@ -293,13 +298,25 @@ def _download(request: Request) -> tuple[str, Address, int, int]:
     return request.station.name, request.source, vehicle.system, type_
 
 
-def _acknowledge(request: Request, result: int) -> None:
-    type_ = getattr(request.message, "mission_type", MISSION)
-    request.answer(
-        message_type("MISSION_ACK").make(
-            **request.source.as_target, type=result, mission_type=type_
-        )
-    )
+def acknowledge_plan(
+    request: Request, result: int, type_: int | None = None, plan: int = 0
+) -> None:
+    """Answer a message of the mission protocol by MISSION_ACK. `plan`: its id, if it is new."""
+    if type_ is None:
+        type_ = getattr(request.message, "mission_type", MISSION)
+    make = plan_message("MISSION_ACK").make
+    to = request.source.as_target
+    request.answer(make(**to, type=result, mission_type=type_, opaque_id=plan))
+
+
+def as_item(message: Message, to: dict[str, int], *, current: bool) -> Message:
+    """Return an uploaded item as it is downloaded."""
+    if message.TYPE.name == "MISSION_ITEM_INT":
+        return message._replace(**to, current=current)
+    fields = dict(zip(message.TYPE.make._fields, message, strict=True))
+    scale = 1.0 if message.frame == dialect.MAV_FRAME_MISSION else 1e7
+    fields |= {"x": round(message.x * scale), "y": round(message.y * scale), "current": current}
+    return message_type("MISSION_ITEM_INT").make(**{**fields, **to})
 
 
 def _whole(value: float) -> int:

@@ -29,9 +29,16 @@ from m2pem_plugin_mavlink.face.components import cameras_of
 from m2pem_plugin_mavlink.face.event_settings import EventRules
 from m2pem_plugin_mavlink.face.events import Events
 from m2pem_plugin_mavlink.face.forwarding import COMMAND_INT, COMMAND_LONG, Forwarder
-from m2pem_plugin_mavlink.face.orders import Orders, acknowledgement, name_of
+from m2pem_plugin_mavlink.face.orders import Orders, acknowledgement
+from m2pem_plugin_mavlink.face.plan_runs import PlanRuns
 from m2pem_plugin_mavlink.face.received_messages import MessageReceiver
-from m2pem_plugin_mavlink.face.requests import DENIED, Request, Requests, refusal_of_files
+from m2pem_plugin_mavlink.face.requests import (
+    DENIED,
+    Request,
+    Requests,
+    name_of,
+    refusal_of_files,
+)
 from m2pem_plugin_mavlink.face.sent_messages import MessageSender
 from m2pem_plugin_mavlink.face.settings import Settings, own_system
 from m2pem_plugin_mavlink.face.stations import Station, Stations
@@ -63,7 +70,7 @@ FILE_TRANSFER: int = dialect.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL
 SET_MODE: int = dialect.MAVLINK_MSG_ID_SET_MODE
 _NO_REQUEST = frozenset(
     getattr(dialect, f"MAVLINK_MSG_ID_{name}")
-    for name in ("HEARTBEAT", "SYSTEM_TIME", "MISSION_ACK", "COMMAND_ACK", "LOG_REQUEST_END")
+    for name in ("HEARTBEAT", "SYSTEM_TIME", "COMMAND_ACK", "LOG_REQUEST_END")
 )
 _TARGETS = (
     POSITION_TARGET,
@@ -124,8 +131,11 @@ class FaceServer:
             self._stations.now_s,
         )
         self._requests = Requests(self._streams, fleet, self._tell)
-        self._orders = Orders(control, self._settings.commands, self._tell, self._stations.now_s)
-        self._events = Events(self._vehicles, control, self._orders, self._say)
+        self._plans = PlanRuns(control, self._tell, self._send)
+        self._orders = Orders(
+            control, self._settings.commands, self._plans, self._tell, self._stations.now_s
+        )
+        self._events = Events(self._vehicles, control, self._orders, self._plans, self._say)
 
     async def serve(self) -> None:
         """Serve ground stations until cancelled.
@@ -151,6 +161,8 @@ class FaceServer:
             for name, vehicle in in_fleet.items()
             if (own := own_system(vehicle.settings)) is not None
         }
+        for vehicle in self._vehicles.values():
+            self._plans.restore_fence(vehicle)
         thrower = EventThrower(self._control)
         vehicles = {address: name for name, address in autopilots.items()}
         self._receiver = MessageReceiver(shared_hub(), self._rules.received, vehicles, thrower)
@@ -219,6 +231,7 @@ class FaceServer:
                 vehicle = self._vehicles.get(state.resource)
                 if vehicle is not None:
                     vehicle.update(state, self._stations.now_s())
+                    self._plans.progress(vehicle)
             elif isinstance(state, PayloadState):
                 camera = self._cameras.get(state.resource)
                 if camera is not None:
@@ -262,7 +275,7 @@ class FaceServer:
             else:
                 if order is not None:
                     self._orders.target(order, request)
-        elif not self._requests.message(request):
+        elif not (self._orders.upload(request) or self._requests.message(request)):
             self._tell(station, vehicle, f"{type_.name} is not carried out")
 
     def _command(self, command: Command, request: Request) -> None:
@@ -277,8 +290,12 @@ class FaceServer:
     def _say(self, vehicle: ShownVehicle, severity: TextSeverity, text: str) -> None:
         """Send a text to all stations."""
         for message in status_texts(text, severity):
-            for station in self._stations:
-                station.send(message, vehicle.autopilot)
+            self._send(vehicle, message)
+
+    def _send(self, vehicle: ShownVehicle, message: Message) -> None:
+        """Send a message of a vehicle to all stations."""
+        for station in self._stations:
+            station.send(message, vehicle.autopilot)
 
     def _tell(self, station: Station, vehicle: ShownVehicle, text: str) -> None:
         """Tell one station why something is refused."""

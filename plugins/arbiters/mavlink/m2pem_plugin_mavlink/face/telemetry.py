@@ -7,8 +7,9 @@ from typing import TypeAlias
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from m2pem.api import VehicleState, ellipsoidal_m
+from m2pem.api import RunStatus, VehicleState, ellipsoidal_m
 from m2pem_plugin_mavlink.face import modes
+from m2pem_plugin_mavlink.face.plan_messages import plan_message
 from m2pem_plugin_mavlink.face.vehicle import ShownVehicle
 from m2pem_plugin_mavlink.protocol.messages import Message, message_type
 from m2pem_plugin_mavlink.vehicle.telemetry_decoder import enu_yaw
@@ -129,10 +130,10 @@ def _sys_status(vehicle: ShownVehicle) -> Message | None:
     health = present if state.position is not None else present & ~_POSITION
     if state.ready is False:
         health &= ~_PREARM
-    if vehicle.fence is not None:
+    fences, at = vehicle.fences, state.position
+    if fences:
         present |= _GEOFENCE
-    at = state.position
-    if vehicle.fence is None or at is None or vehicle.fence.outside_m(at.latlon) <= BREACH_M:
+    if at is None or all(each.outside_m(at.latlon) <= BREACH_M for each in fences):
         health |= _GEOFENCE  # without a fence, too: MAVProxy says "fence breach" if it is missing
     return message_type("SYS_STATUS").make(
         onboard_control_sensors_present=present,
@@ -227,14 +228,31 @@ def _home(vehicle: ShownVehicle) -> Message | None:
 
 
 def _mission_current(vehicle: ShownVehicle) -> Message:
-    plan = vehicle.plan
-    state = dialect.MISSION_STATE_ACTIVE if plan.items else dialect.MISSION_STATE_NO_MISSION
-    return message_type("MISSION_CURRENT").make(
-        seq=plan.current,
-        total=len(plan.items) if plan.items else UINT16_UNKNOWN,
+    plan, run = vehicle.plan, vehicle.plan_run
+    items, current = len(plan.items), plan.current
+    state = dialect.MISSION_STATE_ACTIVE if items else dialect.MISSION_STATE_NO_MISSION
+    if vehicle.shows_upload:
+        items, current = len(vehicle.uploaded.items), 0
+        state = dialect.MISSION_STATE_NOT_STARTED
+        if run is not None and (vehicle.runs_plan or run.plan is vehicle.uploaded):
+            items, current = len(run.plan.items), run.current
+            state = _PLAN_STATES.get(run.status, dialect.MISSION_STATE_NOT_STARTED)
+    return plan_message("MISSION_CURRENT").make(
+        seq=current,
+        total=items or UINT16_UNKNOWN,
         mission_state=state,
         mission_mode=1 if vehicle.mode is modes.MISSION else 2,
+        mission_id=vehicle.uploaded.id if vehicle.shows_upload else 0,
+        fence_id=vehicle.uploaded_fence.id,
+        rally_points_id=vehicle.rally_points.id,
     )
+
+
+_PLAN_STATES: Mapping[RunStatus, int] = {
+    RunStatus.RUNNING: dialect.MISSION_STATE_ACTIVE,
+    RunStatus.PAUSED: dialect.MISSION_STATE_PAUSED,
+    RunStatus.COMPLETED: dialect.MISSION_STATE_COMPLETE,
+}
 
 
 def _system_time(vehicle: ShownVehicle) -> Message | None:

@@ -10,10 +10,12 @@ from m2pem.api import (
     LinkState,
     PayloadState,
     ResourceId,
+    RunId,
+    RunStatus,
     VehicleState,
 )
-from m2pem_plugin_mavlink.face.modes import Mode, mode_of
-from m2pem_plugin_mavlink.face.plan import Plan
+from m2pem_plugin_mavlink.face.modes import HOLD, LAND, MISSION, RETURN, TAKEOFF, Mode, mode_of
+from m2pem_plugin_mavlink.face.plan import Plan, PlanRun, UploadedPlan
 from m2pem_plugin_mavlink.protocol.messages import Address
 
 AUTOPILOT = 1
@@ -45,7 +47,9 @@ class ShownVehicle:
     the clock of the event loop. `behavior`: the name of what it carries out, and `behavior_id`.
     `operator`: who has taken it. `home`: where it was first seen on the ground. `type`: MAV_TYPE.
     `fence`: the fleet's. `arms_itself`: it has motors that it arms, and says whether it did.
-    `arm_requested`: a station has armed it, and what it is to do has not come yet."""
+    `arm_requested`: a station has armed it, and what it is to do has not come yet. `task`: the run
+    and the element of its behavior. `uploaded`: the plan of a station, and `plan_run` its latest
+    run. `own_fences`: those that stations have uploaded, and `uploaded_fence` their items."""
 
     resource: ResourceId
     domain: str
@@ -63,6 +67,27 @@ class ShownVehicle:
     fence: Fence | None = None
     arms_itself: bool = False
     arm_requested: bool = False
+    task: tuple[RunId, str] = ("", "")
+    uploaded: UploadedPlan = field(default_factory=UploadedPlan)
+    plan_run: PlanRun | None = None
+    own_fences: Sequence[Fence] = ()
+    uploaded_fence: UploadedPlan = field(default_factory=UploadedPlan)
+    rally_points: UploadedPlan = field(default_factory=UploadedPlan)
+
+    @property
+    def fences(self) -> list[Fence]:
+        """All that bound where it may be."""
+        return [*([self.fence] if self.fence is not None else ()), *self.own_fences]
+
+    @property
+    def runs_plan(self) -> bool:
+        """Whether a run of an uploaded plan goes on."""
+        return self.plan_run is not None and not self.plan_run.status.ended
+
+    @property
+    def shows_upload(self) -> bool:
+        """Whether its plan is the uploaded one, and not what a mission of m2pem has it do."""
+        return bool(self.uploaded.items) and (self.runs_plan or not self.plan.items)
 
     @property
     def autopilot(self) -> Address:
@@ -72,7 +97,15 @@ class ShownVehicle:
     @property
     def mode(self) -> Mode:
         """The mode that it is shown in."""
+        if self.runs_plan and self.plan_run is not None:
+            return HOLD if self.plan_run.status is RunStatus.PAUSED else self._plan_mode
         return mode_of(self.behavior, self.operator)
+
+    @property
+    def _plan_mode(self) -> Mode:
+        """As autopilots show it: Mission but for the take-off, the return and the landing."""
+        mode = mode_of(self.behavior, "")
+        return mode if mode in (TAKEOFF, LAND, RETURN) else MISSION
 
     @property
     def armed(self) -> bool:

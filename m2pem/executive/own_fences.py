@@ -1,0 +1,69 @@
+"""The fences of single vehicles, which ground stations upload: no behavior may leave them, whoever
+commands it. The fleet's fence is checked by the arbiters, and holds besides."""
+
+import math
+from collections.abc import Callable, Mapping
+
+from m2pem.api.arbiter import BehaviorRequest
+from m2pem.api.behavior_parameters import BehaviorParameters
+from m2pem.api.bus import FleetBus
+from m2pem.api.fence_check import find_breach, known_yaw_rad, stance_on
+from m2pem.api.telemetry import VehicleState
+from m2pem.fleet.fence import own_fences
+from m2pem.geo.fence import Fence
+from m2pem.geo.local_frame import LatLon, offset
+from m2pem.mission.catalogue import ResourceId
+from m2pem.mission.geometry import Area, Geometry, Point, Route
+
+ORBIT_RADIUS_M = 30.0
+"""Of an `orbit` that does not say it, as far as m2pem's own arbiters choose it."""
+_PLACES = 16
+
+
+class OwnFences:
+    """`geometries` returns what was handed over for all runs."""
+
+    def __init__(self, geometries: Callable[[], Mapping[str, Geometry]], bus: FleetBus) -> None:
+        self._geometries = geometries
+        self._bus = bus
+        self._stance_of = stance_on(bus)
+
+    def refusal(self, request: BehaviorRequest) -> str:
+        """Return where a behavior would leave the own fence of one of its vehicles; "": nowhere."""
+        geometries = {
+            name: each
+            for name, each in self._geometries().items()
+            if isinstance(each, Point | Route | Area)
+        }
+        for resource in request.resources:
+            for fence in own_fences(resource, geometries):
+                if breach := self._breach(fence, resource, request):
+                    return breach.replace("the fleet's fence", f"the own fence of {resource}")
+        return ""
+
+    def _breach(self, fence: Fence, resource: ResourceId, request: BehaviorRequest) -> str:
+        parameters = BehaviorParameters(request.parameters)
+        state = self._bus.latest(resource)
+        start, yaw_rad = None, None
+        if isinstance(state, VehicleState) and state.position is not None:
+            start, yaw_rad = state.position.latlon, known_yaw_rad(state)
+        way = _around(request.behavior, parameters)
+        if way:
+            return fence.breach(way, start, lambda _: "its way")
+        name = request.behavior
+        return str(find_breach(fence, name, parameters, start, yaw_rad, self._stance_of) or "")
+
+
+def _around(behavior: str, parameters: BehaviorParameters) -> list[LatLon]:
+    """Return places around what a survey or an orbit covers; none: another behavior."""
+    if behavior == "area_survey" and parameters.area is not None:
+        return [corner[:2] for corner in parameters.area.rings[0]]
+    target = parameters.target
+    if behavior in ("orbit", "area_observe") and isinstance(target, Point):
+        radius_m = parameters.number("radius") or ORBIT_RADIUS_M
+        turns = [math.tau * place / _PLACES for place in range(_PLACES + 1)]
+        return [
+            offset(target.position[:2], radius_m * math.cos(turn), radius_m * math.sin(turn))
+            for turn in turns
+        ]
+    return []
