@@ -8,6 +8,7 @@ from typing import Any
 
 from m2pem_plugin_mavlink.face.face import MavlinkFace
 from mavlink_gcs import FLEET, HOME, gateway, ground_station
+from mavlink_mavsdk_world import free_port
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem.api import LinkState, Route, RunStatus, as_geojson, distance_m
@@ -82,6 +83,29 @@ def test_a_vehicle_that_the_executive_holds_as_lost_sends_nothing_until_it_is_re
             sent = [each for each in station.received[since:] if each.get_type() == "HEARTBEAT"]
             assert not [each for each in sent if beats(ROVER1)(each)]
             await station.hears("HEARTBEAT", beats(ROVER1), since)
+
+    asyncio.run(main())
+
+
+def test_a_link_of_one_vehicle_has_no_other(tmp_path: Path) -> None:
+    async def main() -> None:
+        own = free_port()
+        links = [{"url": f"udpin://127.0.0.1:{own}", "vehicles": ["uav1"]}]
+        async with (
+            gateway(tmp_path, speed=5.0, commands="all", links=links) as (control, port),
+            ground_station(port) as every,
+            ground_station(own, system=253) as one,
+        ):
+            takeoff, reposition = dialect.MAV_CMD_NAV_TAKEOFF, dialect.MAV_CMD_DO_REPOSITION
+            await one.hears("HEARTBEAT")
+            one.mav.command_long_send(ROVER1, 1, reposition, 0, *[0.0] * 4, *NEAR, 0.0)
+            one.mav.timesync_send(0, 1)
+            assert await one.command(UAV1, takeoff, *[0] * 6, 10) == dialect.MAV_RESULT_ACCEPTED
+            await one.told("uav1 begins takeoff")
+            await every.hears("HEARTBEAT", lambda each: each.get_srcSystem() == ROVER1)
+            await every.told("uav1 begins takeoff")
+            assert {each.get_srcSystem() for each in one.received} == {UAV1}
+            assert [each.mission for each in await control.runs()] == ["takeoff of uav1"]
 
     asyncio.run(main())
 

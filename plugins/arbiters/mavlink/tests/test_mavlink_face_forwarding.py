@@ -104,6 +104,37 @@ def test_what_only_asks_passes_to_the_vehicle_and_commands_do_not(tmp_path: Path
     asyncio.run(main())
 
 
+def test_what_does_not_pass_is_refused_as_its_own_protocol_says(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with forwarding(tmp_path) as (_, _, station, _):
+            station.mav.param_request_list_send(SYSTEM, 1)
+            known = await station.hears("PARAM_VALUE")
+            since = len(station.received)
+            name, kind = known.param_id.encode(), known.param_type
+            station.mav.param_set_send(SYSTEM, 1, name, known.param_value + 1, kind)
+            own = lambda each: each.param_id == known.param_id  # noqa: E731
+            error = await station.hears("PARAM_ERROR", own, since)
+            assert error.error == dialect.MAV_PARAM_ERROR_READ_ONLY
+            value = await station.hears("PARAM_VALUE", own, since)
+            assert value.param_value == known.param_value
+            for send in (
+                lambda: station.mav.mission_count_send(SYSTEM, 1, 3, 0),
+                lambda: station.mav.mission_clear_all_send(SYSTEM, 1, 1),
+            ):
+                since = len(station.received)
+                send()
+                refused = await station.hears("MISSION_ACK", is_autopilot, since)
+                assert refused.type == dialect.MAV_MISSION_DENIED
+            assert refused.mission_type == 1
+            await station.told("MISSION_COUNT is not forwarded", "forward_commands")
+            since = len(station.received)
+            station.mav.set_mode_send(SYSTEM, 1, GUIDED)
+            refused = await station.hears("COMMAND_ACK", is_autopilot, since)
+            assert refused.result == dialect.MAV_RESULT_DENIED
+
+    asyncio.run(main())
+
+
 def test_commands_that_pass_move_the_vehicle_and_end_what_the_mission_did(tmp_path: Path) -> None:
     async def main() -> None:
         forward = {"forward": "all", "forward_commands": ["rover1"]}
@@ -247,6 +278,20 @@ def test_a_vehicle_that_is_simulated_is_shown_and_not_forwarded(tmp_path: Path) 
         ({"forward_commands": ["rover1"]}, "faces.mavlink.forward_commands: rover1 is not one"),
         ({"commands": ["rovr1"]}, "faces.mavlink.commands: the fleet has no vehicle 'rovr1'"),
         ({"system_ids": {"rover1": 2, "uav1": 2}}, "uav1 and rover1 both have system id 2"),
+        ({"links": {"url": "udpin://127.0.0.1:1"}}, "faces.mavlink.links: "),
+        ({"links": [{"vehicles": ["uav1"]}]}, "faces.mavlink.links.url: a link has a URL"),
+        ({"links": [{"url": "udpin://127.0.0.1:1"}]}, "links.vehicles: a link has one vehicle"),
+        (
+            {"links": [{"url": "udpin://127.0.0.1:1", "vehicles": ["uav7"]}]},
+            "faces.mavlink.links.vehicles: the fleet has no vehicle 'uav7'",
+        ),
+        (
+            {
+                "url": "udpin://127.0.0.1:1",
+                "links": [{"url": "udpin://127.0.0.1:1", "vehicles": ["uav1"]}],
+            },
+            "faces.mavlink.url: udpin://127.0.0.1:1 is the URL of one of `links`, too",
+        ),
         ({"system_ids": {"rover1": 255}}, "faces.mavlink.system_ids.rover1: 255"),
         ({"rates": {"ATTITUDE": "100 Hz"}}, "faces.mavlink.rates.ATTITUDE: '100 Hz'"),
         (

@@ -128,7 +128,7 @@ class Forwarder:
             )
         systems = [frame.target.system] if frame.target.system else list(self._vehicles)
         for system in systems:
-            if system in self._vehicles:
+            if system in self._vehicles and station.shows(system):
                 self._to_vehicle(station, frame, system)
         for other in self._stations:
             if other is not station and other.reaches(frame.target):
@@ -169,7 +169,7 @@ class Forwarder:
             system = frame.source.system
             if system in self._vehicles and self._is_from_it(frame, peer):
                 for station in self._stations:
-                    if station.reaches(frame.target):
+                    if station.reaches(frame.target) and station.shows(system):
                         station.peer.write(frame.data)
 
     def _is_from_it(self, frame: RawFrame, peer: Peer) -> bool:

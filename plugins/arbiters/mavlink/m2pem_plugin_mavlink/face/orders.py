@@ -33,13 +33,14 @@ from m2pem_plugin_mavlink.face.requests import (
     Request,
     Say,
     acknowledge_plan,
+    acknowledgement,
     name_of,
 )
 from m2pem_plugin_mavlink.face.stations import Station
 from m2pem_plugin_mavlink.face.uploads import Uploads
 from m2pem_plugin_mavlink.face.vehicle import ShownVehicle
 from m2pem_plugin_mavlink.link.route import Peer
-from m2pem_plugin_mavlink.protocol.messages import Address, message_type
+from m2pem_plugin_mavlink.protocol.messages import Address
 
 FAILED: int = dialect.MAV_RESULT_FAILED
 IN_PROGRESS: int = dialect.MAV_RESULT_IN_PROGRESS
@@ -63,7 +64,6 @@ counted apart."""
 TARGET_EVERY_S = 1.0
 SAME_TARGET_M = 0.5
 MOST_OUTCOMES = 256
-UNKNOWN_PROGRESS = 255
 
 OFF = "commands of ground stations are off: faces.mavlink.commands"
 
@@ -493,16 +493,6 @@ class Orders:
     def _end(self, pending: _Pending, result: int) -> None:
         pending.result, pending.ended_s = result, self._now_s()
         pending.acknowledge(result)
-
-
-def acknowledgement(command: int, result: int, to: Address) -> Any:
-    """Return COMMAND_ACK."""
-    return message_type("COMMAND_ACK").make(
-        command=command,
-        result=result,
-        progress=UNKNOWN_PROGRESS if result == IN_PROGRESS else 0,
-        **to.as_target,
-    )
 
 
 def _same(order: Order, other: Order) -> bool:

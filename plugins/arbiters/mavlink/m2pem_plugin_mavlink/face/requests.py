@@ -33,6 +33,7 @@ KEEP_IN: int = dialect.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION
 KEEP_OUT: int = dialect.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION
 
 MOST_DOWNLOADS = 64
+UNKNOWN_PROGRESS = 255
 
 Say = Callable[[Station, ShownVehicle, str], None]
 """Tells a station why something is refused."""
@@ -224,16 +225,17 @@ class Requests:
         if 0 <= known < len(_PARAMETERS):
             request.answer(_parameter(known, request.vehicle))
         else:
-            error = dialect.MAV_PARAM_ERROR_DOES_NOT_EXIST
-            make = message_type("PARAM_ERROR").make
-            request.answer(
-                make(**request.source.as_target, param_id=name, param_index=index, error=error)
-            )
+            unknown = dialect.MAV_PARAM_ERROR_DOES_NOT_EXIST
+            request.answer(_parameter_error(name, index, request.source, unknown))
 
     def _set_parameter(self, request: Request) -> None:
-        index = _index_of(request.message.param_id)
+        name = request.message.param_id
+        index, error = _index_of(name), dialect.MAV_PARAM_ERROR_READ_ONLY
         if index >= 0:
             request.answer(_parameter(index, request.vehicle))
+        else:
+            error = dialect.MAV_PARAM_ERROR_DOES_NOT_EXIST
+        request.answer(_parameter_error(name, -1, request.source, error))
         self._say(request.station, request.vehicle, "parameters are read-only here")
 
     # --- the plan ---------------------------------------------------------------------------------
@@ -291,6 +293,35 @@ def refusal_of_files(message: Message, to: Address) -> Message | None:
     if payload is None:
         return None
     return message._replace(payload=tuple(payload), **to.as_target)
+
+
+def refusals_of(message: Message, to: Address) -> list[Message]:
+    """Return how the protocol of a message says that it is refused; none: it cannot."""
+    name = message.TYPE.name
+    if name in ("COMMAND_LONG", "COMMAND_INT", "SET_MODE"):
+        command = dialect.MAV_CMD_DO_SET_MODE if name == "SET_MODE" else message.command
+        return [acknowledgement(command, DENIED, to)]
+    if name in ("MISSION_COUNT", "MISSION_CLEAR_ALL", "MISSION_WRITE_PARTIAL_LIST"):
+        denied = {"type": dialect.MAV_MISSION_DENIED, "mission_type": message.mission_type}
+        return [plan_message("MISSION_ACK").make(**to.as_target, **denied)]
+    if name == "PARAM_SET":
+        return [_parameter_error(message.param_id, -1, to, dialect.MAV_PARAM_ERROR_READ_ONLY)]
+    if name == "FILE_TRANSFER_PROTOCOL":
+        refusal = refusal_of_files(message, to)
+        return [] if refusal is None else [refusal]
+    return []
+
+
+def acknowledgement(command: int, result: int, to: Address) -> Message:
+    """Return COMMAND_ACK."""
+    progress = UNKNOWN_PROGRESS if result == dialect.MAV_RESULT_IN_PROGRESS else 0
+    make = message_type("COMMAND_ACK").make
+    return make(command=command, result=result, progress=progress, **to.as_target)
+
+
+def _parameter_error(name: bytes, index: int, to: Address, error: int) -> Message:
+    make = message_type("PARAM_ERROR").make
+    return make(**to.as_target, param_id=name, param_index=index, error=error)
 
 
 def _download(request: Request) -> tuple[str, Address, int, int]:

@@ -29,15 +29,15 @@ from m2pem_plugin_mavlink.face.components import cameras_of
 from m2pem_plugin_mavlink.face.event_settings import EventRules
 from m2pem_plugin_mavlink.face.events import Events
 from m2pem_plugin_mavlink.face.forwarding import COMMAND_INT, COMMAND_LONG, Forwarder
-from m2pem_plugin_mavlink.face.orders import Orders, acknowledgement
+from m2pem_plugin_mavlink.face.orders import Orders
 from m2pem_plugin_mavlink.face.plan_runs import PlanRuns
 from m2pem_plugin_mavlink.face.received_messages import MessageReceiver
 from m2pem_plugin_mavlink.face.requests import (
-    DENIED,
     Request,
     Requests,
+    acknowledgement,
     name_of,
-    refusal_of_files,
+    refusals_of,
 )
 from m2pem_plugin_mavlink.face.sent_messages import MessageSender
 from m2pem_plugin_mavlink.face.settings import Settings, own_system
@@ -50,7 +50,7 @@ from m2pem_plugin_mavlink.link.hub import shared_hub
 from m2pem_plugin_mavlink.link.route import Peer
 from m2pem_plugin_mavlink.link.vehicle_link import VehicleLink
 from m2pem_plugin_mavlink.microservices.commands import message_name
-from m2pem_plugin_mavlink.protocol.messages import Address, Message, types_by_id
+from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type, types_by_id
 from m2pem_plugin_mavlink.protocol.raw_frames import RawFrame
 from m2pem_plugin_mavlink.settings import GCS_SYSTEM_ID
 
@@ -66,6 +66,7 @@ STATES_PER_VEHICLE = 4
 
 DATA_STREAM: int = dialect.MAVLINK_MSG_ID_REQUEST_DATA_STREAM
 FILE_TRANSFER: int = dialect.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL
+PARAM_SET: int = dialect.MAVLINK_MSG_ID_PARAM_SET
 
 SET_MODE: int = dialect.MAVLINK_MSG_ID_SET_MODE
 _NO_REQUEST = frozenset(
@@ -123,7 +124,11 @@ class FaceServer:
         self._types = ExitStack()
         self._said: OrderedDict[tuple[Peer, int, str], float] = OrderedDict()
         systems = frozenset(self._settings.systems.values())
-        self._stations = Stations(self._settings.urls, systems, self._receive)
+        links = {
+            url: frozenset(self._settings.systems[each] for each in vehicles)
+            for url, vehicles in self._settings.links.items()
+        }
+        self._stations = Stations(self._settings.urls, systems, self._receive, links)
         self._streams = Streams(
             self._stations,
             list(self._vehicles.values()),
@@ -250,6 +255,8 @@ class FaceServer:
         vehicle = self._by_system.get(frame.target.system)
         if type_ is None or vehicle is None or frame.id in _NO_REQUEST:
             return
+        if not station.shows(vehicle.system):
+            return
         component = frame.target.component or AUTOPILOT
         camera = next((each for each in vehicle.cameras if each.component == component), None)
         if component != AUTOPILOT and camera is None:
@@ -318,14 +325,20 @@ class FaceServer:
         if not frame.target.system:
             return
         to = Address(system, frame.target.component or AUTOPILOT)
-        if frame.id in (COMMAND_LONG, COMMAND_INT):
-            command = types_by_id()[frame.id].unpack(frame.payload).command
-            station.send(acknowledgement(command, DENIED, frame.source), to)
+        type_ = types_by_id().get(frame.id)
+        message = type_.unpack(frame.payload) if type_ is not None else None
+        for refusal in refusals_of(message, frame.source) if message is not None else ():
+            station.send(refusal, to)
+        if message is not None and frame.id == PARAM_SET:
+            # The vehicle's answer, which all stations get, is the value that it keeps.
+            make = message_type("PARAM_REQUEST_READ").make
+            asks = make(**to.as_target, param_id=message.param_id, param_index=-1)
+            for link in shared_hub().links:
+                if link.address.system == system:
+                    link.send(asks)
         if frame.id == FILE_TRANSFER:
-            message = types_by_id()[frame.id].unpack(frame.payload)
-            if (refusal := refusal_of_files(message, frame.source)) is not None:
-                station.send(refusal, to)
-        elif frame.id != DATA_STREAM:  # MAVProxy sends it every 10 s
+            return
+        if frame.id != DATA_STREAM:  # MAVProxy sends it every 10 s
             name = next(each for each, id_ in self._settings.systems.items() if id_ == system)
             what = message_name(frame.id)
             text = f"{name}: {what} is not forwarded: faces.mavlink.forward_commands"

@@ -34,6 +34,7 @@ RATES_HZ: Mapping[str, float] = {
 
 _KEYS = (
     "url",
+    "links",
     "system_ids",
     "commands",
     "rates",
@@ -51,7 +52,8 @@ class Settings:
     """`systems`: the system id of each vehicle, in the order of the fleet file. `commands`: the
     vehicles that ground stations may command. `forwarded`: those whose own frames they get.
     `forwarded_commands`: those of `forwarded` to which commands pass, too. `sent_to`: those to
-    which messages go that missions throw. `rates_hz`: by name."""
+    which messages go that missions throw. `rates_hz`: by name. `links`: the vehicles that are on a
+    URL, of those URLs on which not all are."""
 
     urls: tuple[Url, ...]
     systems: Mapping[ResourceId, int]
@@ -60,6 +62,7 @@ class Settings:
     forwarded: frozenset[ResourceId] = frozenset()
     forwarded_commands: frozenset[ResourceId] = frozenset()
     sent_to: frozenset[ResourceId] = frozenset()
+    links: Mapping[Url, frozenset[ResourceId]] = field(default_factory=dict)
 
 
 def read_settings(reader: FaceSettings, fleet: Fleet) -> Settings:
@@ -80,18 +83,49 @@ def read_settings(reader: FaceSettings, fleet: Fleet) -> Settings:
     commands = reader.vehicles("forward_commands", fleet.vehicles)
     if extra := sorted(commands - named) if reader.values.get("forward_commands") != ALL else []:
         raise reader.error("forward_commands", f"{extra[0]} is not one of those of `forward`")
+    links = _links(reader, fleet)
     return Settings(
-        _urls(reader, fleet),
+        (*_urls(reader, fleet, links), *links),
         _systems(reader, fleet, forwarded),
         reader.vehicles("commands", fleet.vehicles),
         _rates(reader),
         forwarded,
         commands & forwarded,
         reader.vehicles("send_to", fleet.vehicles),
+        links,
     )
 
 
-def _urls(reader: FaceSettings, fleet: Fleet) -> tuple[Url, ...]:
+def _links(reader: FaceSettings, fleet: Fleet) -> dict[Url, frozenset[ResourceId]]:
+    given = reader.values.get("links", [])
+    example = f"[{{url: '{DEFAULT_URL}', vehicles: [rover1]}}]"
+    if not isinstance(given, list) or not all(isinstance(each, dict) for each in given):
+        raise reader.error("links", f"{given!r} is not a list of links such as {example}")
+    links: dict[Url, frozenset[ResourceId]] = {}
+    for each in given:
+        link = FaceSettings("mavlink", each, f"{reader.path}.links")
+        link.refuse_others(("url", "vehicles"))
+        if "url" not in each:
+            raise link.error("url", f"a link has a URL, such as {example}")
+        if not (vehicles := link.vehicles("vehicles", fleet.vehicles)):
+            raise link.error("vehicles", f"a link has one vehicle or more, such as {example}")
+        for url in _read_urls(link, fleet):
+            if url in links:
+                raise link.error("url", f"{url} is the URL of two links")
+            links[url] = vehicles
+    return links
+
+
+def _urls(reader: FaceSettings, fleet: Fleet, links: Collection[Url]) -> tuple[Url, ...]:
+    if links and "url" not in reader.values:
+        return ()
+    urls = _read_urls(reader, fleet)
+    if twice := [each for each in urls if each in links]:
+        raise reader.error("url", f"{twice[0]} is the URL of one of `links`, too")
+    return urls
+
+
+def _read_urls(reader: FaceSettings, fleet: Fleet) -> tuple[Url, ...]:
     value = reader.values.get("url", DEFAULT_URL)
     texts = value if isinstance(value, list) and value else [value]
     urls = []

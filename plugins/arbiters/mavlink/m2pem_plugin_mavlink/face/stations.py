@@ -6,7 +6,8 @@ may send in a second, and of addresses that are kept for it have bounds.
 
 import asyncio
 import logging
-from collections.abc import Callable, Iterable, Iterator, Sequence, Set
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
+from functools import partial
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -35,11 +36,13 @@ class Station:
     """A peer: one ground station, or a router with several. `addresses`: those that send over it.
     `ignored`: its frames that were dropped, as there were too many. `ardupilot_modes`: it is sent
     ArduPilot's numbers of modes. `sends_targets`: as PX4 needs them before its Offboard mode.
+    `systems`: of the vehicles that are on its link, None: all are.
     `intervals_s`: those that it has set itself, by the system and the message, and `queued`: the
     numbers of their entries in the queue of `Streams`."""
 
-    def __init__(self, peer: Peer, now_s: float) -> None:
+    def __init__(self, peer: Peer, now_s: float, systems: Set[int] | None = None) -> None:
         self.peer = peer
+        self.systems = systems
         self.splitter = FrameSplitter()
         self.addresses: set[Address] = set()
         self.ignored = 0
@@ -79,8 +82,15 @@ class Station:
             return any(each.system == target.system for each in self.addresses)
         return target in self.addresses
 
+    def shows(self, system: int) -> bool:
+        """Return whether a vehicle is on its link."""
+        return self.systems is None or system in self.systems
+
     def send(self, message: Message, source: Address) -> None:
-        """Send a message; a station that does not read loses it."""
+        """Send a message; a station that does not read loses it, and one on whose link its vehicle
+        is not does not get it."""
+        if not self.shows(source.system):
+            return
         if self.ardupilot_modes and message.TYPE.id == HEARTBEAT:
             message = modes.renumbered(message)
         self.peer.send(message, source)
@@ -91,10 +101,18 @@ Receive = Callable[[Station, RawFrame], None]
 
 class Stations:
     """The endpoints of the face. `receive` is called with each frame of a station; `own_systems`:
-    the system ids of the fleet, whose frames no station may send."""
+    the system ids of the fleet, whose frames no station may send. `links`: those of the vehicles on
+    a URL, of those URLs on which not all are."""
 
-    def __init__(self, urls: Sequence[Url], own_systems: Set[int], receive: Receive) -> None:
+    def __init__(
+        self,
+        urls: Sequence[Url],
+        own_systems: Set[int],
+        receive: Receive,
+        links: Mapping[Url, Set[int]],
+    ) -> None:
         self._urls = urls
+        self._links = links
         self._own_systems = own_systems
         self._receive = receive
         self._endpoints: list[Endpoint] = []
@@ -110,9 +128,9 @@ class Stations:
         """
         try:
             for url in self._urls:
-                endpoint = endpoint_kind(url)(
-                    url, self._own_systems, self.now_s, self._greet, (self._tap,)
-                )
+                on_link = self._links.get(url)
+                greet, tap = partial(self._greet, on_link), partial(self._tap, on_link)
+                endpoint = endpoint_kind(url)(url, self._own_systems, self.now_s, greet, (tap,))
                 await endpoint.open()
                 self._endpoints.append(endpoint)
         except PluginError:
@@ -155,13 +173,13 @@ class Stations:
     def _present(self, peer: Peer) -> bool:
         return peer.open and any(peer in each.peers.values() for each in self._endpoints)
 
-    def _greet(self, peer: Peer, _: Iterable[Signing | None]) -> None:
-        self._station(peer)
+    def _greet(self, systems: Set[int] | None, peer: Peer, _: Iterable[Signing | None]) -> None:
+        self._station(peer, systems)
 
-    def _station(self, peer: Peer) -> Station | None:
+    def _station(self, peer: Peer, systems: Set[int] | None) -> Station | None:
         station = self._stations.get(peer)
         if station is None and len(self._stations) < MOST_STATIONS:
-            station = self._stations[peer] = Station(peer, self.now_s())
+            station = self._stations[peer] = Station(peer, self.now_s(), systems)
             _logger.info("ground station %s", peer.name)
         elif station is None and not self._full:
             self._full = True
@@ -170,8 +188,8 @@ class Stations:
             )
         return station
 
-    def _tap(self, endpoint: Endpoint, peer: Peer, data: bytes) -> None:
-        station = self._station(peer)
+    def _tap(self, systems: Set[int] | None, endpoint: Endpoint, peer: Peer, data: bytes) -> None:
+        station = self._station(peer, systems)
         if station is None:
             return
         splitter = station.splitter
