@@ -150,9 +150,9 @@ class _Reader:
                 self._speed = item
                 self._reader().add(item)
             case Treatment.LEFT_OUT if item.command == _DELAY:
-                if any(each is not None and each >= 0 for each in item.params[1:4]):
+                if (delay_s := item.params[0] or 0.0) <= 0:
                     raise GeometryError("a delay until a time of the day is not done")
-                self._wait(item, item.params[0])
+                self._wait(item, delay_s)
             case Treatment.LEFT_OUT if item.command == _PICTURES:
                 self._take_pictures(item)
             case Treatment.LEFT_OUT:

@@ -231,3 +231,48 @@ def test_an_uploaded_fence_narrows_what_anybody_has_the_vehicle_do(tmp_path: Pat
             assert await station.go_to(ROVER1, (38.13, -77.32)) == dialect.MAV_RESULT_DENIED
 
     asyncio.run(main())
+
+
+def test_a_transfer_survives_lost_repeated_and_late_messages(tmp_path: Path) -> None:
+    """As QGroundControl's `PlanManager` behaves on a bad link: MISSION_COUNT comes again after 1.5 s,
+    items again on request."""
+
+    async def main() -> None:
+        items = [Item(WAYPOINT, each) for each in (A, B, C)]
+        async with (
+            gateway(tmp_path, commands="all") as (_, port),
+            ground_station(port) as station,
+            ground_station(port, system=253) as other,
+        ):
+            await station.hears("HEARTBEAT", of(ROVER1))
+            send = station.mav.mission_item_int_send
+            station.mav.mission_count_send(ROVER1, 1, 3, 0)
+            await station.hears("MISSION_REQUEST_INT", of(ROVER1, seq=0))
+            assert await upload(other, ROVER1, items) == dialect.MAV_MISSION_DENIED
+            since = len(station.received)
+            station.mav.mission_count_send(ROVER1, 1, 3, 0)
+            await station.hears("MISSION_REQUEST_INT", of(ROVER1, seq=0), since)
+            since = len(station.received)
+            send(ROVER1, 1, *items[2].fields(2), 0)  # out of order
+            await station.hears("MISSION_REQUEST_INT", of(ROVER1, seq=0), since)
+            for _ in range(2):  # twice
+                send(ROVER1, 1, *items[0].fields(0), 0)
+            # The next request is repeated until it is answered.
+            await station.hears("MISSION_REQUEST_INT", of(ROVER1, seq=1), since)
+            since = len(station.received)
+            await station.hears("MISSION_REQUEST_INT", of(ROVER1, seq=1), since)
+            send(ROVER1, 1, *items[1].fields(1), 0)
+            send(ROVER1, 1, *items[2].fields(2), 0)
+            acknowledged = await station.hears("MISSION_ACK", of(ROVER1, type=0))
+            raw = next(each for each in reversed(station.raw) if each[7:10] == b"\x2f\0\0")
+            opaque_id = int.from_bytes(raw[14:18].ljust(4, b"\0"), "little")
+            assert acknowledged.mission_type == 0 and opaque_id
+            assert len(await download(other, ROVER1)) == 3
+            # The id of a plan changes with it, and an upload that stops is given up.
+            station.mav.mission_count_send(ROVER1, 1, 9, 0)
+            cancelled = dialect.MAV_MISSION_OPERATION_CANCELLED
+            await station.hears("MISSION_ACK", of(ROVER1, type=cancelled))
+            await station.told("the upload is given up: item 0 did not come within 8 s")
+            assert len(await download(other, ROVER1)) == 3
+
+    asyncio.run(main())

@@ -76,7 +76,9 @@ class PlanRuns:
         it is refused or what of it is left out."""
         vehicle = request.vehicle
         if type_ == MISSION:
-            return await self._store_mission(vehicle, items)
+            # To ArduPilot, item 0 is the home position.
+            first = int(request.station.ardupilot_modes)
+            return await self._store_mission(vehicle, items, first)
         if type_ == FENCE:
             return await self._store_fence(vehicle, items, request.by)
         vehicle.rally_points = UploadedPlan(items)
@@ -84,9 +86,9 @@ class PlanRuns:
         return ACCEPTED, unused if items else ""
 
     async def _store_mission(
-        self, vehicle: ShownVehicle, items: Sequence[Message]
+        self, vehicle: ShownVehicle, items: Sequence[Message], first: int
     ) -> tuple[int, str]:
-        read = read_mission_tasks(mission_items(items))
+        read = read_mission_tasks(mission_items(items[first:]))
         for problem in read.problems:
             if problem.severity is Severity.ERROR:
                 return UNSUPPORTED, str(problem)
