@@ -234,8 +234,8 @@ def test_an_uploaded_fence_narrows_what_anybody_has_the_vehicle_do(tmp_path: Pat
 
 
 def test_a_transfer_survives_lost_repeated_and_late_messages(tmp_path: Path) -> None:
-    """As QGroundControl's `PlanManager` behaves on a bad link: MISSION_COUNT comes again after 1.5 s,
-    items again on request."""
+    """As QGroundControl's `PlanManager` behaves on a bad link: MISSION_COUNT comes again, and
+    items on request."""
 
     async def main() -> None:
         items = [Item(WAYPOINT, each) for each in (A, B, C)]
