@@ -155,9 +155,9 @@ def _parse(text: str, span: Span, dialect: Dialect, spans: Spans) -> Node:
     def noting(method: Callable[..., Node]) -> Callable[..., Node]:
         def read(*given: Any) -> Node:
             left = spans.get(id(given[0])) if given else None
-            start = left[3] if left else parser._token[2]
+            start = left[3] if left else parser._position
             node = method(*given)
-            stop = start + len(text[start : parser._token[2]].rstrip())
+            stop = start + len(text[start : parser._position].rstrip())
             known = spans.get(id(node), (node, start, stop))
             spans[id(node)] = (*known[:3], start)
             return node

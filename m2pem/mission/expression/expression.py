@@ -3,9 +3,11 @@
 import re
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import NoReturn
+
+from msgspec import Struct
+from msgspec.structs import force_setattr
 
 from m2pem.errors import ExpressionError
 from m2pem.mission.expression import cause, feel_values, operators
@@ -26,34 +28,33 @@ _BARE = (None, Dialect.BARE.value)
 _INTEGER = re.compile(r"-?[0-9]{1,18}")
 
 
-class _Prepared:
-    """What evaluates an expression, once that is made: nothing that distinguishes two of them."""
-
-    __slots__ = ("_run",)
-    _run: Callable[[ReadValue], Value] | None
-
-
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Expression(_Prepared):
+class Expression(Struct, frozen=True, eq=False):
     """A parsed expression; never changes. Equal to another of the same text and dialect.
 
-    `text` is what was written, `tree` what it means, `names` the dotted names that it reads,
-    `rules` what its operators do.
+    `text` is what was written, `tree` what it means. What evaluates it and the names that it reads
+    are found when they are first asked for.
     """
 
     text: str
     dialect: Dialect
     tree: Node
-    names: frozenset[str] = field(init=False)
-    rules: Rules = field(init=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "names", names(self.tree))
-        object.__setattr__(self, "rules", RULES[self.dialect])
-        object.__setattr__(self, "_run", None)
+    _run: Callable[[ReadValue], Value] | None = None
+    _names: frozenset[str] | None = None
 
     def __reduce__(self) -> tuple[type["Expression"], tuple[str, Dialect, Node]]:
         return Expression, (self.text, self.dialect, self.tree)
+
+    @property
+    def names(self) -> frozenset[str]:
+        """The dotted names that it reads."""
+        if self._names is None:
+            force_setattr(self, "_names", names(self.tree))
+        return self._names or frozenset()
+
+    @property
+    def rules(self) -> Rules:
+        """What its operators do."""
+        return RULES[self.dialect]
 
     @property
     def constant(self) -> bool:
@@ -109,7 +110,7 @@ class Expression(_Prepared):
             return result(of_tree(read)) if result else of_tree(read)
 
         run: Callable[[ReadValue], Value] = of_data if result else of_tree
-        object.__setattr__(self, "_run", run)
+        force_setattr(self, "_run", run)
         return run
 
     def kind(self, read: ReadValue) -> str:

@@ -4,15 +4,15 @@ Names may hold spaces and signs: those of contexts, variables and functions are 
 written; of other names, words that follow each other are one name.
 """
 
+import math
 import re
+from bisect import bisect_left
 from collections.abc import Iterable, Sequence
-from typing import NoReturn
 
 from m2pem.mission.expression.calls import CallError, feel_call
-from m2pem.mission.expression.descent import MAX_ITEMS, Descent, Token
+from m2pem.mission.expression.descent import MAX_ITEMS, Descent
 from m2pem.mission.expression.dialect import Span
-from m2pem.mission.expression.feel_functions import FEEL_FUNCTIONS, NAME_HEADS, NAMES
-from m2pem.mission.expression.literals import read_number
+from m2pem.mission.expression.feel_functions import FEEL_FUNCTIONS
 from m2pem.mission.expression.tree import (
     MAX_DEPTH,
     And,
@@ -43,21 +43,19 @@ from m2pem.mission.expression.tree import (
     TypeName,
 )
 
-_BETWEEN = r"(?:\s|//[^\n]*(?:\n|\Z)|/\*.*?\*/)*"
-_WORD_TEXT = r"(?:[^\W\d]|[\U00010000-\U000EFFFF])[\w\U00010000-\U000EFFFF]*"
-_SPACE = re.compile(_BETWEEN, re.DOTALL)
-_WORD = re.compile(_WORD_TEXT)
-_NEXT = re.compile(
-    rf"{_BETWEEN}(?:(?P<word>{_WORD_TEXT})"
-    r"|(?P<number>(?:[0-9]+(?:\.[0-9]+)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)"
-    r'|(?P<text>"(?:[^"\\]|\\.)*")'
-    r"|(?P<sign>\*\*|\.\.|->|<=|>=|!=|/(?![/*])|[-+*()\[\]{},.:<>=@]))",
+_TOKEN = re.compile(
+    r"\s*(?:(?://[^\n]*|/\*.*?\*/)\s*)*"
+    r"((?:[^\W\d]|[\U00010000-\U000EFFFF])[\w\U00010000-\U000EFFFF]*"
+    r"|(?:[0-9]+(?:\.[0-9]+)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?(?![\w\U00010000-\U000EFFFF]|\.(?!\.))"
+    r'|"[^"\\]*(?:\\.[^"\\]*)*"'
+    r"|\*\*|\.\.|->|<=|>=|!=|\.(?![0-9])|/(?![/*])|[-+*()\[\]{},:<>=@]|)",
     re.DOTALL,
 )
-"""A token and the space and comments before it; its group is its kind."""
+"""A token after space and comments: a word, number, text or sign; "" for the end and what is no
+token."""
 
+_NUMBER = re.compile(r"(?:[0-9]+(?:\.[0-9]+)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _INSIDE = re.compile(r"[\w\U00010000-\U000EFFFF]")
-_NAMED = re.compile(r"([^\W\d]\w*(?:\s+\w+)*)\s*:(?!=)")
 _PART = re.compile(r"[\w\U00010000-\U000EFFFF]+|[^\s\w]")
 _ESCAPE = re.compile(r"\\(?:u([0-9A-Fa-f]{4})|U([0-9A-Fa-f]{6})|(.))", re.DOTALL)
 _ESCAPED = {"n": "\n", "t": "\t", "r": "\r", "b": "\b", "f": "\f", "\\": "\\", '"': '"', "'": "'"}
@@ -71,6 +69,8 @@ _COMPARISONS = {
     "=": Comparison.EQUAL,
     **{each.value: each for each in Comparison if each is not Comparison.EQUAL},
 }
+_OPERATIONS = {each.value: each for each in Operation}
+_AFTER = frozenset({".", "[", "(", "instance"})
 _EXACT_DIGITS = 15
 _AND, _COMPARISON = 2, 3
 _STRENGTHS = {
@@ -81,14 +81,25 @@ _STRENGTHS = {
 }
 """How strongly an operator binds."""
 
+_SPELLED = KEYWORDS | _STRENGTHS.keys() | {"..", "->", *"()[]{},.:@"}
+_KINDS = {"": "end", '"': "text", **dict.fromkeys("0123456789.", "number")}
+"""The kind of a token by its first character: "name" of all others."""
+
+_CONSTANTS = {"true": True, "false": False, "null": None}
 _PROPERTIES = ("time offset", "start included", "end included")
-_TYPES = (
-    *("years and months duration", "days and time duration", "date and time", "date", "time"),
-    *("Any", "number", "string", "boolean", "list", "context", "range", "function", "Null"),
-)
+_TYPES = [
+    each.split()
+    for each in (
+        *("years and months duration", "days and time duration", "date and time", "date", "time"),
+        *("Any", "number", "string", "boolean", "list", "context", "range", "function", "Null"),
+    )
+]
+_FUNCTIONS: dict[str, list[list[str]]] = {"not": [["not"]]}
+"""The words of functions that have several, by the first one; the longest names come first."""
 
-
-_new = tuple.__new__  # takes half as long as calling the class
+for _name in sorted(FEEL_FUNCTIONS, key=len, reverse=True):
+    if " " in _name:
+        _FUNCTIONS.setdefault(_name.split()[0], []).append(_name.split())
 
 
 class FeelParser(Descent):
@@ -96,96 +107,93 @@ class FeelParser(Descent):
 
     def __init__(self, text: str, span: Span) -> None:
         self._text = text
-        self._stop = span.stop
+        self._span = span
+        self._tokens: list[str] = _TOKEN.findall(text, span.start, span.stop)
+        self._starts: list[int] = []
+        self._last = -1
         self._names: dict[str, re.Pattern[str]] = {}
         self._locals: list[str] = []
         self._in_range = False
-        self._token = self._read(span.start)
+        self._next()
 
     # --- tokens -----------------------------------------------------------------------------------
 
-    def _read(self, position: int) -> Token:
-        if self._names and (named := self._written(position)):
-            return named
-        found = _NEXT.match(self._text, position, self._stop)
-        if found is None:
-            return self._end_of_text(position)
-        kind = found.lastgroup or ""
-        if kind == "word":
-            return self._name(found["word"], found.start("word"), found.end())
-        if kind == "number":
-            self._alone(found)
-        strength = _STRENGTHS.get(found[kind], 0) if kind == "sign" else 0
-        return _new(Token, (kind, found[kind], found.start(kind), found.end(), strength))
+    def _next(self) -> str:
+        read = self._token
+        self._first = self._last = at = self._last + 1
+        self._token = token = self._tokens[at]
+        if self._names and self._written(at):
+            return read
+        if token in _SPELLED:
+            self._kind = token
+            return read
+        self._kind = kind = _KINDS.get(token[:1], "name")
+        if kind == "name":
+            self._name(token)
+        elif kind == "end" and at + 1 < len(self._tokens):
+            self._unexpected(self._place(at))
+        return read
 
-    def _end_of_text(self, position: int) -> Token:
-        start = self._after_space(position)
-        if start < self._stop:
-            self._refuse(start)
-        return _new(Token, ("end", "the end", self._stop, self._stop, 0))
-
-    def _after_space(self, position: int) -> int:
-        space = _SPACE.match(self._text, position, self._stop)
-        return space.end() if space else position
-
-    def _written(self, position: int) -> Token | None:
-        """A name that was defined and holds spaces or signs, if it is next."""
-        start = self._after_space(position)
-        for key, pattern in self._names.items():
-            named = pattern.match(self._text, start, self._stop)
-            if named and not self._goes_on(named):
-                return _new(Token, ("name", key, start, named.end(), 0))
-        return None
-
-    def _goes_on(self, found: re.Match[str]) -> bool:
-        return bool(
-            _INSIDE.match(self._text, found.end(), self._stop) and _INSIDE.match(found[0][-1])
-        )
-
-    def _name(self, word: str, start: int, stop: int) -> Token:
-        if word in NAME_HEADS:
-            for pattern, name in NAMES:
-                if found := pattern.match(self._text, start, self._stop):
-                    return _new(Token, ("name", name, start, found.end(1), 0))
+    def _name(self, word: str) -> None:
+        """Read the other words of a name."""
+        tokens, last = self._tokens, self._last
+        for words in _FUNCTIONS.get(word, ()):
+            after = last + len(words)
+            if tokens[last:after] == words and tokens[after] == "(":
+                self._token, self._last = " ".join(words), after - 1
+                return
         if word == "not":
-            self._fail("expected '(' after FEEL's 'not'", self._after_space(stop))
-        if word in KEYWORDS:
-            return _new(Token, ("word", word, start, stop, _STRENGTHS.get(word, 0)))
-        text = word
-        while text not in self._locals and text not in FEEL_FUNCTIONS:
-            following = _NEXT.match(self._text, stop, self._stop)
-            if following is None or following.lastgroup != "word":
+            self._fail("expected '(' after FEEL's 'not'", last + 1)
+        while (following := tokens[last + 1]) not in _SPELLED:
+            if following[:1] in _KINDS or word in self._locals or word in FEEL_FUNCTIONS:
                 break
-            if following["word"] in KEYWORDS:
-                break
-            text, stop = f"{text} {following['word']}", following.end()
-        return _new(Token, ("name", text, start, stop, 0))
+            word, last = f"{word} {following}", last + 1
+        self._token, self._last = word, last
 
-    def _alone(self, number: re.Match[str]) -> None:
-        following = self._text[number.end() : number.end() + 1]
-        if number.end() < self._stop and _INSIDE.match(following):
-            self._fail(f"a number cannot be followed by {following!r}", number.end())
-        if following == "." and self._text[number.end() : number.end() + 2] != "..":
-            self._fail("a number cannot be followed by '.'", number.end())
+    def _place(self, token: int) -> int:
+        if not self._starts:
+            self._starts = self._starts_from(self._span.start)
+        return self._starts[token]
 
-    def _refuse(self, start: int) -> NoReturn:
+    def _starts_from(self, position: int) -> list[int]:
+        found = _TOKEN.finditer(self._text, position, self._span.stop)
+        return [each.start(1) for each in found]
+
+    def _written(self, at: int) -> bool:
+        """Read a name that was defined and holds spaces or signs, if it is next."""
+        start, stop = self._place(at), self._span.stop
+        for name, pattern in self._names.items():
+            found = pattern.match(self._text, start, stop)
+            if found and not (
+                _INSIDE.match(self._text, found.end(), stop) and _INSIDE.match(found[0][-1])
+            ):
+                self._kind, self._token = "name", name
+                self._skip_to(found.end())
+                return True
+        return False
+
+    def _skip_to(self, position: int) -> None:
+        """Let the next token be that after a position, which may be within one."""
+        at = bisect_left(self._starts, position, self._first)
+        if self._starts[at - 1] + max(1, len(self._tokens[at - 1])) > position:
+            tokens = _TOKEN.findall(self._text, position, self._span.stop)
+            self._tokens[at:], self._starts[at:] = tokens, self._starts_from(position)
+        self._last = at - 1
+
+    def _unexpected(self, start: int) -> None:
+        if start == self._span.stop:
+            return
+        if number := _NUMBER.match(self._text, start, self._span.stop):
+            following = self._text[number.end()]
+            self._refuse(f"a number cannot be followed by {following!r}", number.end())
         character = self._text[start]
         if character == '"':
-            self._fail('the text is not closed by "', start)
+            self._refuse('the text is not closed by "', start)
         hints = {"'": 'write texts in double quotes: "..."', "!": "write not(...)"}
         hints |= {"?": "write 'if a then b else c'"}
         hints |= {"&": "write 'and'", "|": "write 'or'", "%": "write modulo(x, y)"}
         hint = hints.get(character)
-        self._fail(f"unexpected {character!r}" + (f": {hint}" if hint else ""), start)
-
-    def _next(self) -> Token:
-        token = self._token
-        self._token = self._read(token.stop)
-        return token
-
-    def _is(self, *texts: str) -> bool:
-        token = self._token
-        return token.text in texts and token.kind in ("sign", "word")
+        self._refuse(f"unexpected {character!r}" + (f": {hint}" if hint else ""), start)
 
     def _known(self, name: str) -> str:
         """Note a name that may hold spaces and signs, and return it without more spaces."""
@@ -200,16 +208,18 @@ class FeelParser(Descent):
 
     def _expression(self) -> Node:
         self._nest()
-        if self._take("if"):
+        kind = self._kind
+        if kind == "if":
             node = self._if()
-        elif self._is("for", "some", "every"):
-            node = self._iteration(self._next().text)
+        elif kind in ("for", "some", "every"):
+            node = self._iteration(self._next())
         else:
             node = self._operators()
         self._nesting -= 1
         return node
 
     def _if(self) -> Node:
+        self._next()
         condition = self._expression()
         self._expect("then", "after 'if'")
         then = self._expression()
@@ -240,24 +250,23 @@ class FeelParser(Descent):
 
     def _variable(self, why: str) -> str:
         """A name that is defined here: all up to what follows it."""
-        if self._token.kind != "name":
+        if self._kind != "name":
             self._fail(f"expected a name {why}, found {self._found}")
-        return self._known(self._next().text)
+        return self._known(self._next())
 
     def _operators(self, minimum: int = 0) -> Node:
         """The longest expression whose operators bind more strongly than `minimum`."""
-        node = self._signed()
-        while (strength := self._token.strength) > minimum:
+        node = self._signed() if self._kind == "-" else self._value()
+        while (strength := _STRENGTHS.get(self._kind, 0)) > minimum:
             node = self._binary(node, strength)
         return node
 
     def _binary(self, left: Node, strength: int) -> Node:
-        word = self._token.text
         if strength <= _AND:
-            return self._joined(left, self._operators)
-        self._next()
+            return self._joined(left, strength, self._operators)
+        word = self._next()
         if strength > _COMPARISON:
-            return Arithmetic(Operation(word), left, self._operators(strength))
+            return Arithmetic(_OPERATIONS[word], left, self._operators(strength))
         if word == "in":
             node = self._tests(left)
         elif word == "between":
@@ -266,7 +275,7 @@ class FeelParser(Descent):
             node = _within(left, RangeOf(low, self._operators(_COMPARISON), True, True))
         else:
             node = Compare(_COMPARISONS[word], left, self._operators(_COMPARISON))
-        if self._is("between", "in", *_COMPARISONS):
+        if _STRENGTHS.get(self._kind) == _COMPARISON:
             self._fail("comparisons do not chain; write 'a < b and b < c', or use parentheses")
         return node
 
@@ -277,9 +286,8 @@ class FeelParser(Descent):
             if negative > MAX_DEPTH:
                 self._fail(f"nested deeper than {MAX_DEPTH} levels")
         node = self._value()
-        if negative and isinstance(node, Literal) and _is_number(node):
-            node = Literal(-node.value if negative % 2 else node.value)  # type: ignore[operator]
-            negative = 0
+        if isinstance(node, Literal) and _is_number(node):
+            return Literal(-node.value if negative % 2 else node.value)  # type: ignore[operator]
         for _ in range(negative):
             node = Negate(node)
         return node
@@ -288,99 +296,105 @@ class FeelParser(Descent):
 
     def _value(self) -> Node:
         node = self._primary()
-        while True:
-            if self._take("."):
+        while (kind := self._kind) in _AFTER:
+            if kind == ".":
                 node = self._member(node)
-            elif self._is("[") and not (self._in_range and _is_number(node)):
+            elif kind == "[":
+                if self._in_range and _is_number(node):
+                    return node
                 self._next()
                 self._locals.append("item")
                 node = Filter(node, self._expression())
                 self._locals.pop()
                 self._expect("]", "to close '['")
-            elif self._is("(") and not isinstance(node, Name):
-                arguments, names = self._arguments()
-                node = Invoke(node, arguments, names)
-            elif self._take("instance"):
-                if self._token.text.split()[0] != "of":
+            elif kind == "instance":
+                if self._tokens[self._last + 1] != "of":
+                    self._next()
                     self._fail(f"expected 'of' after 'instance', found {self._found}")
-                self._token = self._read(self._token.position + len("of"))
+                self._last += 1
+                self._next()
                 node = InstanceOf(node, self._type())
-            else:
+            elif isinstance(node, Name):
                 return node
+            else:
+                node = Invoke(node, *self._arguments())
+        return node
 
     def _member(self, node: Node) -> Node:
-        token = self._token
-        for name in _PROPERTIES:
-            pattern = re.compile(name.replace(" ", r"\s+") + r"\b")
-            if found := pattern.match(self._text, token.position, self._stop):
-                self._token = self._read(found.end())
-                return Path(node, name)
-        if token.kind not in ("name", "word"):
-            self._fail(f"expected a name after '.', found {self._found}")
         self._next()
+        first = self._first
+        name = " ".join(self._tokens[first : first + 2])
+        if name in _PROPERTIES:
+            self._last = first + 1
+            self._next()
+            return Path(node, name)
+        if self._kind != "name" and self._kind not in KEYWORDS:
+            self._fail(f"expected a name after '.', found {self._found}")
+        name = self._next()
         if isinstance(node, Name) and node.name.partition(".")[0] not in self._locals:
-            return Name(f"{node.name}.{token.text}")
-        return Path(node, token.text)
+            return Name(f"{node.name}.{name}")
+        return Path(node, name)
 
     def _primary(self) -> Node:
-        token = self._token
-        match token.kind:
+        kind, token = self._kind, self._token
+        match kind:
             case "number":
                 self._next()
-                if len(token.text) > _EXACT_DIGITS:  # a double has not all of them
-                    return Call("FEEL number", (Literal(token.text),))
-                return Literal(read_number(token.text))
-            case "text":
-                self._next()
-                return Literal(_unescaped(token.text[1:-1]))
+                if token.isdecimal() and len(token) <= _EXACT_DIGITS:
+                    return Literal(int(token))
+                if len(token) > _EXACT_DIGITS or math.isinf(value := float(token)):
+                    return Call("FEEL number", (Literal(token),))  # a double has not all of it
+                return Literal(value)
             case "name":
-                return self._named(self._next())
-            case "end":
-                self._fail("expected a value, found the end")
-        match token.text:
-            case "true" | "false" | "null":
+                first = self._first
                 self._next()
-                return Literal({"true": True, "false": False}.get(token.text))
-            case "function":
-                return self._function()
-            case "@":
-                self._next()
-                if self._token.kind != "text":
-                    self._fail("expected a text after '@'")
-                return Call("FEEL @", (Literal(_unescaped(self._next().text[1:-1])),))
-            case "{":
-                return self._context()
+                return self._call(token, first) if self._kind == "(" else Name(token)
+            case "text":
+                return Literal(self._quoted())
             case "[" | "]" | "(":
                 return self._bracketed()
+            case "{":
+                return self._context()
+            case "true" | "false" | "null":
+                self._next()
+                return Literal(_CONSTANTS[token])
+            case "@":
+                self._next()
+                if self._kind != "text":
+                    self._fail("expected a text after '@'")
+                return Call("FEEL @", (Literal(self._quoted()),))
+            case "function":
+                return self._function()
         self._fail(f"expected a value, found {self._found}")
 
-    def _named(self, token: Token) -> Node:
-        if not self._is("("):
-            return Name(token.text)
-        if token.text == "not":
+    def _quoted(self) -> str:
+        text = self._next()[1:-1]
+        return _unescaped(text) if "\\" in text else text
+
+    def _call(self, name: str, first: int) -> Node:
+        if name == "not":
             self._next()
             node = self._expression()
             self._expect(")", "to close 'not('")
             return Not(node)
         arguments, names = self._arguments()
-        if token.text in self._locals:
-            return Invoke(Name(token.text), arguments, names)
+        if name in self._locals:
+            return Invoke(Name(name), arguments, names)
         try:
-            return feel_call(token.text, arguments, names)
+            return feel_call(name, arguments, names)
         except CallError as error:
-            self._fail(str(error), token.position)
+            self._fail(str(error), first)
 
     def _arguments(self) -> tuple[tuple[Node, ...], tuple[str, ...]]:
-        self._expect("(", "before arguments")
+        self._next()
         arguments, names = list[Node](), list[str]()
-        while not self._is(")"):
+        while self._kind != ")":
             if arguments and not self._take(","):
                 break
             if len(arguments) == MAX_ITEMS:
                 self._fail(f"more than {MAX_ITEMS} items")
-            if named := _NAMED.match(self._text, self._token.position, self._stop):
-                names.append(re.sub(r"\s+", " ", named[1]))
-                self._token = self._read(named.end())
+            if named := self._label():
+                names.append(named)
             elif names:
                 self._fail("all arguments have names, or none")
             arguments.append(self._expression())
@@ -389,11 +403,27 @@ class FeelParser(Descent):
             self._fail("all arguments have names, or none")
         return tuple(arguments), tuple(names)
 
+    def _label(self) -> str:
+        """Read the name of an argument and the colon after it; "": there is none."""
+        tokens, at = self._tokens, self._first
+        if self._kind != "name" and self._kind not in KEYWORDS:
+            return ""
+        while tokens[at][:1] not in _KINDS and (
+            tokens[at] not in _SPELLED or tokens[at] in KEYWORDS
+        ):
+            at += 1
+        if tokens[at] != ":":
+            return ""
+        name = " ".join(tokens[self._first : at])
+        self._last = at
+        self._next()
+        return name
+
     def _function(self) -> Node:
         self._next()
         self._expect("(", "after 'function'")
         known, parameters = len(self._locals), list[str]()
-        while not self._is(")"):
+        while self._kind != ")":
             if parameters:
                 self._expect(",", "between parameters")
             name = self._variable("of a parameter")
@@ -402,17 +432,18 @@ class FeelParser(Descent):
             parameters.append(name)
         self._locals += parameters
         self._expect(")", "to close the parameters")
-        if self._token.text == "external":
+        if self._token == "external":
             self._fail("functions of Java or PMML are not run")
         body = self._expression()
         del self._locals[known:]
         return Lambda(tuple(parameters), body)
 
     def _context(self) -> Node:
-        opening = self._next()
+        opening = self._first
+        self._next()
         known = len(self._locals)
         entries: list[tuple[str, Node]] = []
-        while not self._is("}"):
+        while self._kind != "}":
             if entries and not self._take(","):
                 break
             key = self._key()
@@ -422,47 +453,57 @@ class FeelParser(Descent):
             self._locals.append(self._known(key))
             if len(entries) > MAX_ITEMS:
                 self._fail(f"more than {MAX_ITEMS} items")
-            self._token = self._read(self._token.position)  # with the key as a name
+            if self._names:
+                self._last = self._first - 1
+                self._next()  # with the key as a name
         self._expect("}", "to close '{'", opening)
         del self._locals[known:]
         return ContextOf(tuple(entries))
 
     def _key(self) -> str:
-        start = self._token.position
-        if self._token.kind == "text":
-            key = _unescaped(self._next().text[1:-1])
+        if self._kind == "text":
+            key = self._quoted()
             self._expect(":", "after a key")
             return key
-        colon = self._text.find(":", start, self._stop)
-        if colon < 0 or self._token.kind not in ("name", "word"):
+        named = self._kind == "name" or self._kind in KEYWORDS
+        if named and not self._names and self._tokens[self._last + 1] == ":":
+            key = self._token
+            self._last += 1
+            self._next()
+            return key
+        start = self._position
+        colon = self._text.find(":", start, self._span.stop)
+        if colon < 0 or not named:
             self._fail(f"expected a key, found {self._found}")
         key = re.sub(r"\s+", " ", self._text[start:colon].strip())
         if re.search(r'[\[\](){}",:]', key):
-            self._fail("expected ':' after a key", start)
-        self._token = self._read(colon + 1)
+            self._fail("expected ':' after a key")
+        self._skip_to(colon + 1)
+        self._next()
         return key
 
     def _bracketed(self) -> Node:
         """A list, a range, or an expression in parentheses."""
-        opening = self._next()
-        if opening.text == "(" and self._is("<", "<=", ">", ">=", "=", "!="):
+        opening = self._first
+        bracket = self._next()
+        if bracket == "(" and self._kind in _COMPARISONS:
             node = self._open_range()
             self._expect(")", "to close '('")
             return node
-        if opening.text == "[" and self._take("]"):
+        if bracket == "[" and self._take("]"):
             return ListOf(())
-        items = [self._item(opening)]
+        items = [self._item(bracket)]
         if self._take(".."):
-            return self._to_end(items[0], opening.text == "[")
-        if opening.text == "]":
+            return self._to_end(items[0], bracket == "[")
+        if bracket == "]":
             self._expect("..", "in a range")
-        if opening.text == "(":
+        if bracket == "(":
             self._expect(")", "to close '('", opening)
             return items[0]
         while self._take(","):
             if len(items) == MAX_ITEMS:
                 self._fail(f"more than {MAX_ITEMS} items")
-            items.append(self._item(opening))
+            items.append(self._item(bracket))
         self._expect("]", "to close '['", opening)
         return ListOf(tuple(items))
 
@@ -471,19 +512,18 @@ class FeelParser(Descent):
         outer, self._in_range = self._in_range, True
         high = self._expression()
         self._in_range = outer
-        closing = self._take("]", ")", "[")
-        if closing is None:
+        if self._kind not in ("]", ")", "["):
             self._fail("expected ']' or ')' to close the range")
-        return RangeOf(low, high, included, closing.text == "]")
+        return RangeOf(low, high, included, self._next() == "]")
 
-    def _item(self, opening: Token) -> Node:
-        if opening.text == "[" and self._is("<", "<=", ">", ">=", "!="):
+    def _item(self, bracket: str) -> Node:
+        if bracket == "[" and self._kind in _COMPARISONS and self._kind != "=":
             return self._open_range()
         return self._expression()
 
     def _open_range(self) -> Node:
         """`< x` and the like, as a range."""
-        operator = self._next().text
+        operator = self._next()
         value = self._operators(_COMPARISON)
         match operator:
             case "<" | "<=":
@@ -496,24 +536,25 @@ class FeelParser(Descent):
 
     def _tests(self, left: Node) -> Node:
         """What follows `in`: a test, or some of them in parentheses."""
-        if self._is(*_COMPARISONS):
+        if self._kind in _COMPARISONS:
             return self._test(left)
-        if not self._is("("):
+        if self._kind != "(":
             return _within(left, self._operators(_COMPARISON))
-        opening = self._next()
-        tests = [self._test(left, alone=False)]
+        opening = self._first
+        self._next()
+        tests = [self._test(left)]
         if self._take(".."):
             return _within(left, self._to_end(self._low, False))
         while self._take(","):
-            tests.append(self._test(left, alone=False))
+            tests.append(self._test(left))
         self._expect(")", "to close '('", opening)
         if all(isinstance(each, In) and isinstance(each.container, Literal) for each in tests):
             return In(left, ListOf(tuple(each.container for each in tests)))  # type: ignore[union-attr]
         return Or(tuple(tests)) if len(tests) > 1 else tests[0]
 
-    def _test(self, left: Node, *, alone: bool = True) -> Node:
-        if self._is(*_COMPARISONS):
-            operator = _COMPARISONS[self._next().text]
+    def _test(self, left: Node) -> Node:
+        if self._kind in _COMPARISONS:
+            operator = _COMPARISONS[self._next()]
             return Compare(operator, left, self._operators(_COMPARISON))
         self._low = self._expression()
         return _within(left, self._low)
@@ -521,10 +562,13 @@ class FeelParser(Descent):
     # --- types ------------------------------------------------------------------------------------
 
     def _type(self) -> TypeName:
-        for name in _TYPES:
-            pattern = re.compile(name.replace(" ", r"\s+") + r"(?!\w)")
-            if found := pattern.match(self._text, self._token.position, self._stop):
-                self._token = self._read(found.end())
+        first = self._first
+        for words in _TYPES:
+            after = first + len(words)
+            if self._tokens[first:after] == words:
+                self._last = after - 1
+                self._next()
+                name = " ".join(words)
                 return name, tuple(self._parts(name))
         self._fail(f"expected a type such as number or list<string>, found {self._found}")
 
@@ -532,7 +576,7 @@ class FeelParser(Descent):
         parts = list[tuple[str, TypeName]]()
         if name not in ("list", "context", "range", "function") or not self._take("<"):
             return parts
-        while not self._is(">"):
+        while self._kind != ">":
             if parts:
                 self._expect(",", "between types")
             key = self._key() if name == "context" else ""

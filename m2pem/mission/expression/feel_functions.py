@@ -5,7 +5,6 @@ item, and a value for a list of it, where the other is wanted (clause 10.3.2.9.4
 """
 
 import math
-import re
 import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -283,12 +282,3 @@ ALTERNATIVES = {
     for number, each in enumerate(function.ways if function.others else ())
 }
 """The ways to call a function: the names of arguments tell which one is meant."""
-
-_NAMED = (each for each in {*FEEL_FUNCTIONS, "not"} if " " in each or each == "not")
-NAMES = [
-    (re.compile("(" + name.replace(" ", r"\s+") + r")(?=\s*\()"), name)
-    for name in sorted(_NAMED, key=len, reverse=True)
-]
-"""Names of functions that are several words, and how they are found."""
-
-NAME_HEADS = frozenset(name.split()[0] for _, name in NAMES)

@@ -1,10 +1,9 @@
 """Splits an expression into tokens."""
 
 import re
-from typing import NoReturn
+from typing import NamedTuple, NoReturn
 
 from m2pem.errors import ExpressionSyntaxError
-from m2pem.mission.expression.descent import Token
 from m2pem.mission.expression.dialect import Dialect, Span
 from m2pem.mission.expression.literals import NUMBER, unescape
 from m2pem.mission.expression.vocabulary import LOWEST, MEANINGS, SYMBOLS
@@ -41,6 +40,17 @@ _ASCII_NAME = re.compile(r"(?a:[A-Za-z_]\w*+(?:\.\w++)*)")
 _QUOTED = r"""'[^'\\]*+(?:\\[nt'"\\][^'\\]*+)*'|"[^"\\]*+(?:\\[nt'"\\][^"\\]*+)*\""""
 _NOTHING = "(?!)"
 _ALONE = r"(?![\w.]|[^\x00-\x7f])"
+
+
+class Token(NamedTuple):
+    """An operator, bracket or comma, whose kind is its name in the bare dialect; a "number",
+    "name", "constant" or the "end". `position`: in the whole text. `strength`: how strongly it
+    binds as an operator after a value."""
+
+    kind: str
+    text: str
+    position: int
+    strength: int
 
 
 def _pattern(dialect: Dialect) -> re.Pattern[str]:
@@ -109,8 +119,8 @@ def tokenize(text: str, span: Span, dialect: Dialect) -> list[Token]:
             kind = "name"
         elif written in meanings:
             kind, written, strength = meanings[written]
-        tokens.append(_new(Token, (kind, written, start, position, strength)))
-    tokens.append(_new(Token, ("end", "the end", span.stop, span.stop, LOWEST)))
+        tokens.append(_new(Token, (kind, written, start, strength)))
+    tokens.append(Token("end", "the end", span.stop, LOWEST))
     return tokens
 
 

@@ -9,7 +9,7 @@ import re
 from collections.abc import Callable
 
 from m2pem.mission.expression.calls import CallError, meaning, method_call
-from m2pem.mission.expression.descent import MAX_ITEMS, Descent, Token
+from m2pem.mission.expression.descent import MAX_ITEMS, Descent
 from m2pem.mission.expression.dialect import Dialect, Span
 from m2pem.mission.expression.lexer import tokenize
 from m2pem.mission.expression.literals import read_number, unescape
@@ -52,15 +52,24 @@ class Parser(Descent):
 
     def __init__(self, text: str, span: Span, dialect: Dialect) -> None:
         self._text = text
-        self._coming = iter(tokenize(text, span, dialect))
-        self._token = next(self._coming)
+        self._tokens = tokenize(text, span, dialect)
         self._dialect = dialect
+        self._next()
+
+    def _next(self) -> str:
+        read = self._token
+        self._first += 1
+        self._kind, self._token, _, self._strength = self._tokens[self._first]
+        return read
+
+    def _place(self, token: int) -> int:
+        return self._tokens[token][2]
 
     def _expression(self, minimum: int = LOWEST) -> Node:
         """The longest expression whose operators bind more strongly than `minimum`."""
         self._nest()
         node = self._prefix(minimum)
-        while (strength := self._token.strength) > minimum:
+        while (strength := self._strength) > minimum:
             node = self._binary(node, strength)
         if minimum == LOWEST and self._take("?"):
             then = self._expression(LOWEST)
@@ -71,8 +80,8 @@ class Parser(Descent):
 
     def _binary(self, left: Node, strength: int) -> Node:
         if strength <= AND:
-            return self._joined(left, self._expression)
-        operator = self._next().text
+            return self._joined(left, strength, self._expression)
+        operator = self._next()
         negated = operator == "not"
         if negated:
             self._expect("in", "after 'not'")
@@ -87,99 +96,102 @@ class Parser(Descent):
         return Arithmetic(_OPERATIONS[operator], left, right)
 
     def _refuse_chain(self) -> None:
-        if self._token.strength == COMPARISON:
+        if self._strength == COMPARISON:
             self._fail("comparisons do not chain; write 'a < b and b < c', or use parentheses")
 
     def _prefix(self, minimum: int) -> Node:
-        token = self._next()
-        match token.kind:
+        kind, first = self._kind, self._first
+        if kind == "end":
+            self._fail("expected a value, found the end")
+        text = self._next()
+        match kind:
             case "name":
-                return self._inside(self._name(token))
+                return self._inside(self._name(text, first))
             case "number":
-                return self._number(token, "")
+                return self._number(text, first)
             case "constant":
-                return Literal(_constant(token.text))
-            case "end":
-                self._fail("expected a value, found the end", token)
-        match token.text:
+                return Literal(_constant(text))
             case "(":
                 node = self._expression(LOWEST)
-                self._expect(")", "to close '('", token)
+                self._expect(")", "to close '('", first)
                 return self._inside(node)
             case "[":
-                return self._inside(ListOf(self._items("]", token)))
+                return self._inside(ListOf(self._items("]", first)))
             case "-":
-                number = self._token
-                if number.kind == "number":
-                    return self._number(self._next(), "-")
+                if self._kind == "number":
+                    return self._number("-" + self._next(), first + 1)
                 return Negate(self._expression(UNARY))
             case "not":
-                return self._not(token, minimum)
-            case "%" if self._token.text == "(" and self._text.startswith("mod", token.position):
-                return self._inside(self._name(token._replace(text="mod")))
+                return self._not(first, minimum)
+            case "%" if self._kind == "(" and self._text.startswith("mod", self._place(first)):
+                return self._inside(self._name("mod", first))
             case "empty":
-                return self._unambiguous(Call("is_empty", (self._expression(UNARY),)), token)
-        self._fail(f"expected a value, found {token.text!r}", token)
+                return self._unambiguous(Call("is_empty", (self._expression(UNARY),)), first)
+        self._fail(f"expected a value, found {text!r}", first)
 
-    def _not(self, token: Token, minimum: int) -> Node:
+    def _not(self, first: int, minimum: int) -> Node:
         if self._dialect is Dialect.BARE:
             if minimum > NOT:
-                self._fail("put 'not ...' into parentheses here", token)
+                self._fail("put 'not ...' into parentheses here", first)
             return Not(self._expression(NOT))
-        return self._unambiguous(Not(self._expression(UNARY)), token)
+        return self._unambiguous(Not(self._expression(UNARY)), first)
 
-    def _unambiguous(self, node: Node, token: Token) -> Node:
+    def _unambiguous(self, node: Node, first: int) -> Node:
         # JUEL reads '!a == b' as '(!a) == b', most people as '!(a == b)'.
-        if self._token.strength >= EQUALITY:
-            self._fail(
-                f"'{token.text}' is ambiguous before '{self._token.text}'; use parentheses", token
-            )
+        if self._strength >= EQUALITY:
+            operator = self._tokens[first][1]
+            self._fail(f"'{operator}' is ambiguous before '{self._token}'; use parentheses", first)
         return node
 
-    def _number(self, token: Token, sign: str) -> Node:
+    def _number(self, written: str, first: int) -> Node:
         try:
-            return Literal(read_number(sign + token.text))
+            return Literal(read_number(written))
         except ValueError as error:
-            self._fail(str(error), token)
+            self._fail(str(error), first)
 
-    def _name(self, token: Token) -> Node:
-        name = token.text
-        if opening := self._take("("):
-            arguments = self._items(")", opening)
-            return self._meant(lambda: meaning(name, arguments, self._dialect), token)
-        return Name(name)
+    def _name(self, name: str, first: int) -> Node:
+        if self._kind != "(":
+            return Name(name)
+        arguments = self._arguments()
+        return self._meant(lambda: meaning(name, arguments, self._dialect), first)
 
-    def _meant(self, read: Callable[[], Node], token: Token) -> Node:
+    def _meant(self, read: Callable[[], Node], first: int) -> Node:
         try:
             return read()
         except CallError as error:
-            self._fail(str(error), token)
+            self._fail(str(error), first)
 
     def _inside(self, node: Node) -> Node:
         """Parse the accesses after a value: `[0]`, `['key']`, `.key`."""
-        while self._token.text in ("[", "."):
-            opening = self._next()
-            if opening.text == "[":
+        while True:
+            opening = self._first
+            if self._take("["):
                 key = self._expression()
                 self._expect("]", "to close '['", opening)
                 node = _taken(node, key)
-            else:
+            elif self._take("."):
                 node = self._member(node)
-        return node
+            else:
+                return node
 
     def _member(self, node: Node) -> Node:
-        token = self._next()
-        if token.kind != "name":
-            self._fail("expected a name after '.'", token)
-        *keys, last = token.text.split(".")
+        first = self._first
+        if self._kind != "name":
+            self._fail("expected a name after '.'")
+        *keys, last = self._next().split(".")
         for key in keys:
             node = _taken(node, Literal(key))
-        if self._dialect is Dialect.JUEL and (opening := self._take("(")):
-            holder, arguments = node, self._items(")", opening)
-            return self._meant(lambda: method_call(holder, last, arguments), token)
+        if self._dialect is Dialect.JUEL and self._kind == "(":
+            holder, arguments = node, self._arguments()
+            return self._meant(lambda: method_call(holder, last, arguments), first)
         return _taken(node, Literal(last))
 
-    def _items(self, closing: str, opening: Token) -> tuple[Node, ...]:
+    def _arguments(self) -> tuple[Node, ...]:
+        opening = self._first
+        self._next()
+        return self._items(")", opening)
+
+    def _items(self, closing: str, opening: int) -> tuple[Node, ...]:
         items: list[Node] = []
         if self._take(closing):
             return ()
@@ -188,13 +200,9 @@ class Parser(Descent):
                 self._fail(f"more than {MAX_ITEMS} items")
             items.append(self._expression(LOWEST))
             if not self._take(","):
-                self._expect(closing, f"to close '{opening.text}'", opening)
+                why = f"to close '{self._tokens[opening][1]}'"
+                self._expect(closing, why, opening)
                 return tuple(items)
-
-    def _next(self) -> Token:
-        token = self._token
-        self._token = next(self._coming, token)
-        return token
 
 
 def _constant(written: str) -> bool | str | None:

@@ -1,14 +1,15 @@
 """The syntax tree: what all dialects parse to, and what a verifier translates.
 
 Nodes are immutable. A tree is never deeper than `MAX_DEPTH`, so walking it by recursion is safe.
-Dataclass equality takes `Literal(1)`, `Literal(1.0)` and `Literal(True)` for the same, as Python
+Equality takes `Literal(1)`, `Literal(1.0)` and `Literal(True)` for the same, as Python
 does; compare `repr` where the type matters.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields
 from enum import StrEnum
 from typing import TypeAlias, Union, get_args
+
+from msgspec import Struct
 
 MAX_DEPTH = 100
 
@@ -39,50 +40,43 @@ class Operation(StrEnum):
     __hash__ = str.__hash__
 
 
-@dataclass(frozen=True, slots=True)
-class Literal:
+class Literal(Struct, frozen=True, gc=False):
     """A value as written."""
 
     value: bool | int | float | str | None
 
 
-@dataclass(frozen=True, slots=True)
-class Name:
+class Name(Struct, frozen=True, gc=False):
     """The value under a dotted name of the data store; null when it is not there."""
 
     name: str
 
 
-@dataclass(frozen=True, slots=True)
-class ListOf:
+class ListOf(Struct, frozen=True, gc=False):
     """`[a, b]`."""
 
     items: "tuple[Node, ...]"
 
 
-@dataclass(frozen=True, slots=True)
-class Not:
+class Not(Struct, frozen=True, gc=False):
     """`not a`; null counts as false."""
 
     operand: "Node"
 
 
-@dataclass(frozen=True, slots=True)
-class And:
+class And(Struct, frozen=True, gc=False):
     """`a and b and ...`, from left to right until one is false."""
 
     operands: "tuple[Node, ...]"
 
 
-@dataclass(frozen=True, slots=True)
-class Or:
+class Or(Struct, frozen=True, gc=False):
     """`a or b or ...`, from left to right until one is true."""
 
     operands: "tuple[Node, ...]"
 
 
-@dataclass(frozen=True, slots=True)
-class Compare:
+class Compare(Struct, frozen=True, gc=False):
     """`left operator right`, always true or false."""
 
     operator: Comparison
@@ -90,23 +84,20 @@ class Compare:
     right: "Node"
 
 
-@dataclass(frozen=True, slots=True)
-class In:
+class In(Struct, frozen=True, gc=False):
     """`item in container`: whether a list has an item that is equal."""
 
     item: "Node"
     container: "Node"
 
 
-@dataclass(frozen=True, slots=True)
-class Negate:
+class Negate(Struct, frozen=True, gc=False):
     """`-a`."""
 
     operand: "Node"
 
 
-@dataclass(frozen=True, slots=True)
-class Arithmetic:
+class Arithmetic(Struct, frozen=True, gc=False):
     """`left operator right`; null when either is null."""
 
     operator: Operation
@@ -114,16 +105,14 @@ class Arithmetic:
     right: "Node"
 
 
-@dataclass(frozen=True, slots=True)
-class Call:
+class Call(Struct, frozen=True, gc=False):
     """A listed function; `function` is its name in `functions.LISTED`, whatever the dialect."""
 
     function: str
     arguments: "tuple[Node, ...]"
 
 
-@dataclass(frozen=True, slots=True)
-class If:
+class If(Struct, frozen=True, gc=False):
     """`then` where `condition` is true, else `otherwise`; null counts as false."""
 
     condition: "Node"
@@ -131,16 +120,14 @@ class If:
     otherwise: "Node"
 
 
-@dataclass(frozen=True, slots=True)
-class Index:
+class Index(Struct, frozen=True, gc=False):
     """`container[key]`: an item of a list, counted from 0 (from -1 backwards), or of a map."""
 
     container: "Node"
     key: "Node"
 
 
-@dataclass(frozen=True, slots=True)
-class Some:
+class Some(Struct, frozen=True, gc=False):
     """Whether the condition is true with `variable` as one of the items; never, of null."""
 
     variable: str
@@ -148,8 +135,7 @@ class Some:
     condition: "Node"
 
 
-@dataclass(frozen=True, slots=True)
-class Every:
+class Every(Struct, frozen=True, gc=False):
     """As `Some`: whether the condition is true with each item. FEEL's."""
 
     variable: str
@@ -157,39 +143,34 @@ class Every:
     condition: "Node"
 
 
-@dataclass(frozen=True, slots=True)
-class For:
+class For(Struct, frozen=True, gc=False):
     """The list of `result` for each combination of items; `partial` is what there is so far."""
 
     iterators: "tuple[tuple[str, Node], ...]"
     result: "Node"
 
 
-@dataclass(frozen=True, slots=True)
-class Filter:
+class Filter(Struct, frozen=True, gc=False):
     """`container[condition]` of FEEL: the item of a number, or the items for which it is true."""
 
     container: "Node"
     condition: "Node"
 
 
-@dataclass(frozen=True, slots=True)
-class Path:
+class Path(Struct, frozen=True, gc=False):
     """`container.key` of FEEL: an entry, of lists that of each item, or a property."""
 
     container: "Node"
     key: str
 
 
-@dataclass(frozen=True, slots=True)
-class ContextOf:
+class ContextOf(Struct, frozen=True, gc=False):
     """`{key: value}`; a value may read the entries before it."""
 
     entries: "tuple[tuple[str, Node], ...]"
 
 
-@dataclass(frozen=True, slots=True)
-class RangeOf:
+class RangeOf(Struct, frozen=True, gc=False):
     """`[low..high]`; None: without that end. `negated`: all but `low`. `descends`: of an iteration,
     which may go from a higher value to a lower one."""
 
@@ -201,16 +182,14 @@ class RangeOf:
     descends: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class Lambda:
+class Lambda(Struct, frozen=True, gc=False):
     """`function(a, b) body`."""
 
     parameters: tuple[str, ...]
     body: "Node"
 
 
-@dataclass(frozen=True, slots=True)
-class Invoke:
+class Invoke(Struct, frozen=True, gc=False):
     """A call of a function that an expression defines. `names`: of its arguments, or none."""
 
     function: "Node"
@@ -222,16 +201,14 @@ TypeName: TypeAlias = tuple[str, tuple[tuple[str, "TypeName"], ...]]
 """A type of FEEL: its name, and the types of its parts by their names ("" where they have none)."""
 
 
-@dataclass(frozen=True, slots=True)
-class InstanceOf:
+class InstanceOf(Struct, frozen=True, gc=False):
     """`value instance of type`."""
 
     value: "Node"
     type: TypeName
 
 
-@dataclass(frozen=True, slots=True)
-class Join:
+class Join(Struct, frozen=True, gc=False):
     """A text with `${...}` parts; each part's value is written into it."""
 
     parts: "tuple[Node, ...]"
@@ -266,7 +243,7 @@ Node: TypeAlias = Union[
 
 
 _BELOW = {
-    each: tuple(one.name for one in fields(each) if "Node" in str(one.type))
+    each: tuple(name for name, of in each.__annotations__.items() if "Node" in str(of))
     for each in get_args(Node)
 }
 """The fields of each node that hold nodes: one, several, or several with names."""

@@ -56,7 +56,7 @@ def _meanings(dialect: Dialect) -> dict[str, tuple[str, str, int]]:
     equality = dict.fromkeys(("==", "!="), EQUALITY) if dialect in COERCING else {}
     binary = {**_BINARY, **equality}
     return {
-        **{w: ("operator", name, binary.get(name, LOWEST)) for w, name in operators.items()},
+        **{w: (name, name, binary.get(name, LOWEST)) for w, name in operators.items()},
         **{word: ("constant", word, LOWEST) for word in CONSTANTS},
     }
 
