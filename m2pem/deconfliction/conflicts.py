@@ -85,7 +85,7 @@ def conflict_text(conflict: Conflict, where: str, again: Again | None) -> str:
     near = f"nearer than {policy.horizontal_m:g} m"
     if airborne:
         near += f" and {policy.vertical_m:g} m in height"
-    altitudes = [] if again is None else _altitudes(conflict, policy, again)
+    altitudes = [] if again is None else _altitudes(conflict, again)
     advice = ", or ".join([*altitudes, way_out(other, "landed" if airborne else "")])
     if not altitudes:
         advice = f"start it {advice}"
@@ -134,53 +134,31 @@ def _heights(piece: Piece, home_m: float | None) -> str:
     return f" at {high} m{frame}" if low == high else f" at {low} to {high} m{frame}"
 
 
-def _altitudes(conflict: Conflict, policy: Separation, again: Again) -> list[str]:
+def _altitudes(conflict: Conflict, again: Again) -> list[str]:
     """Altitudes that were found to be free, the higher ones first."""
     found = []
-    above_m = _search(conflict, lambda piece: _over(piece, policy), again)
-    if above_m is not None:
-        found.append(_said(above_m, "climb", "more", HIGHEST_M, again))
-    below_m = _search(conflict, lambda piece: _under(piece, policy), again)
-    if below_m is not None:
-        found.append(_said(below_m, "descend", "less", LOWEST_M, again))
+    for up, change, beyond in ((True, "climb", "more"), (False, "descend", "less")):
+        altitude_m = _free_altitude_m(conflict, up, again)
+        if altitude_m is not None:
+            farthest_free = again(HIGHEST_M if up else LOWEST_M, True) is None
+            at = f"{altitude_m:.0f} m" + (f" or {beyond}" if farthest_free else "")
+            at_once = again(altitude_m, False) is None
+            found.append(f"fly at {at}" if at_once else f"{change} to {at} first")
     return found
 
 
-def _said(altitude_m: float, change: str, beyond: str, farthest_m: float, again: Again) -> str:
-    """`change`: whether it climbs or descends; it may then conflict with a third one."""
-    at = f"{altitude_m:.0f} m"
-    if again(farthest_m, True) is None:
-        at += f" or {beyond}"
-    if again(altitude_m, False) is None:
-        return f"fly at {at}"
-    return f"{change} to {at} first"
-
-
-def _over(piece: Piece, policy: Separation) -> tuple[float, Callable[[float], int]]:
-    return piece.high_m + policy.vertical_m - NOTHING_M, math.ceil
-
-
-def _under(piece: Piece, policy: Separation) -> tuple[float, Callable[[float], int]]:
-    return piece.low_m - policy.vertical_m + NOTHING_M, math.floor
-
-
-def _search(
-    conflict: Conflict,
-    beside: Callable[[Piece], tuple[float, Callable[[float], int]]],
-    again: Again,
-) -> float | None:
+def _free_altitude_m(conflict: Conflict, up: bool, again: Again) -> float | None:
     """Return the nearest altitude above home without any conflict; None: there is none."""
     met: Conflict | None = conflict
-    tried: set[float] = set()
-    while met is not None and len(tried) < _TRIES:
-        edge_m, whole = beside(met.piece)
+    apart_m = conflict.policy.vertical_m - NOTHING_M
+    altitude_m, tried = 0.0, set[float]()
+    while met is not None:
+        edge_m = met.piece.high_m + apart_m if up else met.piece.low_m - apart_m
         if met.home_m is None or not LOWEST_M <= edge_m - met.home_m <= HIGHEST_M:
             return None
-        altitude_m = float(whole(edge_m - met.home_m))
-        if altitude_m in tried:
+        altitude_m = float((math.ceil if up else math.floor)(edge_m - met.home_m))
+        if altitude_m in tried or len(tried) == _TRIES:
             return None
         tried.add(altitude_m)
         met = again(altitude_m, True)
-        if met is None:
-            return altitude_m
-    return None
+    return altitude_m

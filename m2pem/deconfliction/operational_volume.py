@@ -4,12 +4,11 @@ Heights are metres above mean sea level, times seconds since the Unix epoch.
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from m2pem.geo.local_frame import EastNorth
-from m2pem.geo.polygon import Hull, buffered_hull, hull_distance_m
+from m2pem.geo.polygon import Hull, buffered_hull, hull_distance_m, near_stretch
 
 NOTHING_M = 0.01
 """Two computations of one place may differ by this."""
@@ -19,8 +18,6 @@ OFF_M = 3.0
 
 REACHED_M = 2.0
 """A vehicle that is nearer to a place of its route than this has reached it."""
-
-_HALVINGS = 40
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,40 +130,14 @@ def _near(a: Piece, b: Piece, policy: Separation) -> bool:
 
 def _when(piece: Piece, other: Piece, reach_m: float) -> tuple[float, float]:
     """From when to when a piece is taken as far as it is within reach of another."""
-    way = piece.way
-    if way is None or other.area is None:
+    stretch = None
+    if piece.way is not None and other.area is not None:
+        stretch = near_stretch(piece.way, other.area, reach_m + piece.aside_m)
+    begin, end = stretch or (0.0, 1.0)  # only just not apart: nothing can be left out
+    if (begin, end) == (0.0, 1.0):
         return piece.from_s, piece.to_s
-    reach_m += piece.aside_m
-
-    def off_m(share: float) -> float:
-        return hull_distance_m((_on(way, share),), other.area)
-
-    # How far off it is, is a convex function of the way: the near part is one stretch.
-    low, high = 0.0, 1.0
-    for _ in range(_HALVINGS):
-        left, right = low + (high - low) / 3, high - (high - low) / 3
-        if off_m(left) <= off_m(right):
-            high = right
-        else:
-            low = left
-    nearest = (low + high) / 2
-    if off_m(nearest) >= reach_m:  # only just not apart: nothing can be left out
-        return piece.from_s, piece.to_s
-    begin, end = _edge(off_m, nearest, 0.0, reach_m), _edge(off_m, nearest, 1.0, reach_m)
     lasts_s = piece.to_s - piece.from_s
     return piece.from_s + begin * lasts_s, piece.from_s + end * lasts_s
-
-
-def _edge(off_m: Callable[[float], float], near: float, far: float, reach_m: float) -> float:
-    if off_m(far) < reach_m:
-        return far
-    for _ in range(_HALVINGS):
-        middle = (near + far) / 2
-        if off_m(middle) < reach_m:
-            near = middle
-        else:
-            far = middle
-    return far
 
 
 def _dot(start: EastNorth, before: EastNorth, end: EastNorth, place: EastNorth) -> float:

@@ -6,12 +6,13 @@ Rings of areas are in degrees: GeoJSON draws straight edges in the plane of long
 """
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
 from typing import TYPE_CHECKING, TypeAlias
 
+from m2pem.geo.fence import valid
 from m2pem.geo.lazy_imports import shapely
 from m2pem.geo.local_frame import EastNorth, LatLon, LocalFrame
 from m2pem.mission.geometry import Area, Coordinate, Geometry, Point, Route
@@ -67,12 +68,10 @@ def middle_of(corners: Sequence[EastNorth]) -> EastNorth:
 
 
 def convex_hull(points: Iterable[EastNorth]) -> Hull:
-    """Return the smallest convex polygon around points; at least one is needed."""
-    ordered = sorted(set(points))
-    if len(ordered) < 3:
-        return tuple(ordered)
-    lower, upper = _chain(ordered), _chain(ordered[::-1])
-    return (*lower[:-1], *upper[:-1])
+    """Return the smallest convex polygon around points; of none, one without corners."""
+    places = [*points]
+    corners = _corners(shapely.multipoints(places).convex_hull) if places else []
+    return tuple(corners) if len(corners) < 3 else tuple(corners[:0:-1])
 
 
 def buffered_hull(points: Iterable[EastNorth], distance_m: float) -> Hull:
@@ -98,6 +97,17 @@ def hull_distance_m(a: Hull | None, b: Hull | None) -> float:
     return 0.0 if a is None or b is None else float(_shape(a).distance(_shape(b)))
 
 
+def near_stretch(
+    way: tuple[EastNorth, EastNorth], hull: Hull, distance_m: float
+) -> tuple[float, float] | None:
+    """Return from which to which share of its length a straight way is nearer to a convex polygon
+    than a distance; None: nowhere."""
+    line = _shape(way)
+    near = shapely.get_coordinates(line.intersection(_shape(hull).buffer(distance_m, 64)))
+    shares = shapely.line_locate_point(line, shapely.points(near), normalized=True)
+    return (float(min(shares)), float(max(shares))) if len(near) else None
+
+
 def meeting_place(a: Hull | None, b: Hull | None) -> EastNorth | None:
     """Return the middle of what two convex polygons have in common, or the middle between them if
     they are apart. None is everywhere; if both are, there is no middle."""
@@ -114,20 +124,6 @@ def _middle_between(a: "BaseGeometry", b: "BaseGeometry") -> EastNorth:
 
 def _corners(shape: "BaseGeometry") -> list[EastNorth]:
     return [(east, north) for east, north in shapely.get_coordinates(shape).tolist()]
-
-
-def _chain(points: Sequence[EastNorth]) -> list[EastNorth]:
-    kept: list[EastNorth] = []
-    for point in points:
-        while len(kept) >= 2 and _turn(kept[-2], kept[-1], point) <= 0:
-            kept.pop()
-        kept.append(point)
-    return kept
-
-
-def _turn(a: EastNorth, b: EastNorth, c: EastNorth) -> float:
-    """Above 0: c is to the left of the way from a to b."""
-    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
 # --- areas and corridors along routes, in a local frame -------------------------------------------
@@ -183,10 +179,37 @@ def ring_problem(rings: Sequence[Sequence[Coordinate]]) -> str:
     """
     if problem := _limit_problem(rings):
         return problem
-    for a, b in _overlapping(_edges_of(rings)):
-        if does := _crosses(a, b):
+    edges = _edges_of(rings)
+    lines = shapely.linestrings(edges)
+    one, other = shapely.STRtree(lines).query(lines, predicate="intersects")
+    one, other = one[one < other], other[one < other]
+    along = shapely.length(shapely.intersection(lines[one], lines[other])) > 0
+    for is_apart, first, second in sorted(zip(~along, one, other, strict=True)):
+        a, b = edges[first], edges[second]
+        if not (is_apart and {*a} & {*b}):
+            does = "crosses" if is_apart else "goes along"
             return f"its edge {_text(a)} {does} its edge {_text(b)}; a ring may not cross itself"
-    return next(filter(None, map(_eight_problem, rings)), "") or _hole_problem(rings)
+    level = [[corner[:2] for corner in ring] for ring in rings]
+    return next(filter(None, map(_eight_problem, level)), "") or _hole_problem(level)
+
+
+def _eight_problem(ring: Sequence[LatLon]) -> str:
+    """Where a ring whose edges do not cross crosses itself: in a corner that it passes twice."""
+    if valid(ring).area <= shapely.Polygon(ring).area * (1 + _SAME_AREA):
+        return ""
+    twice = next(corner for corner in ring[1:] if ring[1:].count(corner) > 1)
+    return f"it crosses itself at its corner [{twice[0]:.9g}, {twice[1]:.9g}]"
+
+
+def _hole_problem(rings: Sequence[Sequence[LatLon]]) -> str:
+    outer, *holes = map(valid, rings)
+    for index, hole in enumerate(holes, 1):
+        if not outer.covers(hole):
+            return f"its hole {index} lies outside of its outer ring"
+        for number, other in enumerate(holes, 1):
+            if number != index and other.covers(hole):
+                return f"its hole {index} lies in its hole {number}"
+    return ""
 
 
 def mended(rings: Sequence[Sequence[Coordinate]]) -> tuple[tuple[Coordinate, ...], ...] | None:
@@ -196,15 +219,13 @@ def mended(rings: Sequence[Sequence[Coordinate]]) -> tuple[tuple[Coordinate, ...
         return None
     heights = {corner[:2]: corner[2] for ring in rings for corner in ring}
     outer, *holes = ([corner[:2] for corner in ring] for ring in rings)
-    drawn = shapely.Polygon(outer, holes)
-    valid = shapely.make_valid(drawn, method="structure", keep_collapsed=False)
-    if not isinstance(valid, shapely.Polygon) or valid.is_empty:
-        return None
-    if abs(valid.area - drawn.area) > _SAME_AREA * drawn.area:
+    drawn, mend = shapely.Polygon(outer, holes), valid(outer, *holes)
+    same = abs(mend.area - drawn.area) <= _SAME_AREA * drawn.area
+    if not isinstance(mend, shapely.Polygon) or mend.is_empty or not same:
         return None
     return tuple(
         tuple((*at, heights[_nearest_corner(heights, at)]) for at in ring.coords)
-        for ring in (valid.exterior, *valid.interiors)
+        for ring in (mend.exterior, *mend.interiors)
     )
 
 
@@ -226,80 +247,6 @@ def _limit_problem(rings: Sequence[Sequence[Coordinate]]) -> str:
 
 def _edges_of(rings: Sequence[Sequence[Coordinate]]) -> list[Edge]:
     return [edge for ring in rings for edge in pairwise(c[:2] for c in ring) if edge[0] != edge[1]]
-
-
-def _overlapping(edges: list[Edge]) -> Iterator[tuple[Edge, Edge]]:
-    """The pairs of edges whose bounding boxes overlap."""
-    boxes = [(min(a[1], b[1]), max(a[1], b[1]), min(a[0], b[0]), max(a[0], b[0])) for a, b in edges]
-    active: list[int] = []
-    for index in sorted(range(len(edges)), key=boxes.__getitem__):
-        west, _, south, north = boxes[index]
-        active = [other for other in active if boxes[other][1] >= west]
-        for other in active:
-            if boxes[other][2] <= north and boxes[other][3] >= south:
-                yield edges[min(index, other)], edges[max(index, other)]
-        active.append(index)
-
-
-def _crosses(a: Edge, b: Edge) -> str:
-    """What an edge does to another; "" if they have no more in common than a corner of both."""
-    sides = [_side(*a, b[0]), _side(*a, b[1]), _side(*b, a[0]), _side(*b, a[1])]
-    if sides[0] * sides[1] < 0 and sides[2] * sides[3] < 0:
-        return "crosses"
-    common = set(a) & set(b)
-    touched = any(
-        side == 0 and corner not in common and _within(corner, edge)
-        for side, edge, corner in zip(sides, (a, a, b, b), (*b, *a), strict=True)
-    )
-    if touched or len(common) == 2:
-        return "goes along" if common else "crosses"
-    return ""
-
-
-def _side(a: LatLon, b: LatLon, c: LatLon) -> int:
-    """On which side of the line from a to b the corner c lies: 1, -1, or 0 when it is on it."""
-    turn = _turn(a, b, c)
-    return (turn > 0) - (turn < 0)
-
-
-def _within(corner: LatLon, edge: Edge) -> bool:
-    return all(min(a, b) <= at <= max(a, b) for a, b, at in zip(*edge, corner, strict=True))
-
-
-def _eight_problem(ring: Sequence[Coordinate]) -> str:
-    """Where a ring crosses itself in a corner that it passes twice."""
-    first: dict[LatLon, int] = {}
-    for index, corner in enumerate(ring[:-1]):
-        begin = first.setdefault(corner[:2], index)
-        if index - begin < 3:
-            continue
-        loop, rest = [*ring[begin : index + 1]], [*ring[: begin + 1], *ring[index + 1 :]]
-        nested = _any_inside(loop, rest) or _any_inside(rest, loop)
-        if not nested and _doubled_area(loop) * _doubled_area(rest) < 0:
-            return f"it crosses itself at its corner [{corner[0]:.9g}, {corner[1]:.9g}]"
-    return ""
-
-
-def _doubled_area(ring: Sequence[Coordinate]) -> float:
-    return sum(_turn(ring[0][:2], a[:2], b[:2]) for a, b in pairwise(ring))
-
-
-def _hole_problem(rings: Sequence[Sequence[Coordinate]]) -> str:
-    for index, hole in enumerate(rings[1:], 1):
-        if not _any_inside(hole, rings[0]):
-            return f"its hole {index} lies outside of its outer ring"
-        for number, other in enumerate(rings[1:], 1):
-            if number != index and _any_inside(hole, other):
-                return f"its hole {index} lies in its hole {number}"
-    return ""
-
-
-def _any_inside(ring: Sequence[Coordinate], around: Sequence[Coordinate]) -> bool:
-    """Whether a ring that does not cross another lies within it; corners may be common."""
-    common = {corner[:2] for corner in around}
-    own = [corner for corner in ring if corner[:2] not in common]
-    corners = [(longitude, latitude) for latitude, longitude, _ in around]
-    return bool(own) and edges_enclose(pairwise(corners), (own[0][1], own[0][0]))
 
 
 def _text(edge: Edge) -> str:

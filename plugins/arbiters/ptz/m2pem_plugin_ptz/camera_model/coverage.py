@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pymap3d
+import shapely
 from numpy.typing import NDArray
 
 from m2pem.api import Area
@@ -27,31 +28,10 @@ def points_in_area(
     """Return points in ECEF, one in each row: even on the ground, even in the view of the camera,
     and along the border. There is at least one."""
     rings = [np.array([corner[:2] for corner in ring], dtype=float) for ring in area.rings]
-    border = np.concatenate([_along(ring) for ring in rings])
-    on_border = _ecef(border, ground_m)
-    return np.concatenate(
-        (
-            on_border,
-            _evenly(rings, ground_m),
-            _as_seen(rings, on_border, camera_pose, field_of_view, ground_m),
-        )
-    )
-
-
-def inside(rings: list[Vector], points: Vector) -> NDArray[np.bool_]:
-    """Return which points (latitude, longitude) are in the outer ring and in none of the holes.
-
-    As `m2pem.api.edges_enclose`, for an array of points at once.
-    """
-    latitude, longitude = points[:, 0], points[:, 1]
-    odd = np.zeros(len(points), dtype=bool)
-    for ring in rings:
-        for (lat1, lon1), (lat2, lon2) in pairwise(ring):
-            if lat1 == lat2:
-                continue
-            crosses = (latitude < lat1) != (latitude < lat2)
-            odd ^= crosses & (longitude < lon1 + (latitude - lat1) / (lat2 - lat1) * (lon2 - lon1))
-    return odd
+    on_border = _ecef(np.concatenate([_along(ring) for ring in rings]), ground_m)
+    region = shapely.Polygon(rings[0], rings[1:])
+    seen = _as_seen(region, on_border, camera_pose, field_of_view, ground_m)
+    return np.concatenate((on_border, _evenly(region, ground_m), seen))
 
 
 def _along(ring: Vector) -> Vector:
@@ -59,14 +39,14 @@ def _along(ring: Vector) -> Vector:
     return np.concatenate([a + share * (b - a) for a, b in pairwise(ring)])
 
 
-def _evenly(rings: list[Vector], ground_m: float) -> Vector:
-    low, high = rings[0].min(axis=0), rings[0].max(axis=0)
+def _evenly(region: shapely.Polygon, ground_m: float) -> Vector:
+    low, high = np.reshape(region.bounds, (2, 2))
     narrowing = math.cos(math.radians(float(low[0] + high[0]) / 2))
     tall, wide = float(high[0] - low[0]), float(high[1] - low[1]) * narrowing
     probe = _grid(low, high, tall, wide, EVEN)
-    share = max(float(inside(rings, probe).mean()), 0.02) if len(probe) else 1.0
+    share = max(float(shapely.contains_xy(region, probe).mean()), 0.02) if len(probe) else 1.0
     points = _grid(low, high, tall, wide, round(EVEN / share))
-    return _ecef(points[inside(rings, points)], ground_m)
+    return _ecef(points[shapely.contains_xy(region, points)], ground_m)
 
 
 def _grid(low: Vector, high: Vector, tall: float, wide: float, count: int) -> Vector:
@@ -80,7 +60,7 @@ def _grid(low: Vector, high: Vector, tall: float, wide: float, count: int) -> Ve
 
 
 def _as_seen(
-    rings: list[Vector],
+    region: shapely.Polygon,
     border: Vector,
     camera_pose: CameraPose,
     field_of_view: FieldOfView,
@@ -89,12 +69,11 @@ def _as_seen(
     vectors = camera_pose.vector_to(border)
     elevation = np.arctan2(vectors[:, 2], np.hypot(vectors[:, 0], vectors[:, 1]))
     heading = np.unwrap(np.arctan2(vectors[:, 0], vectors[:, 1]))
-    below = inside(
-        rings, np.array([[camera_pose.position.latitude_deg, camera_pose.position.longitude_deg]])
-    )
-    bottom = -math.pi / 2 if below[0] else float(elevation.min())
+    position = camera_pose.position
+    below = shapely.contains_xy(region, position.latitude_deg, position.longitude_deg)
+    bottom = -math.pi / 2 if below else float(elevation.min())
     left, right = float(heading.min()), float(heading.max())
-    if below[0] or right - left > math.tau:
+    if below or right - left > math.tau:
         left, right = -math.pi, math.pi
     tall, wide = float(elevation.max()) - bottom, right - left
     step = min(field_of_view.width_rad, field_of_view.height_rad) / _CELLS_IN_A_VIEW
@@ -112,7 +91,7 @@ def _as_seen(
         return np.empty((0, 3))
     places = camera_pose.place + far[:, None] * (rays @ camera_pose.enu)
     latitude, longitude, _ = pymap3d.ecef2geodetic(*places.T)
-    return places[inside(rings, np.column_stack((latitude, longitude)))]
+    return places[shapely.contains_xy(region, latitude, longitude)]
 
 
 def _ecef(points: Vector, ground_m: float) -> Vector:
