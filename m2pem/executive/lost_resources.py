@@ -318,7 +318,7 @@ def _is_not_received(state: VehicleState | PayloadState) -> bool:
     of it."""
     if state.link is not LinkState.DEGRADED or not isinstance(state, VehicleState):
         return state.link is LinkState.LOST
-    return state.position is state.battery_fraction is state.armed is None
+    return (state.position, state.battery_fraction, state.armed) == (None, None, None)
 
 
 def _nothing_received(resource: ResourceId, now_us: int) -> VehicleState | PayloadState:
