@@ -44,6 +44,24 @@ def test_services_tell_what_they_write(play: Any) -> None:
     assert ("detection.type", "Look") in [(each.name, each.source) for each in outline.names]
 
 
+def test_names_that_only_timers_and_conditional_events_read_are_listed(play: Any) -> None:
+    wait = (
+        '<intermediateCatchEvent id="Wait"><timerEventDefinition><timeDuration>${pause.length}'
+        "</timeDuration></timerEventDefinition></intermediateCatchEvent>"
+    )
+    until = (
+        '<intermediateCatchEvent id="Until"><conditionalEventDefinition><condition>weather.calm'
+        "</condition></conditionalEventDefinition></intermediateCatchEvent>"
+    )
+    source = mission(sequence(("Wait", wait), ("Until", until)))
+
+    async def story(world: World) -> Any:
+        return world.executive.control.outline(source)
+
+    names = [(each.name, each.source) for each in play(story).names]
+    assert names == [("pause.length", ""), ("weather.calm", "")]
+
+
 def test_geometries_tell_who_handed_them_over_and_when(play: Any) -> None:
     async def story(world: World) -> Any:
         control = world.executive.control
