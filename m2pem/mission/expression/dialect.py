@@ -19,6 +19,8 @@ class Dialect(StrEnum):
     TEMPLATE = "template"
     TEXT = "text"
 
+    __hash__ = str.__hash__  # an enum's own is slow
+
 
 Span: TypeAlias = "slice[int, int, None]"
 """Where an expression stands in its text, without its marks."""

@@ -3,7 +3,7 @@
 What the rules of a language decide is decided then, not at each evaluation.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Container, Iterable, Sequence
 from contextvars import ContextVar
 from datetime import date, timedelta
 from functools import partial
@@ -67,6 +67,7 @@ tracing = ContextVar[Callable[[Node, Evaluate], Evaluate] | None]("tracing", def
 _calls = ContextVar("_calls", default=0)
 _TYPES = {"string": "text"}
 
+_NUMBERS = frozenset({int, float})
 _EXACT = 2**53
 """Whole numbers below are doubles, too, so that all languages compare others with them alike."""
 
@@ -182,16 +183,21 @@ def _compare(node: Compare, rules: Rules) -> Evaluate:
         return lambda read: test(left(read), right(read))
     other = node.right.value
     # What conditions mostly are: all languages compare them alike, and so does Python.
-    whole = type(other) is int and abs(other) < _EXACT
-    if not (whole or (type(other) is str and sign in SAME)):
-        return lambda read: test(left(read), other)
-    kind, direct = type(other), {**ORDERS, **SAME}[sign]
+    alike: Container[type] = ()
+    if type(other) is str and sign in SAME:
+        alike = (str,)
+    elif type(other) in _NUMBERS and abs(other) < _EXACT:
+        # JUEL orders -0.0 before 0.0.
+        alike = _NUMBERS if other or rules.ternary else (int,) if type(other) is int else ()
+    direct = {**ORDERS, **SAME}[sign]
 
     def compared(read: ReadValue) -> Computed:
         value = left(read)
-        return direct(value, other) if type(value) is kind else test(value, other)
+        if type(value) in alike and value == value:  # noqa: PLR0124 as what is not a number is not
+            return direct(value, other)
+        return test(value, other)
 
-    return compared
+    return compared if alike else lambda read: test(left(read), other)
 
 
 def _in(node: In, rules: Rules) -> Evaluate:
@@ -206,8 +212,11 @@ def _negate(node: Negate, rules: Rules) -> Evaluate:
 
 
 def _arithmetic(node: Arithmetic, rules: Rules) -> Evaluate:
-    left, right = _all((node.left, node.right), rules)
-    compute = rules.arithmetic[node.operator]
+    left, compute = evaluator(node.left, rules), rules.arithmetic[node.operator]
+    if isinstance(node.right, Literal):
+        other = node.right.value
+        return lambda read: compute(left(read), other)
+    right = evaluator(node.right, rules)
     return lambda read: compute(left(read), right(read))
 
 
@@ -446,12 +455,21 @@ def _is_a(value: Computed, wanted: TypeName) -> bool:
 
 
 def _list(node: ListOf, rules: Rules) -> Evaluate:
+    if all(isinstance(each, Literal) for each in node.items):
+        values = [each.value for each in node.items if isinstance(each, Literal)]
+        size = 1 + sum(1 + len(each) if isinstance(each, str) else 1 for each in values)
+
+        def listed(read: ReadValue) -> Computed:
+            look_at(size)
+            return [*values]
+
+        return listed
     runs = _all(node.items, rules)
     return lambda read: bounded_list([run(read) for run in runs])
 
 
 def _call(node: Call, rules: Rules) -> Evaluate:
-    call, runs = LISTED[node.function].call, _all(node.arguments, rules)
+    call, runs = LISTED[node.function].of(len(node.arguments)), _all(node.arguments, rules)
     if rules.ternary and not node.function.startswith("FEEL "):
         return lambda read: call([feel.to_data(run(read)) for run in runs])
     return lambda read: call([run(read) for run in runs])

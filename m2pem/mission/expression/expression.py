@@ -1,7 +1,7 @@
 """A parsed expression, and the ways to get one from text."""
 
+import math
 import re
-from collections.abc import Callable
 from contextlib import suppress
 from functools import lru_cache
 from typing import NoReturn
@@ -12,9 +12,9 @@ from msgspec.structs import force_setattr
 from m2pem.errors import ExpressionError
 from m2pem.mission.expression import cause, feel_values, operators
 from m2pem.mission.expression.dialect import Dialect, locate, split
-from m2pem.mission.expression.evaluate import evaluator
+from m2pem.mission.expression.evaluate import Evaluate, evaluator
 from m2pem.mission.expression.literals import shorten, show_scalar
-from m2pem.mission.expression.operators import begin_work
+from m2pem.mission.expression.operators import MAX_WORK, begin_work, work_left
 from m2pem.mission.expression.parser import Parser
 from m2pem.mission.expression.rules import RULES, Rules
 from m2pem.mission.expression.tree import Join, Literal, Node, names
@@ -25,6 +25,8 @@ EXPRESSION_RULES = 1
 before, so that operators of a run that was begun by others can know. 0: not numbered yet."""
 
 _BARE = (None, Dialect.BARE.value)
+_set_work_left = work_left.set
+_PLAIN = frozenset({bool, int, str})
 _INTEGER = re.compile(r"-?[0-9]{1,18}")
 
 
@@ -38,7 +40,7 @@ class Expression(Struct, frozen=True, eq=False):
     text: str
     dialect: Dialect
     tree: Node
-    _run: Callable[[ReadValue], Value] | None = None
+    _run: Evaluate | None = None
     _names: frozenset[str] | None = None
 
     def __reduce__(self) -> tuple[type["Expression"], tuple[str, Dialect, Node]]:
@@ -71,9 +73,16 @@ class Expression(Struct, frozen=True, eq=False):
             ExpressionError: a wrong type, a division by zero, or something beyond the limits.
         """
         if new_limit:
-            begin_work()
+            _set_work_left(MAX_WORK)
+        if feel_values.cause():
+            feel_values.begin()
         try:
-            return (self._run or self._prepare())(read)
+            value = (self._run or self._prepare())(read)
+            kind = type(value)
+            if kind in _PLAIN or (kind is float and math.isfinite(value)):
+                return value  # type: ignore[no-any-return]
+            result = RULES[self.dialect].result
+            return result(value) if result else value  # type: ignore[no-any-return]
         except ExpressionError as error:
             self._explain(error, read)
         except RecursionError:
@@ -89,27 +98,25 @@ class Expression(Struct, frozen=True, eq=False):
 
     def truth(self, read: ReadValue) -> bool | None:
         """As `holds`; None: the value is null, for the reason that `why_null` gives."""
-        begin_work()
+        _set_work_left(MAX_WORK)
+        if feel_values.cause():
+            feel_values.begin()
         try:
             value = (self._run or self._prepare())(read)
-            if value is None or value is True or value is False:
+            if value is True or value is False:
                 return value
-            return self.rules.truth(value, "a condition")
+            rules = RULES[self.dialect]
+            if rules.result:
+                value = rules.result(value)
+            return None if value is None else rules.truth(value, "a condition")
         except ExpressionError as error:
             self._explain(error, read)
         except RecursionError:
             self._explain(ExpressionError("functions and values are nested too deep"))
 
-    def _prepare(self) -> Callable[[ReadValue], Value]:
+    def _prepare(self) -> Evaluate:
         """Make what evaluates it: most expressions of a mission are never evaluated."""
-        of_tree, rules, result = evaluator(self.tree, self.rules), self.rules, self.rules.result
-
-        def of_data(read: ReadValue) -> Value:
-            if rules.ternary:
-                feel_values.begin()
-            return result(of_tree(read)) if result else of_tree(read)
-
-        run: Callable[[ReadValue], Value] = of_data if result else of_tree
+        run = evaluator(self.tree, self.rules)
         force_setattr(self, "_run", run)
         return run
 

@@ -387,7 +387,8 @@ class FeelParser(Descent):
 
     def _arguments(self) -> tuple[tuple[Node, ...], tuple[str, ...]]:
         self._next()
-        arguments, names = list[Node](), list[str]()
+        arguments: list[Node] = []
+        names: list[str] = []
         while self._kind != ")":
             if arguments and not self._take(","):
                 break

@@ -5,12 +5,13 @@ from calendar import monthrange
 from collections.abc import Callable, Mapping
 from datetime import UTC, date, datetime, time, timedelta
 from decimal import Decimal
-from functools import partial
 from typing import Any, TypeAlias
 
 from m2pem.mission.expression.feel_values import (
     DIGITS,
+    NUMBERS,
     FeelValue,
+    as_written,
     describe,
     instant,
     is_number,
@@ -25,7 +26,7 @@ from m2pem.mission.expression.tree import Operation
 _MOST_WHOLE = 10**18
 _Compute: TypeAlias = Callable[[Any, Any], FeelValue]
 
-_COMPUTE: Mapping[Operation, Callable[[Decimal, Decimal], Decimal]] = {
+_COMPUTE: Mapping[Operation, Callable[[Any, Any], Decimal]] = {
     Operation.ADD: DIGITS.add,
     Operation.SUBTRACT: DIGITS.subtract,
     Operation.MULTIPLY: DIGITS.multiply,
@@ -34,36 +35,35 @@ _COMPUTE: Mapping[Operation, Callable[[Decimal, Decimal], Decimal]] = {
 }
 
 
-def _numbers(symbol: Operation, left: Decimal, right: Decimal) -> Decimal | None:
-    try:
-        found = _COMPUTE[symbol](left, right)
-    except ArithmeticError:
-        return None
-    return found if found.is_finite() else None
+def _arithmetic(symbol: Operation, compute: Callable[[Any, Any], Decimal]) -> _Compute:
+    whole = WHOLE.get(symbol)
 
-
-def arithmetic(symbol: Operation, left: FeelValue, right: FeelValue) -> FeelValue:
-    """`left symbol right`; null of null, and without a value otherwise."""
-    if left is None or right is None:
-        return None
-    if type(left) is int is type(right) and symbol in WHOLE:
-        whole: int = WHOLE[symbol](left, right)
-        if -_MOST_WHOLE < whole < _MOST_WHOLE:
-            return whole
-    found: FeelValue = None
-    kinds = kind(left), kind(right)
-    if kinds == ("number", "number"):
-        found = _numbers(symbol, number(left), number(right))
-    elif kinds == ("text", "text") and symbol is Operation.ADD:
-        return bounded_text(left + right, "'+'")
-    else:
+    def apply(left: FeelValue, right: FeelValue) -> FeelValue:
+        one, other = type(left), type(right)
+        if one is other is int and whole:
+            sure: int = whole(left, right)
+            if -_MOST_WHOLE < sure < _MOST_WHOLE:
+                return sure
         try:
-            found = _TEMPORAL[kinds[0], symbol, kinds[1]][1](left, right)
+            if one in NUMBERS and other in NUMBERS:
+                found = compute(
+                    as_written[left] if one is float else left,
+                    as_written[right] if other is float else right,
+                )
+                if found.is_finite():
+                    return found
+            elif left is None or right is None:
+                return None
+            elif one is other is str and symbol is Operation.ADD:
+                return bounded_text(left + right, "'+'")
+            elif (value := _TEMPORAL[kind(left), symbol, kind(right)][1](left, right)) is not None:
+                return value
         except (KeyError, ArithmeticError, ValueError):
-            found = None
-    if found is None:
+            pass
         without_value(f"'{symbol}' of {describe(left)} and {describe(right)}")
-    return found
+        return None
+
+    return apply
 
 
 def _size(value: timedelta | Months) -> Decimal:
@@ -73,8 +73,8 @@ def _size(value: timedelta | Months) -> Decimal:
     )
 
 
-def _quotient(left: Any, right: Any) -> Decimal | None:
-    return _numbers(Operation.DIVIDE, _size(left), _size(right))
+def _quotient(left: Any, right: Any) -> Decimal:
+    return DIGITS.divide(_size(left), _size(right))
 
 
 def _scaled(value: timedelta | Months, by: FeelValue) -> timedelta | Months:
@@ -150,12 +150,17 @@ def result_kind(left: str, sign: Operation, right: str) -> str | None:
 
 
 ARITHMETIC: Mapping[Operation, Callable[[Any, Any], FeelValue]] = {
-    each: partial(arithmetic, each) for each in Operation
+    sign: _arithmetic(sign, compute) for sign, compute in _COMPUTE.items()
 }
+"""`left symbol right`; null of null, and without a value otherwise."""
 
 
 def negate(value: FeelValue) -> FeelValue:
     """`-value`."""
+    if type(value) is int and -_MOST_WHOLE < value < _MOST_WHOLE:
+        return -value
+    if type(value) is float and not value.is_integer():
+        return -value
     if is_number(value):
         return number(value).copy_negate()
     if isinstance(value, timedelta | Months):

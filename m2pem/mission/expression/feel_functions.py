@@ -6,9 +6,9 @@ item, and a value for a list of it, where the other is wanted (clause 10.3.2.9.4
 
 import math
 import statistics
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from decimal import Decimal, InvalidOperation, localcontext
+from decimal import Decimal, InvalidOperation, getcontext, setcontext
 
 from m2pem.mission.expression import feel_library as lib
 from m2pem.mission.expression import feel_values as v
@@ -32,7 +32,7 @@ class FeelFunction(Function):
         taken = [each.kinds for each in self.parameters]
         of_items = self.repeated and taken == [("list",)]
         object.__setattr__(self, "_of_items", of_items)
-        decimals = of_items or any("number" in each for each in (self.gives, *taken))
+        decimals = of_items or any("number" in each for each in taken)
         object.__setattr__(self, "_decimals", decimals)
 
     def fits(self, given: Sequence[frozenset[str]]) -> bool:
@@ -61,29 +61,39 @@ class FeelFunction(Function):
             for each, value in zip(self.parameters, arguments, strict=False)
         )
 
+    def of(self, count: int) -> Callable[[Sequence[FeelValue]], FeelValue]:
+        """What calls it with so many arguments."""
+        return self._call if self.accepts(count) and not self.others else self.call
+
     def _call(self, arguments: Sequence[FeelValue]) -> FeelValue:
-        if self._of_items and (len(arguments) > 1 or not isinstance(arguments[0], list)):
+        if self._of_items and (len(arguments) > 1 or type(arguments[0]) is not list):
             arguments = [[*arguments]]
-        taken = list[FeelValue]()
+        taken: list[FeelValue] = []
         parameters = self.parameters
         if self.repeated:
             parameters += parameters[-1:] * len(arguments)
         for each, value in zip(parameters, arguments, strict=False):
-            if value is None and each.kinds and not each.optional:
+            kinds = each.kinds
+            if value is None and kinds and not each.optional:
                 return None
-            found = _as_kind(value, each.kinds)
+            fits = value is None or not kinds or v.kind(value) in kinds
+            found = value if fits else _as_kind(value, kinds)
             if found is _WRONG:
-                wanted = " or a ".join(each.kinds)
+                wanted = " or a ".join(kinds)
                 v.without_value(f"{self.name}() takes a {wanted}, not {v.describe(value)}")
                 return None
-            if isinstance(found, list):
+            if type(found) is list:
                 look_at(len(found))
             taken.append(found)
         try:
             if not self._decimals:
                 return _bounded(self.compute(*taken), self.name)
-            with localcontext(DIGITS):
+            outer = getcontext()
+            setcontext(DIGITS)
+            try:
                 return _bounded(self.compute(*taken), self.name)
+            finally:
+                setcontext(outer)
         except NoValueError as error:
             v.without_value(f"{self.name}(): {error}")
         except (ArithmeticError, InvalidOperation, ValueError):
@@ -97,14 +107,12 @@ _WRONG = object()
 
 def _bounded(value: FeelValue, name: str) -> FeelValue:
     """The value that a function made, when it is not too large."""
-    if isinstance(value, list | dict):
-        return bounded_list([value])[0]
-    return bounded_text(value, f"{name}()") if isinstance(value, str) else value
+    if type(value) is str:
+        return bounded_text(value, f"{name}()")
+    return bounded_list([value])[0] if isinstance(value, list | dict) else value
 
 
 def _as_kind(value: FeelValue, kinds: tuple[str, ...]) -> FeelValue:
-    if value is None or not kinds or v.kind(value) in kinds:
-        return value
     if "list" in kinds:
         return [value]
     if isinstance(value, list) and len(value) == 1 and v.kind(value[0]) in kinds:
@@ -142,7 +150,7 @@ FEEL_FUNCTIONS = FeelFunction.table([
     ("range(from: text) -> range", lib.as_range, "a range, of its text: [1..5]"),
     ("substring(string: text, start position: number, length?: number) -> text", lib.substring,
      "the text from a position on; the first is 1, the last -1"),
-    ("string length(string: text) -> number", lambda text: Decimal(len(text)),
+    ("string length(string: text) -> number", len,
      "how many characters the text has"),
     ("upper case(string: text) -> text", str.upper, "the text in capital letters"),
     ("lower case(string: text) -> text", str.lower, "the text in small letters"),
@@ -193,17 +201,18 @@ FEEL_FUNCTIONS = FeelFunction.table([
      lambda values, item: any(v.kind(each) == v.kind(item) and v.equal(each, item)
                               for each in values),
      "whether an item equals the element"),
-    ("count(list: list) -> number", lambda values: Decimal(len(values)),
+    ("count(list: list) -> number", len,
      "how many items the list has"),
     ("min(list: list, ...)", lib.extreme(-1), "the least item"),
     ("max(list: list, ...)", lib.extreme(1), "the greatest item"),
-    ("sum(list: list, ...) -> number", lib.of_numbers(lambda n: sum(n, Decimal())),
+    ("sum(list: list, ...) -> number", lib.of_numbers(lib.total),
      "the sum of the numbers"),
     ("product(list: list, ...) -> number", lib.of_numbers(lambda n: math.prod(n, start=Decimal(1))),
      "the product of the numbers"),
     ("mean(list: list, ...) -> number", lib.of_numbers(lambda n: sum(n, Decimal()) / len(n)),
      "the arithmetic mean of the numbers"),
-    ("median(list: list, ...) -> number", lib.of_numbers(statistics.median),
+    ("median(list: list, ...) -> number",
+     lib.of_numbers(lambda n: statistics.median(map(Decimal, n))),
      "the middle one of the numbers"),
     ("stddev(list: list, ...) -> number", lib.of_numbers(statistics.stdev),
      "the sample standard deviation of the numbers"),
@@ -249,8 +258,8 @@ FEEL_FUNCTIONS = FeelFunction.table([
     ("day of week(date: date|date and time) -> text", lambda day: lib.WEEKDAYS[day.weekday()],
      "the name of the weekday"),
     ("day of year(date: date|date and time) -> number",
-     lambda day: Decimal(day.timetuple().tm_yday), "the number of the day in its year"),
-    ("week of year(date: date|date and time) -> number", lambda day: Decimal(day.isocalendar()[1]),
+     lambda day: day.timetuple().tm_yday, "the number of the day in its year"),
+    ("week of year(date: date|date and time) -> number", lambda day: day.isocalendar()[1],
      "the number of the week, by ISO 8601"),
     ("month of year(date: date|date and time) -> text", lambda day: lib.MONTHS[day.month - 1],
      "the name of the month"),

@@ -13,6 +13,7 @@ from typing import Any
 
 from m2pem.mission.expression import feel_values as v
 from m2pem.mission.expression.feel_values import DIGITS, Closure, FeelValue, Range, number
+from m2pem.mission.expression.literals import MAX_INTEGER, MIN_INTEGER
 from m2pem.mission.expression.operators import MAX_SIZE, MAX_VALUE_DEPTH, look_at
 from m2pem.mission.expression.temporal import (
     Months,
@@ -26,6 +27,7 @@ from m2pem.mission.expression.temporal import (
 from m2pem.mission.expression.tree import Comparison
 
 _SCALES = -6111, 6176
+_SIMPLE = frozenset({int, float, str})
 _below = v.COMPARISONS[Comparison.LESS]
 
 
@@ -287,6 +289,8 @@ def rounded(how: str) -> Callable[..., Decimal | None]:
         if not _SCALES[0] <= places <= _SCALES[1]:
             raise NoValueError(f"a scale is {_SCALES[0]} to {_SCALES[1]}")
         found = number(value)
+        if not places:
+            return found.to_integral_value(how)
         if -found.as_tuple().exponent <= places:  # type: ignore[operator]
             return found
         with localcontext(DIGITS) as context:
@@ -320,10 +324,11 @@ def root(value: FeelValue) -> Decimal:
 # --- lists ----------------------------------------------------------------------------------------
 
 
-def numbers(values: list[FeelValue]) -> list[Decimal]:
-    if not all(map(v.is_number, values)):
+def numbers(values: list[FeelValue]) -> list[Any]:
+    """Integers and decimals."""
+    if not v.NUMBERS.issuperset(map(type, values)):
         raise NoValueError("not all items are numbers")
-    return [number(each) for each in values]
+    return [v.as_written[each] if type(each) is float else each for each in values]
 
 
 def extreme(sign: int) -> Callable[[list[FeelValue]], FeelValue]:
@@ -331,6 +336,8 @@ def extreme(sign: int) -> Callable[[list[FeelValue]], FeelValue]:
         if not values:
             return None
         best = values[0]
+        if type(best) in _SIMPLE and all(type(each) is type(best) for each in values):
+            return min(values) if sign < 0 else max(values)
         for each in values:
             lower = _below(*((each, best) if sign < 0 else (best, each)))
             if lower is None:
@@ -341,12 +348,17 @@ def extreme(sign: int) -> Callable[[list[FeelValue]], FeelValue]:
     return compute
 
 
-def of_numbers(compute: Callable[[list[Decimal]], FeelValue]) -> Callable[..., FeelValue]:
+def of_numbers(compute: Callable[[list[Any]], FeelValue]) -> Callable[..., FeelValue]:
     def of(values: list[FeelValue]) -> FeelValue:
         found = numbers(values)
         return compute(found) if found else None
 
     return of
+
+
+def total(values: list[Any]) -> int | Decimal:
+    found = sum(values)
+    return found if MIN_INTEGER <= found <= MAX_INTEGER else number(found)
 
 
 def truths(decisive: bool) -> Callable[[list[FeelValue]], bool | None]:

@@ -62,13 +62,11 @@ _cause: ContextVar[str] = ContextVar("_cause", default="")
 
 def begin() -> None:
     """Forget what the evaluation before had no value for."""
-    if _cause.get():
-        _cause.set("")
+    _cause.set("")
 
 
-def cause() -> str:
-    """Return why the first operation without a value had none; "": each had one."""
-    return _cause.get()
+cause = _cause.get
+"""Return why the first operation without a value had none; "": each had one."""
 
 
 def without_value(why: str) -> None:
@@ -110,16 +108,31 @@ def describe(value: FeelValue) -> str:
     return f"a {kind(value)}" if isinstance(value, Range | Closure) else literals.describe(value)
 
 
+class _AsWritten(dict[float, Decimal]):
+    """The decimals that doubles are written as: those of a mission come again and again."""
+
+    def __missing__(self, value: float) -> Decimal:
+        if len(self) >= MAX_DOUBLES:
+            self.clear()
+        found = self[value] = Decimal(repr(value))
+        return found
+
+
+MAX_DOUBLES = 1_000
+as_written = _AsWritten()
+NUMBERS = frozenset({int, float, Decimal})
+
+
 def number(value: FeelValue) -> Decimal:
     """A number as a decimal."""
-    if isinstance(value, Decimal):
+    if type(value) is Decimal:
         return value
-    return Decimal(value) if isinstance(value, int) else Decimal(repr(value))
+    return as_written[value] if type(value) is float else Decimal(value)
 
 
 def is_number(value: FeelValue) -> bool:
     """Whether a value is a number."""
-    return isinstance(value, int | float | Decimal) and not isinstance(value, bool)
+    return type(value) in NUMBERS
 
 
 def to_data(value: FeelValue) -> Any:
@@ -128,10 +141,14 @@ def to_data(value: FeelValue) -> Any:
     Raises:
         ExpressionError: a number does not fit into either.
     """
-    if isinstance(value, Decimal):
-        if value == value.to_integral_value() and MIN_INTEGER <= value <= MAX_INTEGER:
-            return int(value)
-        return bounded(float(value), "the expression")
+    kind = type(value)
+    if kind in _DIRECT:
+        return value
+    if kind is Decimal:
+        double = float(value)
+        if double.is_integer() and value == (whole := int(value)):
+            return whole if MIN_INTEGER <= whole <= MAX_INTEGER else double
+        return bounded(double, "the expression")
     if isinstance(value, list):
         return [to_data(each) for each in value]
     if isinstance(value, dict):
@@ -149,10 +166,8 @@ def result(value: FeelValue) -> Any:
     Raises:
         ExpressionError: it is null because an operation had no value, or does not fit into data.
     """
-    if type(value) in _DIRECT:
-        return value
-    if value is None and _cause.get():
-        raise ExpressionError(f"it has no value: {_cause.get()}")
+    if value is None and (why := _cause.get()):
+        raise ExpressionError(f"it has no value: {why}")
     return to_data(value)
 
 
@@ -211,13 +226,13 @@ def equal(left: FeelValue, right: FeelValue, depth: int = MAX_VALUE_DEPTH) -> bo
         return left is right
     if type(left) is type(right) and type(left) in _DIRECT:
         return bool(left == right)
+    if type(left) in NUMBERS and type(right) in NUMBERS:
+        return number(left) == number(right)
     kinds = kind(left), kind(right)
     if kinds[0] != kinds[1] or depth == 0:
         without_value(f"'=' of {describe(left)} and {describe(right)}")
         return None
     match kinds[0]:
-        case "number":
-            return number(left) == number(right)
         case "list":
             look_at(len(left))
             if len(left) != len(right):
@@ -260,8 +275,9 @@ def instant(value: FeelValue) -> FeelValue:
     return value
 
 
-_DIRECT = frozenset({bool, int, str})
-"""Types whose values Python compares as FEEL does."""
+_DIRECT = frozenset({bool, int, float, str})
+"""Types whose values Python compares as FEEL does: two doubles have the order of what they are
+written as."""
 
 _ORDERED = frozenset({"number", "text", DATE, MOMENT, TIME, DAYS, MONTHS})
 Ordered = Callable[[Any, Any], bool]
@@ -273,12 +289,12 @@ def ordered(symbol: str, compare: Ordered, left: FeelValue, right: FeelValue) ->
         return None
     if type(left) is type(right) and type(left) in _DIRECT and type(left) is not bool:
         return compare(left, right)
+    if type(left) in NUMBERS and type(right) in NUMBERS:
+        return compare(number(left), number(right))
     kinds = kind(left), kind(right)
     if kinds[0] != kinds[1] or kinds[0] not in _ORDERED:
         without_value(f"'{symbol}' of {describe(left)} and {describe(right)}")
         return None
-    if kinds[0] == "number":
-        return compare(number(left), number(right))
     return compare(instant(left), instant(right))
 
 

@@ -70,6 +70,8 @@ def _number(value: Computed, written: re.Pattern[str]) -> Any:
 
 def negate(value: Computed) -> Computed:
     """`-value`; of null 0."""
+    if type(value) is int:
+        return bounded(-value, "'-'", value)
     if value == "":
         raise ExpressionError("'-' takes a number, not an empty text")
     if value is None:
@@ -178,6 +180,10 @@ def _ordering(compare: Callable[[Any, Any], bool], *, or_equal: bool) -> Test:
             return or_equal and left is right
         if type(left) is type(right) and type(left) in _DIRECT:
             return compare(left, right)
+        if type(left) in _NUMBERS and type(right) in _NUMBERS:
+            low, high = float(left), float(right)
+            if low < high or low > high:
+                return compare(low, high)
         one, other = _pair(left, right, ordered=True)
         if isinstance(one, str) and _equal(left, right):
             return or_equal

@@ -26,18 +26,19 @@ TEXT_AS_VALUE = 1_000
 """So many characters of a text count as one value."""
 
 
-_left = ContextVar("_left", default=MAX_WORK)
+work_left = ContextVar("work_left", default=MAX_WORK)
+"""How many values an evaluation may still look at."""
 
 
 def begin_work() -> None:
     """Count from 0 what is looked at."""
-    _left.set(MAX_WORK)
+    work_left.set(MAX_WORK)
 
 
 def look_at(values: int) -> None:
     """Count values; raises ExpressionError when they are too many."""
-    left = _left.get() - values
-    _left.set(left)
+    left = work_left.get() - values
+    work_left.set(left)
     if left < 0:
         raise ExpressionError(f"it looks at more than {MAX_WORK:,} values")
 
@@ -205,21 +206,22 @@ def bounded_text(value: str, what: str) -> str:
 
 def bounded_list(items: list[Computed]) -> list[Computed]:
     """A new list, when it is not too large: lists of lists could double with every step."""
-    size = 0
+    size = 1
     waiting: list[tuple[Computed, int]] = [(items, 0)]
     while waiting:
-        value, depth = waiting.pop()
-        size += 1
-        if isinstance(value, str):
-            size += len(value)
-        elif isinstance(value, list):
-            waiting.extend((each, depth + 1) for each in value)
-        elif isinstance(value, dict):
-            size += sum(len(key) for key in value)
-            waiting.extend((each, depth + 1) for each in value.values())
-        if size + len(waiting) > MAX_SIZE:
+        container, depth = waiting.pop()
+        size += len(container)
+        if isinstance(container, dict):
+            size += sum(map(len, container))
+            container = container.values()
+        for each in container:
+            if isinstance(each, str):
+                size += len(each)
+            elif isinstance(each, list | dict):
+                waiting.append((each, depth + 1))
+        if size > MAX_SIZE:
             raise ExpressionError(f"the list is larger than {MAX_SIZE} values and characters")
-        if depth > MAX_VALUE_DEPTH:
+        if container and depth >= MAX_VALUE_DEPTH:
             raise ExpressionError(f"the list is nested deeper than {MAX_VALUE_DEPTH}")
     look_at(size)
     return items

@@ -69,6 +69,10 @@ class Function:
             for place, kinds in enumerate(given)
         )
 
+    def of(self, count: int) -> Callable[[Sequence[Computed]], Computed]:
+        """What calls it with so many arguments."""
+        return self.call
+
     def call(self, arguments: Sequence[Computed]) -> Computed:
         """Return the function's value; raises ExpressionError."""
         null = False
