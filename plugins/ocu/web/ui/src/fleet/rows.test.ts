@@ -7,15 +7,16 @@ const names = (found: readonly Row[]) => found.map(({ id }) => id);
 describe("rows", () => {
   it("say the worst of a vehicle's health", () => {
     const found = rows({
-      vehicles: ["v1", "v2", "v3", "v4", "v5", "v6"].map((id) => vehicle(id)),
+      vehicles: ["v1", "v2", "v3", "v4", "v5", "v6", "v7"].map((id) => vehicle(id)),
       states: [
         state("v1"),
         state("v2", { link: "degraded" }),
         state("v3", { battery_fraction: 0.2, link: "degraded" }),
         state("v4", { ready: false, battery_fraction: 0.2 }),
-        state("v5", { ready: false }),
+        state("v5", { ready: false, link: "lost" }),
+        state("v7"),
       ],
-      silent: { v5: 9 },
+      silent: { v7: 9 }, // within its `lost_after`: it is lost when the executive says so
     });
     expect(found.map(({ health }) => health)).toEqual([
       "ok",
@@ -24,13 +25,14 @@ describe("rows", () => {
       "notReady",
       "lost",
       "unheard",
+      "ok",
     ]);
     expect(found[0]!.speed).toBe(5);
     expect(counts(found, true)).toEqual({
       lost: 2,
       notReady: 2,
       lowBattery: 2,
-      free: 6,
+      free: 7,
       taken: 0,
       inRun: 0,
     });

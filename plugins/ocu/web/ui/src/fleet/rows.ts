@@ -1,6 +1,6 @@
 // The lines of the table of the fleet: what is known of each vehicle and payload, as people sort,
 // search and group it.
-import { speed_m_s, STALE_S } from "../shared/format";
+import { speed_m_s } from "../shared/format";
 import { healthOf, isLow, rankOf, type Health } from "../map/health";
 import type { Fleet, PayloadState, VehicleState } from "../shared/types";
 import { locale } from "../strings/language";
@@ -123,7 +123,7 @@ function rowOf(
   const battery = vehicle?.battery_fraction ?? null;
   // That nothing comes is no fault of the vehicle then.
   const isUnknown = unknownSince !== null;
-  const isLost = state?.link === "lost" || (!isUnknown && age_s !== null && age_s > STALE_S);
+  const isLost = state?.link === "lost";
   const operator = now && now.holder && !OF_RUN.test(now.holder) ? now.holder : "";
   const row = {
     id,

@@ -197,9 +197,12 @@ function takeRun(summary: RunSummary): void {
   if (isOver(summary)) prompts.value = prompts.value.filter(({ run }) => run !== summary.run);
 }
 
-function heardNow(states: Record<string, unknown>): void {
+/** The state of what is lost comes from the executive, and not from the resource. */
+function heardNow(states: Record<string, { link?: string }>): void {
   const now = performance.now();
-  for (const resource of Object.keys(states)) heardAt.set(resource, now);
+  for (const [resource, { link }] of Object.entries(states)) {
+    if (link !== "lost") heardAt.set(resource, now);
+  }
 }
 
 /** Of a snapshot the clocks are the server's: old is what is older than the newest. */
