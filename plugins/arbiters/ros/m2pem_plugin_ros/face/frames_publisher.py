@@ -51,11 +51,11 @@ log = logging.getLogger("m2pem.face.ros")
 
 @dataclass(slots=True)
 class _Left:
-    """A frame that is left to other nodes. `heard_s`: when they published it last, by the clock of
+    """A frame that is left to other nodes. `received_s`: when they published it last, by the clock of
     the event loop. `own`: the static transform that the face has for it."""
 
     topic: str
-    heard_s: float
+    received_s: float
     own: Any = None
 
 
@@ -171,7 +171,7 @@ class FramesPublisher:
         for transform in message.transforms:
             child = transform.child_frame_id.removeprefix("/")
             if (left := self._left.get(child)) is not None:
-                left.heard_s = max(left.heard_s, self._loop.time())
+                left.received_s = max(left.received_s, self._loop.time())
                 continue
             sent = self._sent.get(child)
             if child in self._statics or (sent is not None and _stamp(transform) not in sent):
@@ -202,8 +202,8 @@ class FramesPublisher:
 
     def _take_back(self) -> None:
         for child, left in list(self._left.items()):
-            is_silent = left.topic == "/tf" and self._loop.time() - left.heard_s > GONE_AFTER_S
-            is_alone = left.heard_s < math.inf and self._node.count_publishers(left.topic) <= 1
+            is_silent = left.topic == "/tf" and self._loop.time() - left.received_s > GONE_AFTER_S
+            is_alone = left.received_s < math.inf and self._node.count_publishers(left.topic) <= 1
             if not (is_silent or is_alone):
                 continue
             del self._left[child]
