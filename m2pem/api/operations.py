@@ -27,6 +27,7 @@ from m2pem.api.approval import MissionApproval
 from m2pem.api.authoring import MissionFiles, MissionSource
 from m2pem.api.control import MissionControl
 from m2pem.api.health import ExecutiveAddress, HealthCheck
+from m2pem.api.operator import one_line
 from m2pem.api.people import OpenControlRequest, OperatorPresence, OperatorsChanged
 from m2pem.api.revision import RevisionPreview, RunVersion
 from m2pem.api.runs import (
@@ -132,8 +133,10 @@ class Operation:
     def call(self, control: MissionControl, params: msgspec.Struct) -> Any:
         """Call the method; returns its result, an awaitable of it, or a stream."""
         method = getattr(control, self.name)
-        arguments = _arguments_of(self.name)
-        return method(**{each.name: getattr(params, each.name) for each in arguments})
+        values = {each.name: getattr(params, each.name) for each in _arguments_of(self.name)}
+        if "by" in values:
+            values["by"] = one_line(values["by"])
+        return method(**values)
 
 
 Event = (

@@ -161,6 +161,7 @@ async def serve_fleet(
             fleet, opened, plugins, clock, search_path=search_path, page=operators.page
         )
         faces.make(executive.control)
+        executive.announce_schedule()
         executive.supervisor.interrupted.expect([line.run for line in mine])
         with output_of(output) as out:
             async with driving(

@@ -18,7 +18,7 @@ from m2pem.engine.throwing import catcher_of_error, fail_run, throw_error
 from m2pem.fleet.allocation import resources_of
 from m2pem.fleet.fleet import Fleet
 from m2pem.mission.elements import Element, FlowNode, InclusiveGateway, SequenceFlow
-from m2pem.suggestions import did_you_mean, suggest_or
+from m2pem.suggestions import suggest, suggest_or
 
 # --- checks -------------------------------------------------------------------------------------
 
@@ -88,7 +88,8 @@ def _wrong_roles(fleet: Fleet, incident: Incident, item: ResolveIncident) -> str
         for resource in resources:
             there = (*fleet.vehicles, *fleet.payloads)
             if resource not in there:
-                return f"the fleet has no {resource!r}; {did_you_mean(resource, there)}"
+                hint = suggest(resource, there, "vehicles and payloads")
+                return f"the fleet has no {resource!r}; {hint}"
     roles = replaced_roles(fleet, incident, item)
     counted: dict[str, str] = {}
     for name, resources in roles.items():

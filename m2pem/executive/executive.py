@@ -327,6 +327,10 @@ class Executive:
             return False
         return await self.switchover.link_lost(lambda: links.receives_nothing(self.clock.now_us()))
 
+    def announce_schedule(self) -> None:
+        """Say that missions can be scheduled soon: `load_schedule` and `serve_schedule` follow."""
+        self._schedule.is_beginning = True
+
     async def load_schedule(self) -> None:
         """Read what the journal has scheduled for this fleet, before runs are taken up.
 
@@ -340,7 +344,7 @@ class Executive:
 
     def serve_schedule(self) -> None:
         """Start what is scheduled, from now on, once interrupted runs are taken up."""
-        self._schedule.served = True
+        self._schedule.served, self._schedule.is_beginning = True, False
         self._scheduling = asyncio.create_task(self._scheduler.serve(), name="schedule")
         self._scheduling.add_done_callback(self._schedule_ended)
 

@@ -21,7 +21,7 @@ from m2pem.mission.behavior import OnLoss
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.elements import ErrorPolicy
 from m2pem.mission.mission import Mission
-from m2pem.suggestions import did_you_mean
+from m2pem.suggestions import suggest
 
 if TYPE_CHECKING:
     from m2pem.executive.fleet_connections import FleetArbiters
@@ -159,7 +159,7 @@ class Handover:
         """
         resource = ResourceId(name)
         if resource not in self._known:
-            hint = did_you_mean(name, self._known)
+            hint = suggest(name, self._known, "vehicles and payloads")
             raise OperatorError(f"the fleet has no {name!r}; {hint}")
         return resource
 

@@ -4,6 +4,8 @@ Until all of them have their vehicles again no run begins: it could get the vehi
 An operator's STOP counts for them as for any other run.
 """
 
+import asyncio
+from collections import defaultdict
 from collections.abc import Iterable
 
 from m2pem.api.runs import RunId
@@ -19,6 +21,7 @@ class InterruptedRuns:
         self._runs: tuple[RunId, ...] = ()
         self._stopped: StopMark | None = None
         self._are_taken_up = False
+        self._stops: defaultdict[RunId, asyncio.Event] = defaultdict(asyncio.Event)
 
     def expect(self, runs: Iterable[RunId]) -> None:
         """Say which are to be taken up, as far as is known. What was stopped by a STOP of all that
@@ -59,7 +62,12 @@ class InterruptedRuns:
         """Stop a run as soon as it is driven. Returns whether it is one of these."""
         if run in self._runs:
             self._marks.put(run, StopMark(by, reason))
+            self._stops[run].set()
         return run in self._runs
+
+    def stop_of(self, run: RunId) -> asyncio.Event:
+        """Return what is set when a run is stopped before it is driven."""
+        return self._stops[run]
 
     def stop_all(self, by: str, reason: str) -> list[RunId]:
         """Stop all as soon as they are driven, also those that are found later; returns them."""

@@ -43,6 +43,9 @@ log = logging.getLogger("m2pem.resume")
 QUERY_TIMEOUT_S = 10.0
 """How long an arbiter may take to look at a vehicle before it counts as unreachable."""
 
+STOPPED_WITHIN_S = 1.0
+"""The same once an operator has stopped the run: the cancels of its other vehicles wait for it."""
+
 UNASKED = "its arbiter could not be asked after a restart"
 """Why a resource counts as lost after a restart."""
 
@@ -95,6 +98,7 @@ async def take_over(
     outage_s: float,
     lost: Callable[[ResourceId, str], None],
     loss: Loss | None = None,
+    stopped: asyncio.Event | None = None,
 ) -> list[c.Command]:
     """Give a replayed and claimed run what it commanded. Its task must not run yet.
 
@@ -105,7 +109,8 @@ async def take_over(
     fleet's `max_outage`, every behavior is held and an operator is asked. `lost`: is called for
     each resource whose arbiter cannot be asked, which must stop before it is free again. `loss`:
     what the journal has lost of it: the run is paused, and an operator is asked about every
-    behavior when it goes on (see `JournalLossPrompts`).
+    behavior when it goes on (see `JournalLossPrompts`). `stopped`: is set when an operator stops
+    the run meanwhile, whose cancels wait for this.
     """
     state = runner.run.state
     max_outage_s = arbiters.fleet.max_outage_s
@@ -118,7 +123,7 @@ async def take_over(
     for keeping in state.kept.values():
         dispatcher.keep_between_tasks(keeping.id, keeping.resource)
     _recall(runner, arbiters, dispatcher)
-    reports = await asyncio.gather(*(_query(arbiters, behavior) for behavior in known))
+    reports = await asyncio.gather(*(_query(arbiters, each, stopped) for each in known))
     if (newest := _newest_epoch(reports)) > runner.epoch:
         runner.fail(replaced_by(runner, newest))
         return []
@@ -252,17 +257,33 @@ def replaced_by(runner: Runner, newest: int) -> StaleEpochError:
     )
 
 
-async def _query(arbiters: FleetArbiters, behavior: Behavior) -> BehaviorReport | None:
+async def _query(
+    arbiters: FleetArbiters, behavior: Behavior, stopped: asyncio.Event | None = None
+) -> BehaviorReport | None:
     """What the arbiter sees; None: it cannot say."""
     arbiter = _arbiter(arbiters, behavior)
     try:
-        async with asyncio.timeout(QUERY_TIMEOUT_S):
-            return await arbiter.query(behavior.id, behavior.native_ref)
+        async with asyncio.timeout(QUERY_TIMEOUT_S) as limit:
+            hurry = None if stopped is None else asyncio.create_task(_hurry(limit, stopped))
+            try:
+                return await arbiter.query(behavior.id, behavior.native_ref)
+            finally:
+                if hurry is not None:
+                    hurry.cancel()
     except TimeoutError:
-        log.error("%s: its arbiter did not answer within %s s", behavior.id, QUERY_TIMEOUT_S)
+        is_stopped = stopped is not None and stopped.is_set()
+        within_s = STOPPED_WITHIN_S if is_stopped else QUERY_TIMEOUT_S
+        log.error("%s: its arbiter did not answer within %s s", behavior.id, within_s)
     except Exception:  # an arbiter's fault is an unreachable vehicle
         log.exception("%s: its arbiter raised on query", behavior.id)
     return None
+
+
+async def _hurry(limit: asyncio.Timeout, stopped: asyncio.Event) -> None:
+    """Let a query end soon once its run is stopped."""
+    await stopped.wait()
+    now_s = asyncio.get_running_loop().time()
+    limit.reschedule(min(limit.when() or now_s, now_s + STOPPED_WITHIN_S))
 
 
 def _is_not_begun(behavior: Behavior, report: BehaviorReport) -> bool:

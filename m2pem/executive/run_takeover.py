@@ -115,7 +115,13 @@ class RunTakeover:
             log.warning("%s was stopped before its executive ended; it stays stopped", number)
             runner.submit_stop(StopRun(mark.by, mark.reason), frozenset())
         commands = await take_over(
-            runner, supervisor.arbiters, supervisor.dispatcher, outage_s, supervisor.lost, line.loss
+            runner,
+            supervisor.arbiters,
+            supervisor.dispatcher,
+            outage_s,
+            supervisor.lost,
+            line.loss,
+            supervisor.interrupted.stop_of(number),
         )
         supervisor.take_up(runner)
         if line.loss is not None:

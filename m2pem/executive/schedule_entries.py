@@ -66,7 +66,7 @@ class ScheduleEntries:
         """The hold of the whole schedule."""
         self.holds = 0
         """How often all was stopped or held."""
-        self.served = False
+        self.served = self.is_beginning = False
         """Whether due missions are started."""
         self.lock = asyncio.Lock()
         """Held while entries are looked at and changed."""

@@ -647,7 +647,8 @@ class Supervisor:
         runner = self.runners.get(run)
         if runner is None:
             self.interrupted.refuse_request(run)
-            known = ", ".join(self.runners) or "none"
+            driven = [each for each, runner in self.runners.items() if not runner.done.is_set()]
+            known = ", ".join(driven) or "none"
             raise NotDrivenError(f"{run} is not driven by this executive; it drives: {known}")
         return runner
 

@@ -66,8 +66,8 @@ Speed = Annotated[
     BeforeValidator(_reader(Dimension.SPEED)),
     WithJsonSchema(_quantity_schema(Dimension.SPEED)),
 ]
-Name = Annotated[str, StringConstraints(pattern=r"^[^\s/]+$")]
-"""What missions call something: no white space, no "/"."""
+Name = Annotated[str, StringConstraints(pattern=r"^[^\s/\x00-\x1f\x7f-\x9f]+$")]
+"""What missions call something: no white space, no control characters, no "/"."""
 
 Text = Annotated[str, StringConstraints(min_length=1)]
 

@@ -2,6 +2,7 @@
 
 import re
 from pathlib import Path
+from typing import cast
 
 import msgspec
 import pytest
@@ -49,3 +50,14 @@ def test_the_docs_name_an_operation_with_its_parameters(operation: Operation) ->
     in_docs = documented()[operation.name]
     assert in_docs[0] == required
     assert optional - {"by"} <= in_docs[1] <= optional
+
+
+def test_the_name_of_who_asks_has_no_control_characters() -> None:
+    class Control:
+        def stop_all(self, *, by: str, reason: str) -> str:
+            return by
+
+    stop = OPERATIONS["stop_all"]
+    params = msgspec.convert({"by": "anna\x1b[2J\n" + 300 * "x"}, stop.parameters)
+    by = stop.call(cast("MissionControl", Control()), params)
+    assert by == "anna [2J " + 191 * "x"

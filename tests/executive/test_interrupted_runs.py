@@ -256,3 +256,55 @@ def test_a_run_knows_the_geometries_that_were_handed_over_before_it_was_taken_up
         assert dict(world.executive.runner("r1").run.state.geometries["Route"]) == POINT
 
     after_a_crash(play, story, (DRIVE, accepted, running))
+
+
+def test_a_stop_of_all_waits_no_ten_seconds_for_a_vehicle_that_does_not_answer(play):
+    async def story(world: World, runs):
+        query = world.fake.query
+
+        async def asked(behavior: str, native_ref: str | None) -> BehaviorReport:
+            if behavior == "r1.b1":
+                await asyncio.Event().wait()  # it never answers
+            return await query(behavior, native_ref)
+
+        world.fake.query = asked
+        taking_up = asyncio.create_task(world.executive.resume_all(runs))
+        await world.clock.sleep(0.5)
+        stopped_us = world.clock.now_us()
+        assert await world.executive.control.stop_all(by="anna") == runs
+        await world.fake.until_called("cancel", "r2.b1")
+        assert world.clock.now_us() - stopped_us < 2_000_000
+        await taking_up
+
+    after_a_crash(play, story, (DRIVE, accepted, running), (ELSEWHERE, accepted, running))
+
+
+def test_what_is_not_there_is_said_in_a_whole_sentence(play):
+    async def story(world: World):
+        with pytest.raises(OperatorError) as refused:
+            await world.executive.control.take("zz", by="anna")
+        assert str(refused.value) == (
+            "the fleet has no 'zz'; known vehicles and payloads: ugv1, ugv2"
+        )
+        run = await world.executive.control.start(DRIVE)
+        await world.executive.control.stop(run)
+        await world.executive.control.wait(run)
+        with pytest.raises(NotDrivenError, match="r9 is not driven.*it drives: none"):
+            await world.executive.control.pause("r9")
+
+    play(story, fleet=VEHICLES)
+
+
+def test_a_schedule_that_is_just_read_is_said_so(play):
+    async def story(world: World):
+        with pytest.raises(OperatorError, match="`m2pem serve` is one that does"):
+            await world.executive.control.schedule(DRIVE)
+        world.executive.announce_schedule()
+        with pytest.raises(OperatorError, match="has just begun.* try again in a few seconds"):
+            await world.executive.control.schedule(DRIVE)
+        await world.executive.load_schedule()
+        world.executive.serve_schedule()
+        with pytest.raises(OperatorError, match="unattended"):  # the next thing that it asks for
+            await world.executive.control.schedule(DRIVE)
+
+    play(story, fleet=VEHICLES)

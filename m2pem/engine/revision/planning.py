@@ -26,7 +26,7 @@ from m2pem.mission.elements import (
     SubProcess,
 )
 from m2pem.mission.mission import Mission
-from m2pem.suggestions import did_you_mean
+from m2pem.suggestions import suggest
 
 
 def plan_revision(
@@ -99,7 +99,9 @@ class _Planning:
             if element in old:
                 text = f"no token is on {called(old[element])}, which is to be moved"
             else:
-                text = f"the mission has no element {element!r}; {did_you_mean(element, old)}"
+                text = (
+                    f"the mission has no element {element!r}; {suggest(element, old, 'elements')}"
+                )
             self._draft.refuse(element, text)
 
     def _data_stores(self) -> None:

@@ -25,6 +25,11 @@ class ScheduleOperations(ControlParts):
         by: str = "",
     ) -> EntryId:
         if not self._schedule.served:
+            if self._schedule.is_beginning:
+                raise OperatorError(
+                    "this executive has just begun, and takes up what was interrupted before it "
+                    "schedules missions; try again in a few seconds"
+                )
             raise OperatorError(
                 "this executive starts no scheduled missions: `m2pem serve` is one that does"
             )
