@@ -289,7 +289,7 @@ def test_what_is_not_there_is_said_in_a_whole_sentence(play):
         run = await world.executive.control.start(DRIVE)
         await world.executive.control.stop(run)
         await world.executive.control.wait(run)
-        with pytest.raises(NotDrivenError, match="r9 is not driven.*it drives: none"):
+        with pytest.raises(NotDrivenError, match=r"r9 is not driven.*it drives: none"):
             await world.executive.control.pause("r9")
 
     play(story, fleet=VEHICLES)
@@ -300,7 +300,7 @@ def test_a_schedule_that_is_just_read_is_said_so(play):
         with pytest.raises(OperatorError, match="`m2pem serve` is one that does"):
             await world.executive.control.schedule(DRIVE)
         world.executive.announce_schedule()
-        with pytest.raises(OperatorError, match="has just begun.* try again in a few seconds"):
+        with pytest.raises(OperatorError, match=r"has just begun.* try again in a few seconds"):
             await world.executive.control.schedule(DRIVE)
         await world.executive.load_schedule()
         world.executive.serve_schedule()

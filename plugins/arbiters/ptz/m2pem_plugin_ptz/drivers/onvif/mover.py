@@ -29,7 +29,7 @@ RUNS_ON_S = 1.0
 LAGS_ON = 4.0
 SILENT_CALLS = 3
 SILENT_S = 3.0
-"""After this many calls and this time without an answer, the session ends."""
+"""After this many calls and this time without a right answer, the session ends."""
 
 BACKOFF_S = 0.5
 ON_ITS_WAY_RAD = math.radians(0.5)
@@ -138,7 +138,7 @@ class Mover:
                 await self._ask(session)
                 silent_calls, answered_s, self.answered = 0, self._now_s, True
                 self._on_contact()
-            except SilentError:
+            except (SilentError, RefusedError):
                 silent_calls += 1
                 if silent_calls >= SILENT_CALLS and self._now_s - answered_s >= SILENT_S:
                     raise

@@ -115,12 +115,10 @@ def translate_error(
         if require("onvif.util").is_auth_error(error):
             return unauthorized_error(settings, user)
         return RefusedError(f"{camera(settings)} refuses {operation}: {fault_text(error)}")
-    if isinstance(error, zeep.exceptions.TransportError):
-        if error.status_code in (401, 403):
-            return unauthorized_error(settings, user)
-        if error.status_code >= 500:
-            return silent_error(settings, OSError(f"HTTP status {error.status_code}"))
-    text = " ".join(str(error).split())[:200]
+    if isinstance(error, zeep.exceptions.TransportError) and error.status_code in (401, 403):
+        return unauthorized_error(settings, user)
+    # zeep 4.3.3 raises AttributeError for a text, such as the page of an HTTP error.
+    text = "no XML" if isinstance(error, AttributeError) else " ".join(str(error).split())[:200]
     return RefusedError(f"{camera(settings)} answers {operation} with invalid ONVIF: {text}")
 
 
