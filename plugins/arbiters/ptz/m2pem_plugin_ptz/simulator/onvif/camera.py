@@ -177,7 +177,7 @@ Moment = Callable[[], float]
 class FaultState:
     """The active faults. `speaks`: if it is not set, requests are not answered. `slow_s`:
     additional latency. `locked`: no password is right. `fault`: answer to moves. `picture`: content
-    in place of a picture. `full`: no storage for video. `status`: of HTTP, in place of answers."""
+    in place of a picture. `full`: no storage for video."""
 
     speaks: asyncio.Event = field(default_factory=asyncio.Event)
     slow_s: float = 0.0
@@ -185,7 +185,6 @@ class FaultState:
     fault: str = ""
     picture: bytes | None = None
     full: bool = False
-    status: int = 0
 
     def __post_init__(self) -> None:
         self.speaks.set()

@@ -46,10 +46,6 @@ class Faults:
         """Answer moves with a SOAP fault; "" ends it."""
         self._camera.fault_state.fault = text
 
-    def http(self, status: int) -> None:
-        """Answer all calls with a status of HTTP alone; 0 ends it."""
-        self._camera.fault_state.status = status
-
     def clock(self, seconds: float) -> None:
         """Advance the clock."""
         self._camera.skew_s += seconds
@@ -97,10 +93,6 @@ def _refuse(match: Match) -> Effect[Faults]:
     return Effect(lambda faults: faults.refuse(match[1]), lambda faults: faults.refuse(""))
 
 
-def _http(match: Match) -> Effect[Faults]:
-    return Effect(lambda faults: faults.http(int(match[1])), lambda faults: faults.http(0))
-
-
 def _clock(match: Match) -> Effect[Faults]:
     seconds = float(match[1])
     return Effect(lambda faults: faults.clock(seconds), lambda faults: faults.clock(-seconds))
@@ -116,7 +108,6 @@ GRAMMAR = FaultGrammar(
         "slow 2 s": FaultKind(rf"slow\s+{NUMBER}\s*s", _slow),
         "refuse auth": FaultKind(r"refuse\s+auth", _switch(Faults.locked)),
         'refuse "text"': FaultKind(r"refuse\s+\"([^\"]+)\"", _refuse),
-        "http 500": FaultKind(r"http\s+(5\d\d)", _http),
         "stuck": FaultKind("stuck", _switch(Faults.stuck)),
         "clock +3600 s": FaultKind(r"clock\s+([+-]?\d+(?:\.\d+)?)\s*s", _clock),
         "reboot": FaultKind("reboot", fixed(Faults.switch_off, Faults.switch_on), REBOOT_S),

@@ -125,8 +125,6 @@ class OnvifServer:
         # Half of the time is the way there, half the way back: what is done is done in between.
         content = await request.read()
         await self._delay(0.5)
-        if self.camera.fault_state.status:
-            return web.Response(status=self.camera.fault_state.status)
         try:
             header, asked = soap.read(content)
             status, body = 200, soap.answer(self._do(header, asked, str(request.url.origin())))
