@@ -22,7 +22,7 @@ from m2pem.api import (
     shown_geometries,
 )
 from m2pem.errors import M2pemError
-from m2pem_plugin_cot.contact import CONTACT_EVERY_S, Chat, Contact
+from m2pem_plugin_cot.contact import CONTACT_EVERY_S, Chat
 from m2pem_plugin_cot.events import (
     TYPES,
     deletion_event,
@@ -59,7 +59,7 @@ class CotFace:
         self._control = control
         self._fleet = control.fleet()
         self._settings = read_settings(settings, self._fleet)
-        self._link = Link(self._settings, self._received)
+        self._link = Link(self._settings, self._received, self._connected)
         self._states: dict[str, VehicleState] = {}
         self._holders: Mapping[ResourceId, str] = {}
         self._waiting: asyncio.Queue[tuple[bytes, str]] = asyncio.Queue(MAX_WAITING)
@@ -68,9 +68,11 @@ class CotFace:
         self._given: dict[str, Point | Route | Area] = {}
         self._refused: dict[str, int] = {}
         self._contact = contact = self._settings.contact
-        self._chat: Chat | None = None
-        if contact is not None and contact.chat:
-            self._chat = Chat(control, contact, self._link.send, self._now_us)
+        self._chat = (
+            Chat(control, contact, self._link.send, self._now_us)
+            if contact is not None and contact.chat
+            else None
+        )
 
     async def serve(self) -> None:
         """Send and receive until cancelled.
@@ -80,7 +82,7 @@ class CotFace:
         """
         works = [self._link.run(), self._follow(), self._send(), self._send_geometries()]
         if self._contact is not None:
-            works.append(self._introduce(self._contact))
+            works.append(self._stay_known())
         if self._chat is not None:
             works.append(self._chat.follow())
         if self._settings.receive or self._chat is not None:
@@ -109,17 +111,17 @@ class CotFace:
                     uid = self._uid("detection", f"{found.source}.{found.time_us}.{number}")
                     self._link.send(detection_event(uid, found, GEOMETRY_STALE_S))
 
-    async def _introduce(self, contact: Contact) -> None:
-        """Send the contact now and then, and what is asked to a server that is new."""
-        connections = 0
-        while True:
-            if self._link.is_open:
-                self._link.send(contact.event(self._fleet.origin, self._now_us()))
-            if self._link.connections != connections:
-                if self._chat is not None:
-                    self._chat.repeat()
-                connections = self._link.connections
-            await self._link.until_connected(CONTACT_EVERY_S)
+    def _connected(self) -> None:
+        """Say who m2pem is, and what is asked now."""
+        if self._contact is not None:
+            self._link.send(self._contact.event(self._fleet.origin, self._now_us()))
+        if self._chat is not None:
+            self._chat.repeat()
+
+    async def _stay_known(self) -> None:
+        while self._contact is not None:
+            await asyncio.sleep(CONTACT_EVERY_S)
+            self._link.send(self._contact.event(self._fleet.origin, self._now_us()))
 
     async def _send(self) -> None:
         """Send the vehicles that were received since the last time; others become stale."""

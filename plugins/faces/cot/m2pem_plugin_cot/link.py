@@ -9,7 +9,6 @@ import logging
 import socket
 import struct
 from collections.abc import Callable
-from contextlib import suppress
 from typing import cast
 
 from m2pem.errors import PluginError
@@ -28,11 +27,11 @@ LONGEST_AGAIN_S = 30.0
 
 
 class Link:
-    """`dropped`: events that were not sent. `connections`: how often it was connected."""
+    """`dropped`: events that were not sent. `connected`: is called at each connection."""
 
-    def __init__(self, settings: Settings, receive: Receive) -> None:
-        self.dropped = self.connections = 0
-        self._connected = asyncio.Event()
+    def __init__(self, settings: Settings, receive: Receive, connected: Callable[[], None]) -> None:
+        self.dropped = 0
+        self._connected = connected
         self._settings = settings
         self._receive = receive
         self._transport: asyncio.Transport | None = None
@@ -46,23 +45,6 @@ class Link:
             cast("asyncio.DatagramTransport", transport).sendto(event)
         else:
             transport.write(event + b"\n")
-
-    @property
-    def is_open(self) -> bool:
-        """Whether what is sent now goes out."""
-        return self._transport is not None
-
-    async def until_connected(self, within_s: float) -> None:
-        """Wait for another connection, no longer than this."""
-        self._connected.clear()
-        with suppress(TimeoutError):
-            async with asyncio.timeout(within_s):
-                await self._connected.wait()
-
-    def _open(self, transport: asyncio.Transport) -> None:
-        self._transport = transport
-        self.connections += 1
-        self._connected.set()
 
     async def run(self) -> None:
         """Send and receive until cancelled.
@@ -84,7 +66,8 @@ class Link:
             transport, _ = await loop.create_datagram_endpoint(_Errors, sock=sending)
             opened.append(transport)
             # A datagram transport of asyncio has a buffer, too, whatever its declared type.
-            self._open(cast("asyncio.Transport", transport))
+            self._transport = cast("asyncio.Transport", transport)
+            self._connected()
             if listen is not None:
                 receiving = _receiving_socket(listen, self._settings.interface)
                 listening, _ = await loop.create_datagram_endpoint(
@@ -118,8 +101,8 @@ class Link:
                 again_s = min(2 * again_s, LONGEST_AGAIN_S)
                 continue
             log.info("%s: connected", address)
-            again_s = AGAIN_S
-            self._open(transport)
+            self._transport, again_s = transport, AGAIN_S
+            self._connected()
             try:
                 why = await lost
             finally:
