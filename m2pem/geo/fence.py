@@ -87,17 +87,24 @@ class Fence:
     def around(cls, rings: Sequence[Sequence[EastNorth]]) -> "Fence":
         """Return the fence that keeps out what closed rings bound, in metres of any local frame: it
         has no `frame`, and is for `is_free`, `way` and `closed`."""
+        return cls._of(None, [valid(ring) for ring in rings])
+
+    @classmethod
+    def _of(cls, inside: "BaseGeometry | None", kept_out: Sequence["BaseGeometry"]) -> "Fence":
         fence = cls.__new__(cls)
         fence._named = {}
-        fence._keep(None, [valid(ring) for ring in rings], 0.0)
+        fence._keep(inside, kept_out, 0.0)
         return fence
+
+    def apart_from(self, kept_out: Sequence["BaseGeometry"]) -> "Fence":
+        """Return as `around` does the same one that also keeps out areas in metres of its frame."""
+        return self._of(self._inside, [self.closed, *kept_out])
 
     def _keep(
         self, inside: "BaseGeometry | None", kept_out: Sequence["BaseGeometry"], clearance_m: float
     ) -> None:
         everywhere = shapely.box(-_FAR_M, -_FAR_M, _FAR_M, _FAR_M)
-        if inside is None:
-            inside = everywhere
+        self._inside = inside = everywhere if inside is None else inside
         self.closed: BaseGeometry = shapely.union_all(kept_out)
         """The exclusions with the clearance, in metres of the frame."""
         if clearance_m > 0:

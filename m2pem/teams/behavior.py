@@ -398,9 +398,10 @@ class TeamBehavior:
         """Return the time until the next check; None: no member needs one."""
         if self._ending is not None:
             return PERIOD_S
-        if self._controller is not None and any(member.goes for member in self.members.values()):
-            return PERIOD_S
-        if any(member.active and member.state is None for member in self.members.values()):
+        active = [member for member in self.members.values() if member.active]
+        if self._controller is not None and any(each.goes or each.state is None for each in active):
+            return PERIOD_S  # it may have to stop as soon as it goes
+        if any(each.state is None for each in active):
             return IDLE_PERIOD_S
         if self._plan.duration_s is not None and self._shares.all_over:
             return min(IDLE_PERIOD_S, max(0.001, self._plan.duration_s - self._stayed_s))

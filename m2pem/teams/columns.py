@@ -20,7 +20,6 @@ from m2pem.teams.paths import (
     SPACING_M,
     MemberPath,
     beside,
-    keep_out,
     lane,
     lead_around,
     slot,
@@ -68,9 +67,7 @@ def march(context: PlanningContext, default_shape: str) -> Plan:
     speed = _march_speed(context, marchers, spacing)
     legs = tuple(way.leg(context, speed, None) for way in ways)
     closes = shape == "column"
-    return Plan(
-        legs, March(marchers, spacing, speed, closes, context.frame, context.fence, in_order)
-    )
+    return Plan(legs, March(marchers, spacing, speed, closes, in_order))
 
 
 def one_by_one(context: PlanningContext) -> Plan:
@@ -162,8 +159,9 @@ class _Way:
         route: Sequence[EastNorthUp],
         place: tuple[float, float],
         begin: EastNorth | None,
+        fence: Fence,
     ) -> None:
-        self.member, self._begin = member, begin
+        self.member, self._begin, self._fence = member, begin, fence
         self._around: Fence | None = None
         self._back_m, self._left_m = place
         self._route = route
@@ -194,18 +192,15 @@ class _Way:
             nearest_m = min(math.dist(place, end) for end in ends)
             radius_m = min(_AROUND_SHARE * spacing_m, nearest_m - _SAME_PLACE_M)
             discs.append(shapely.Point(place).buffer(radius_m))
-        within = context.fence
         # A route that leaves the fence is refused by the arbiters, and not led around its holes.
-        if within is not None:
-            track = [each[:2] for each in self.lane.places]
-            within = None if Fence(within, frame=context.frame).leaves(track) else within
-        self._around = keep_out(discs, within, context.frame)
+        leaves = self._fence.leaves([each[:2] for each in self.lane.places])
+        self._around = (Fence.around(()) if leaves else self._fence).apart_from(discs)
         self._end_at(self._mark_m)
 
     def marcher(self, motion: Motion, *, begins: bool = True) -> Marcher:
         """The member on its path; or on that without its way to the route."""
         path = self.path if begins else self.lane
-        return Marcher(self.member, path, self._back_m, self._left_m, motion)
+        return Marcher(self.member, path, self._back_m, self._left_m, motion, self._fence)
 
     def corners(self, frame: LocalFrame) -> list[LatLon]:
         """The corners of its lane."""
@@ -305,7 +300,7 @@ def _drawn(
         )
     places = [(*context.level(each), each[2] or 0.0) for each in _apart(context, route)]
     return [
-        _Way(member, places, offset, context.begin(member))
+        _Way(member, places, offset, context.begin(member), context.fence(member))
         for member, offset in zip(context.members, offsets, strict=False)
     ]
 

@@ -17,10 +17,9 @@ from m2pem.geo.polyline import EastNorthUp
 from m2pem.mission.catalogue import ResourceId
 from m2pem.teams.clearance import NEAREST_SHARE, Clearance
 from m2pem.teams.columns import GAP_SHARE, lane_mates
-from m2pem.teams.paths import keep_out, lead_around
+from m2pem.teams.paths import lead_around
 from m2pem.teams.plan import (
-    REACTION_S,
-    REACTION_SHARE,
+    SOON_S,
     START_SHARE,
     March,
     Marcher,
@@ -35,11 +34,9 @@ PERIOD_S = 0.25
 
 _SLACK_S = 1.5
 _SILENT_S = 1.0
-"""A member of which nothing new is received for so long is not waited for: it may go on."""
+"""A member of which nothing new is received for so long is not waited for, as it may go on; those
+behind it may come to where it stands."""
 
-_SOON_S = REACTION_S * REACTION_SHARE
-_HARD_BRAKING = 2.0
-"""Vehicles brake at most so many times as hard as they do at least."""
 
 _LOOK_AHEAD_M = 50.0
 _HERE_M = 1.0
@@ -57,8 +54,8 @@ class _Track:
     """A member's progress in metres: `along_m` on its own path, `mark_m` on the team's route.
 
     `stops_m`: the least distance along its path at which it may come to a stop. How far it may go
-    on without coming too near to another one: `room_m` if that one brakes as vehicles do; `free_m`
-    if it stops at once, at a distance that is less.
+    on without coming too near to another one: `room_m` if that one brakes as vehicles do, with
+    `settling_s` to stop there; `free_m` if it stops at once, at a distance that is less.
     """
 
     marcher: Marcher
@@ -66,6 +63,7 @@ class _Track:
     stops_m: float = 0.0
     room_m: float = math.inf
     free_m: float = math.inf
+    settling_s: float = SOON_S
     pose: MemberPose | None = None
     unseen_s: float = 0.0
     along_m: float | None = None
@@ -155,11 +153,11 @@ class FormationController:
 
         A way that would end too near to a lost one ends beside it.
         """
-        track, frame = self._tracks[member], self._march.frame
-        path, tracks = track.marcher.path, list(self._tracks.values())
+        track, tracks = self._tracks[member], list(self._tracks.values())
+        path = track.marcher.path
         behind = [each.pose.place for each in tracks[tracks.index(track) + 1 :] if each.pose]
         where = (*self._lost, *map(shapely.Point, behind))
-        fence = keep_out((each.buffer(self.spacing_m) for each in where), self._march.fence, frame)
+        fence = track.marcher.fence.apart_from([each.buffer(self.spacing_m) for each in where])
         places = lead_around(path.rest(pose.place, track.find(pose)), fence)
         if not places:
             return []
@@ -236,13 +234,14 @@ class FormationController:
             track.along_m = track.stops_m = path.line.length_m
         elif stand is None or (stand.speed_m_s > 0 and stand == track.pose):
             track.unseen_s += PERIOD_S
+            if track.unseen_s >= _SILENT_S and track.along_m is not None:
+                track.stops_m = track.along_m  # it may stand there
         else:
             found_m = track.find(stand)
             track.pose, track.unseen_s = stand, 0.0
             track.along_m, track.mark_m = found_m, path.mark_m(found_m)
             track.off_m = math.dist(stand.place, path.line.at(found_m))
-            braking_m_s2 = _HARD_BRAKING * track.marcher.motion.braking_m_s2
-            track.stops_m = found_m + stand.speed_m_s**2 / (2 * braking_m_s2)
+            track.stops_m = found_m + track.marcher.motion.hard_stop_m(stand.speed_m_s)
 
     def _measure_room(self, track: _Track) -> None:
         """Measure the room if the others brake, and if they stop where they are now."""
@@ -255,8 +254,10 @@ class FormationController:
             math.inf if limit_m >= track.marcher.path.line.length_m else limit_m - along_m
             for limit_m in limits_m
         )
-        soon_m = track.marcher.motion.stopping_m(max(0.0, now_m) / _SOON_S, _SOON_S)
+        soon_m = track.marcher.motion.stopping_m(max(0.0, now_m) / SOON_S, SOON_S)
         track.room_m = min(then_m, soon_m)
+        # Those that move go on meanwhile.
+        track.settling_s = track.marcher.motion.settling_s if then_m == now_m else SOON_S
         track.free_m = now_m + self._nearest_m - self.floor_m
 
     def _delay_m(self, track: _Track, other: _Track) -> float:
@@ -271,7 +272,7 @@ class FormationController:
     def _steady_free_m(self, track: _Track) -> float:
         """How far a member without variable speed may go on, to stop from the march's speed."""
         motion, march_m_s = track.marcher.motion, self._march.speed_m_s
-        braked_m = motion.stopping_m(march_m_s, _SOON_S) / _HARD_BRAKING
+        braked_m = march_m_s * SOON_S + motion.hard_stop_m(march_m_s)
         return min(track.free_m, track.room_m - braked_m + motion.stopping_m(march_m_s))
 
     def _speed(self, track: _Track, lead: _Track, waits_m: float) -> float:
@@ -283,7 +284,7 @@ class FormationController:
         motion = track.marcher.motion
         if track.marcher.member not in self._steady:
             speed = min(march_m_s * (1 + lag_m / slack), march_m_s * (2 - waits_m / slack))
-            room_m_s = motion.safe_m_s(track.room_m, _SOON_S)
+            room_m_s = motion.safe_m_s(track.room_m, track.settling_s)
             return self._graded(track, min(speed, motion.safe_m_s(track.free_m), room_m_s))
         needed_m = motion.stopping_m(march_m_s)
         free_m = self._steady_free_m(track)

@@ -4,16 +4,11 @@ import math
 from bisect import bisect_left
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import accumulate, chain, pairwise
-from typing import TYPE_CHECKING
 
 from m2pem.geo.fence import Fence
 from m2pem.geo.lazy_imports import shapely
-from m2pem.geo.local_frame import EastNorth, LocalFrame
+from m2pem.geo.local_frame import EastNorth
 from m2pem.geo.polyline import EastNorthUp, Polyline, Segment, shifted, trimmed
-from m2pem.mission.geometry import Area
-
-if TYPE_CHECKING:
-    from shapely import Polygon
 
 SPACING_M = 15.0
 """The default spacing between members."""
@@ -178,14 +173,6 @@ def _arc(before: Segment, after: Segment) -> list[EastNorth]:
         Segment(begin, before.yaw_rad + sweep / 2, 0.0).at(2 * radius_m * math.sin(abs(sweep) / 2))
         for sweep in sweeps
     ]
-
-
-def keep_out(where: Iterable["Polygon"], within: Area | None, frame: LocalFrame) -> Fence:
-    """Return the fence that keeps out some areas in metres of a local frame; `within`: may not be
-    left."""
-    rings = [[frame.to_latlon((x, y)) for x, y in each.exterior.coords] for each in where if each]
-    areas = [Area((tuple((*corner, None) for corner in ring),)) for ring in rings]
-    return Fence(within, areas, frame=frame)
 
 
 def lead_around(places: Sequence[EastNorthUp], fence: Fence) -> list[EastNorthUp]:

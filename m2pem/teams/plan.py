@@ -8,18 +8,18 @@ from typing import TypeAlias
 from m2pem.api.arbiter import ResolvedValue
 from m2pem.api.behavior_parameters import BehaviorParameters
 from m2pem.fleet.parameters import accepted
+from m2pem.geo.fence import Fence
 from m2pem.geo.local_frame import EastNorth, LatLon, LocalFrame
 from m2pem.geo.polyline import EastNorthUp
 from m2pem.mission.catalogue import BehaviorSpec, ResourceId
-from m2pem.mission.geometry import Area, Coordinate, Point, Route, VehiclePosition
+from m2pem.mission.geometry import Coordinate, Point, Route, VehiclePosition
 from m2pem.teams.paths import MemberPath
 
 REACTION_S = 1.0
 """Time from a change of telemetry until the vehicle brakes: telemetry, control, command."""
 
-
-REACTION_SHARE = 0.5
-"""Share of `REACTION_S` within which a vehicle brakes that nothing disturbs."""
+SOON_S = 0.5
+"""The same of a vehicle that nothing disturbs."""
 
 START_SHARE = 0.2
 """Share of the march's speed: slower than that no member starts."""
@@ -27,19 +27,26 @@ START_SHARE = 0.2
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """`nominal_m_s`: the default speed of a march. `braking_m_s2`: the minimum deceleration of a
-    vehicle after a command to stop."""
+    """`nominal_m_s`: the default speed of a march. `braking_m_s2`, `hardest_m_s2`: the minimum and
+    the maximum deceleration of a vehicle after a command to stop. `settling_s`: how long it goes on
+    with its speed, in all, while it slows down to stop at a place: it overshoots, and coasts."""
 
     nominal_m_s: float
     braking_m_s2: float
+    hardest_m_s2: float
+    settling_s: float = SOON_S
 
     def stopping_m(self, speed_m_s: float, reaction_s: float = REACTION_S) -> float:
         """Return the distance that the vehicle needs to stop from that speed."""
         return speed_m_s * reaction_s + speed_m_s**2 / (2 * self.braking_m_s2)
 
+    def hard_stop_m(self, speed_m_s: float) -> float:
+        """Return the least distance within which the vehicle may come to a stop."""
+        return speed_m_s**2 / (2 * self.hardest_m_s2)
+
     def short_m(self, march_m_s: float) -> float:
         """Return how far before the place where it must stop the vehicle may come to a stop."""
-        return self.stopping_m(START_SHARE * march_m_s, REACTION_S * REACTION_SHARE)
+        return self.stopping_m(START_SHARE * march_m_s, self.settling_s)
 
     def safe_m_s(self, distance_m: float, reaction_s: float = REACTION_S) -> float:
         """Return the maximum speed from which it stops within the distance; 0 if that is <= 0."""
@@ -50,12 +57,13 @@ class Motion:
 
 
 MOTIONS: Mapping[str, Motion] = {
-    "ground": Motion(5.0, 2.0),
-    "air": Motion(10.0, 2.0),
-    "surface": Motion(4.0, 0.4),
-    "subsurface": Motion(1.5, 0.25),
+    "ground": Motion(5.0, 1.0, 4.0, 2.0),
+    "air": Motion(10.0, 2.0, 4.0),
+    "surface": Motion(4.0, 0.4, 0.8),
+    "subsurface": Motion(1.5, 0.25, 0.5),
 }
-"""By domain."""
+"""By domain. ArduRovers (4.7) brake with 1 m/s² (`ATC_DECEL_MAX` 0: as `ATC_ACCEL_MAX`), overshoot
+when their speed is to fall, and coast in HOLD."""
 
 
 MAX_RANGE_M = 100_000.0
@@ -93,29 +101,29 @@ class Leg:
 
 @dataclass(frozen=True, slots=True)
 class Marcher:
-    """A member on the march: `back_m` behind the lead along the route, `left_m` beside it."""
+    """A member on the march: `back_m` behind the lead along the route, `left_m` beside it. `fence`:
+    where it may be."""
 
     member: ResourceId
     path: MemberPath
     back_m: float
     left_m: float
     motion: Motion
+    fence: Fence
 
 
 @dataclass(frozen=True, slots=True)
 class March:
     """Members that move along one route and keep their places to each other, the lead first.
 
-    `closes`: the members behind a lost one move up. `frame`: of the places; `fence`: the area that
-    no vehicle may leave. `in_order`: on its way to the route, each goes before those behind it.
+    `closes`: the members behind a lost one move up. `in_order`: on its way to the route, each goes
+    before those behind it.
     """
 
     marchers: tuple[Marcher, ...]
     spacing_m: float
     speed_m_s: float
     closes: bool
-    frame: LocalFrame
-    fence: Area | None = None
     in_order: bool = False
 
 
@@ -158,8 +166,8 @@ class PlanningContext:
     `poses`: the members' poses. `target`: the pose of the vehicle that the parameter `target`
     names. `begun`: the members are on the route already (after a restart), with the shares of
     `split`. `cruises_m_s`: the members' cruise speeds that the fleet states. `lasts_s`: the time
-    that members can still move, where the fleet states their endurance. `fence`: the area that no
-    vehicle may leave.
+    that members can still move, where the fleet states their endurance. `fences`: where members
+    may be, if there is a limit.
     """
 
     members: tuple[ResourceId, ...]
@@ -173,7 +181,12 @@ class PlanningContext:
     cruises_m_s: Mapping[ResourceId, float] = field(default_factory=dict)
     lasts_s: Mapping[ResourceId, float] = field(default_factory=dict)
     split: tuple[float, ...] = ()
-    fence: Area | None = None
+    fences: Mapping[ResourceId, Fence | None] = field(default_factory=dict)
+
+    def fence(self, member: ResourceId) -> Fence:
+        """Return where a member may be, in the local frame."""
+        fence = self.fences.get(member)
+        return Fence.around(()) if fence is None else fence.in_frame(self.frame)
 
     def target_place(self) -> tuple[float, float]:
         """Return the present place of `target`, east and north in metres.

@@ -1,10 +1,11 @@
 """The reference of a team behavior in the journal, and its parts after a restart."""
 
 import asyncio
-import json
 import logging
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
+
+import msgspec
 
 from m2pem.api.arbiter import Arbiter, BehaviorReport, BehaviorRequest
 from m2pem.mission.catalogue import BehaviorState, ResourceId
@@ -20,10 +21,6 @@ class Transfer:
     member: ResourceId
     behavior: str
     parameters: Mapping[str, Value]
-
-
-_ALWAYS = ("begun", "done", "lost", "version", "split")
-"""What the text of a `Reference` has though it is empty."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,30 +43,14 @@ class Reference:
 
     def text(self) -> str:
         """Return it as JSON, for the journal."""
-        given = {name: value for name, value in asdict(self).items() if value or name in _ALWAYS}
-        return json.dumps(given, separators=(",", ":"))
+        return msgspec.json.encode(self).decode()
 
 
 def read_reference(text: str | None) -> Reference:
     """Read the text of `Reference.text`; return an empty one if there is none or it is invalid."""
     try:
-        data = json.loads(text or "{}")
-        return Reference(
-            {str(name): ref for name, ref in data.get("begun", {}).items()},
-            tuple(data.get("done", ())),
-            {ResourceId(name): str(why) for name, why in data.get("lost", {}).items()},
-            int(data.get("version", 0)),
-            tuple(float(share) for share in data.get("split", ())),
-            {
-                str(key): Transfer(
-                    ResourceId(each["member"]), str(each["behavior"]), dict(each["parameters"])
-                )
-                for key, each in data.get("transfers", {}).items()
-            },
-            tuple(map(str, data.get("given_up", ()))),
-            {str(key): dict(left) for key, left in data.get("left", {}).items()},
-        )
-    except (ValueError, TypeError, KeyError, AttributeError):
+        return msgspec.json.decode(text or "{}", type=Reference)
+    except msgspec.MsgspecError:
         return Reference()
 
 

@@ -11,10 +11,10 @@ from m2pem.api.bus import FleetBus
 from m2pem.api.clock import Clock
 from m2pem.api.telemetry import VehicleState
 from m2pem.fleet.endurance import lasts_s
+from m2pem.fleet.fence import fence_of
 from m2pem.fleet.fleet import Fleet
 from m2pem.geo.local_frame import LatLon, LocalFrame
 from m2pem.mission.catalogue import ResourceId
-from m2pem.mission.geometry import Area
 from m2pem.teams.areas import escort, observe, survey
 from m2pem.teams.capabilities import Capabilities
 from m2pem.teams.columns import march, one_by_one
@@ -100,7 +100,6 @@ class TeamSituation:
             target = self._state(ResourceId(parameters.target_vehicle))
             seen = None if target is None else pose_of(frame, target)
         vehicles = {each: self._fleet.vehicles[each] for each in request.resources}
-        fence = self._fleet.geometries.get(self._fleet.fence)
         context = PlanningContext(
             request.resources,
             {each: vehicle.domain.value for each, vehicle in vehicles.items()},
@@ -117,7 +116,7 @@ class TeamSituation:
                 if vehicle.endurance_s
             },
             split,
-            fence if isinstance(fence, Area) else None,
+            {each: fence_of(self._fleet, vehicle.domain) for each, vehicle in vehicles.items()},
         )
         return TeamPlan(PLANS[request.behavior](context), frame)
 

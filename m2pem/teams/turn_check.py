@@ -8,7 +8,7 @@ from m2pem.findings import Finding, Severity
 from m2pem.fleet.allocation import resources_of
 from m2pem.fleet.behaviors import SHARED
 from m2pem.fleet.fence import fence_of
-from m2pem.fleet.fleet import Fleet
+from m2pem.fleet.fleet import Fleet, LostMemberPolicy
 from m2pem.fleet.parameters import examine_behavior
 from m2pem.fleet.task_findings import TaskFindings
 from m2pem.geo.local_frame import LocalFrame
@@ -26,13 +26,30 @@ def check_turns(mission: Mission, fleet: Fleet) -> Iterator[Finding]:
         if behavior.type is BehaviorType.TEAM and behavior.name in SHAPES:
             context = _context(behavior, mission, fleet)
             findings = TaskFindings(mission.file_of(task), task)
+            _add_failsafes(findings, behavior, fleet)
             try:
                 if context is not None:
                     _add_meeting(findings, behavior, context, fleet)
-                    _add_breaches(findings, behavior, context, fleet)
+                    _add_breaches(findings, behavior, context)
             except (TeamRefusedError, KeyError):  # for another reason, or as the first finding says
                 pass
             yield from findings.found
+
+
+def _add_failsafes(findings: TaskFindings, behavior: Behavior, fleet: Fleet) -> None:
+    teams = (fleet.teams.get(role.resource) for role in behavior.roles)
+    going_on = (each for each in teams if each and each.on_lost_member is LostMemberPolicy.CONTINUE)
+    members = (fleet.vehicles[member] for team in going_on for member in team.members)
+    for each in members:
+        if each.failsafe not in ("", "hold"):
+            findings.add(
+                "moves-when-lost",
+                f"{each.id} ({fleet.file}:{each.line}) may meet the others, which go on without it "
+                f"when its link is lost: its failsafe is '{each.failsafe}'",
+                "set its failsafe to hold, or the team's `on_lost_member` to stop",
+                line=behavior.line,
+                severity=Severity.WARNING,
+            )
 
 
 def _add_meeting(
@@ -54,18 +71,15 @@ def _add_meeting(
         )
 
 
-def _add_breaches(
-    findings: TaskFindings, behavior: Behavior, context: PlanningContext, fleet: Fleet
-) -> None:
+def _add_breaches(findings: TaskFindings, behavior: Behavior, context: PlanningContext) -> None:
     from m2pem.teams.columns import lanes  # noqa: PLC0415  # loads NumPy
 
     route = context.parameters.route
-    fences = {each: fence_of(fleet, fleet.vehicles[each].domain) for each in context.members}
-    if route is None or not any(fences.values()):
+    if route is None or not any(context.fences.values()):
         return
     way = [each[:2] for each in route.waypoints]
     for member, lane in lanes(context, behavior.name).items():
-        fence = fences[member]
+        fence = context.fences[member]
         if fence is None or fence.find_breach(way) is not None:
             continue
         breach = fence.find_breach(lane, None, lambda index: f"corner {index + 1} of its lane")
@@ -101,4 +115,5 @@ def _context(behavior: Behavior, mission: Mission, fleet: Fleet) -> PlanningCont
         {each.id: {} for each in vehicles},
         BehaviorParameters(values),
         LocalFrame(route.waypoints[0][:2]),
+        fences={each.id: fence_of(fleet, each.domain) for each in vehicles},
     )

@@ -15,8 +15,8 @@ from m2pem.engine.records import BehaviorEnded
 from m2pem.executive.fleet_connections import FleetArbiters
 from m2pem.executive.loading import findings_for
 from m2pem.findings import Finding, Severity
-from m2pem.fleet.fleet import Domain, Fleet, LostMemberPolicy
-from m2pem.mission.catalogue import BehaviorState
+from m2pem.fleet.fleet import Domain, Fleet, LostMemberPolicy, SharedSpace
+from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.mission.geometry import Area
 from m2pem.plugins import PluginManager
 from m2pem.simulation.faults import Fault
@@ -285,6 +285,20 @@ def test_check_finds_a_spacing_below_the_separation_of_the_fleet(given: dict[str
     assert f"parameter '{next(iter(given))}': members come within 16" in finding.message
 
 
+@pytest.mark.parametrize("policy", LostMemberPolicy)
+@pytest.mark.parametrize("failsafe", ["", "hold", "return_to_launch"])
+def test_check_finds_a_member_that_moves_on_when_the_others_go_on_without_it(
+    policy: LostMemberPolicy, failsafe: str
+) -> None:
+    case = column([(0.0, 0.0), (200.0, 0.0)], 3)
+    fleet = case.fleet(policy)
+    vehicles = {**fleet.vehicles, "b": replace(fleet.vehicles[ResourceId("b")], failsafe=failsafe)}
+    found = checked_in(replace(fleet, vehicles=vehicles), case.mission)
+    meets = policy is LostMemberPolicy.CONTINUE and failsafe == "return_to_launch"
+    assert [each.rule for each in found] == ["moves-when-lost"] * meets
+    assert all("b (" in each.message and failsafe in each.message for each in found)
+
+
 def test_check_finds_nothing_where_members_keep_apart() -> None:
     assert checked(column([(0.0, 0.0), (200.0, 0.0), (200.0, 200.0)])) == []
 
@@ -323,16 +337,29 @@ def test_a_team_fails_where_no_way_within_the_fence_leads_around_a_lost_member()
     assert found.least_m >= 16, found
 
 
-def fenced(fence: shapely.Polygon) -> Judged:
-    """A column within a fence loses its second member; no vehicle leaves the fence."""
-    fleet = column([(0.0, 0.0), (250.0, 0.0)], 3).fleet(LostMemberPolicy.CONTINUE)
-    rings = [[(x, y) for x, y in each.coords[:-1]] for each in (fence.exterior, *fence.interiors)]
-    yard = Area(tuple(area(*ring).rings[0] for ring in rings))
-    fleet = replace(fleet, fence="yard", geometries={**fleet.geometries, "yard": yard})
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_way_around_a_lost_member_keeps_out_of_shared_space_without_a_place(side: int) -> None:
+    pond = shapely.box(100.0, min(12.0 * side, 90.0 * side), 180.0, max(12.0 * side, 90.0 * side))
+    found = fenced(pond, closed=True)
+    assert found.ended.state is BehaviorState.SUCCEEDED, found
+    assert found.ended.reason.startswith("without b (LINK_LOST")
+    assert found.least_m >= 16, found
+    assert max(abs(north) for _, north in found.tracks["c"]) > 15, "it went around"
+
+
+def fenced(yard: shapely.Polygon, *, closed: bool = False) -> Judged:
+    """A column loses its second member; no vehicle leaves an area, or (`closed`) enters it."""
     case = column([(0.0, 0.0), (250.0, 0.0)], 3)
+    fleet = case.fleet(LostMemberPolicy.CONTINUE)
+    rings = [[(x, y) for x, y in each.coords[:-1]] for each in (yard.exterior, *yard.interiors)]
+    drawn = {"yard": Area(tuple(area(*ring).rings[0] for ring in rings))}
+    space = {"yard": SharedSpace("yard", 0)} if closed else {}
+    fleet = replace(fleet, closed_space=space, geometries={**fleet.geometries, **drawn})
+    fleet = fleet if closed else replace(fleet, fence="yard")
     found = judged(fleet, case.mission, ("b", Fault("lose_link", after_s=30.0)))
-    for track in found.tracks.values():
-        assert shapely.LineString(track).difference(fence.buffer(0.1)).length < 0.1
+    for track in map(shapely.LineString, found.tracks.values()):
+        kept_out = track.intersection(yard.buffer(-0.1)) if closed else track - yard.buffer(0.1)
+        assert kept_out.length < 0.1
     return found
 
 
@@ -401,7 +428,7 @@ def check_scattered(seed: int) -> bool:
         return True
 
 
-@pytest.mark.parametrize("seed", [1, 3, 6, 11, 15, 38, 418, 434, 582])
+@pytest.mark.parametrize("seed", [1, 3, 6, 11, 15, 38, 193, 418, 434, 582])
 def test_members_that_begin_anywhere_keep_apart_on_their_ways_to_the_route(seed: int) -> None:
     assert check_scattered(seed)
 

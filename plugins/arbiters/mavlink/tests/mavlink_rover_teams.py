@@ -30,9 +30,8 @@ STRAIGHT: Sequence[Place] = CORNER[:2]
 NEAREST = 0.8
 """Of the spacing, docs/teams.md."""
 
-CONTROL_M = 2.5
-"""Nearer by so much than by their paths two rovers may come: each is steered back to its path, and
-cuts corners by up to 2 m, and m2pem sees where it was up to a quarter of a second before."""
+CORNER_M = 2.5
+"""A rover cuts corners by so much, as it is steered back to its path."""
 
 REACHED_M = 4.0
 
@@ -135,18 +134,17 @@ def check(team: str, tracks: Mapping[str, Track]) -> None:
     assert all(math.dist(a, b) < 2 * spacing_m + REACHED_M for a, b in pairwise(ends)), ends
 
 
-def check_lost(team: str, tracks: Mapping[str, Track], turns_m: float = 0.0) -> None:
+def check_lost(team: str, tracks: Mapping[str, Track], nearer_m: float = 0.0) -> None:
     """Check that the first rover is at the end of the route, that the third has passed the second,
-    and that no two came nearer than 0.8 of the spacing; one that has to turn back first, by what
-    it needs for that, `turns_m`."""
-    keep_apart(team, tracks, turns_m)
+    and that no two came nearer than 0.8 of the spacing, or by `nearer_m`."""
+    keep_apart(team, tracks, nearer_m)
     _, spacing_m, places = TEAMS[team]
     lead, lost, other = (track[-1][1:] for track in tracks.values())
     assert math.dist(lead, places[-1]) < REACHED_M
     assert math.dist(lead, other) < 2 * spacing_m + REACHED_M < math.dist(lead, lost)
 
 
-def keep_apart(team: str, tracks: Mapping[str, Track], turns_m: float = 0.0) -> None:
+def keep_apart(team: str, tracks: Mapping[str, Track], nearer_m: float = 0.0) -> None:
     found, spacing_m = nearest(tracks), TEAMS[team][1]
-    assert found.m >= NEAREST * spacing_m - CONTROL_M - turns_m, found
+    assert found.m >= NEAREST * spacing_m - nearer_m, found
     print(f"{team}: {found.m:.1f} m at the nearest, spacing {spacing_m:g} m")  # for people
