@@ -29,6 +29,7 @@ from m2pem.mission.elements import (
 from m2pem.mission.events import ConditionalEventDefinition, TimerEventDefinition, caught_data
 from m2pem.mission.expression import Expression, parse
 from m2pem.mission.expression.kinds import DATA, kinds
+from m2pem.mission.expression.operators import kind
 from m2pem.mission.expression.temporal import NOW
 from m2pem.mission.loops import INSTANCE_COUNTS, LOOP_COUNTER, MultiInstance, StandardLoop
 from m2pem.mission.mission import Mission
@@ -95,12 +96,16 @@ def unwritten(
 ) -> Iterator[Finding]:
     """A warning for each name that a process reads and nothing writes, which would be null; and for
     each expression that the kinds of what it reads let have no value, or another one than before.
+
+    `known_names`: written from outside; a mapping has their values, too.
     """
     within: dict[Container, _Store] = {process: _Store() for process in mission.processes}
     stores = {process: within[process] for process in mission.processes}
-    everywhere = {*known_names, *mission.associated}
+    given = known_names if isinstance(known_names, Mapping) else {}
+    known = {name: frozenset({kind(each)}) for name, each in given.items() if each is not None}
     for store in stores.values():
-        store.write(everywhere)
+        store.write(known_names, known)
+        store.write(mission.associated)
     main = mission.process()
     called = {node.called for node in mission.nodes if isinstance(node, CallActivity)}
     for node in mission.nodes:

@@ -44,7 +44,8 @@ def lint(
 ) -> list[Finding]:
     """Look over a whole mission; findings are sorted by file and line.
 
-    `known_names`: names that are written from outside (`--data`). `service_writes`: what each
+    `known_names`: names that are written from outside (`--data`), with values in a mapping.
+    `service_writes`: what each
     registered service class writes; a class that is not there may write anything.
     `behavior_writes`: what behaviors write, by their names.
     """

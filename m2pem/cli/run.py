@@ -85,7 +85,7 @@ async def _run(
     from m2pem.cli.ocus import Operators, chosen
     from m2pem.cli.output import output_of
     from m2pem.cli.session import drive_run, make_executive, refuse_speed
-    from m2pem.executive.loading import known_data, load_source, monitored_requirements
+    from m2pem.executive.loading import load_source, monitored_requirements
     from m2pem.executive.simulated_state import tidy_up, with_own_state
     from m2pem.findings import lines
     from m2pem.fleet.fleet import simulated_fleet
@@ -112,7 +112,7 @@ async def _run(
         process_id, warnings = executive.starter.admit(loaded, process, data)
         for line in lines(warnings):
             note(line)
-        required = monitored_requirements(loaded, fleet, plugins, known_data(data), spec)
+        required = monitored_requirements(loaded, fleet, plugins, data, spec)
         with output_of(output) as out:
             status = await drive_run(
                 executive,

@@ -1,7 +1,7 @@
 """Getting a mission: from a path, a URL or bytes; and checking it against the fleet."""
 
 import logging
-from collections.abc import Collection, Container, Iterable, Mapping, Sequence
+from collections.abc import Collection, Container, Iterable, Sequence
 from dataclasses import replace
 from itertools import chain
 from pathlib import Path
@@ -109,8 +109,8 @@ def findings_for(
 ) -> list[Finding]:
     """All findings of `m2pem check` for a mission that was read: its own, the fleet's, plugins'.
 
-    `data`: names given at start (`--data`). `arbiters` None: no fleet, so roles are only
-    checked to be there. `handed_over`: names of geometries that operators have handed over.
+    `data`: names given at start (`--data`), with values in a mapping. `arbiters` None: no fleet, so
+    roles are only checked to be there. `handed_over`: geometries that operators have handed over.
     """
     writes = plugins.service_writes()
     findings = [*mission.warnings, *lint(mission, data, writes, _behavior_writes(arbiters))]
@@ -173,11 +173,6 @@ def refuse_errors(what: str, findings: Sequence[Finding]) -> None:
     """Raise MissionError with all findings when any of them is an error."""
     if has_errors(findings):
         raise MissionError(what, findings)
-
-
-def known_data(data: Mapping[str, object] | None) -> tuple[str, ...]:
-    """Names that are given at start."""
-    return tuple(data or ())
 
 
 _ELEMENT = b"requirement"

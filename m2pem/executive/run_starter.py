@@ -19,7 +19,6 @@ from m2pem.executive.handover import refuse_busy_resources
 from m2pem.executive.loading import (
     findings_for,
     has_requirements,
-    known_data,
     load_source,
     monitored_requirements,
     refuse_errors,
@@ -76,12 +75,12 @@ class RunStarter:
             loaded,
             supervisor.arbiters,
             supervisor.plugins,
-            known_data(data),
+            data or {},
             process,
             handed_over=supervisor.drawings.handed_over,
         )
         findings += requirement_findings(
-            loaded, supervisor.arbiters, supervisor.plugins, known_data(data)
+            loaded, supervisor.arbiters, supervisor.plugins, data or {}
         )
         refuse_errors(f"{loaded.file} cannot run with fleet {supervisor.fleet.file}", findings)
         if loaded.chooses_resources or waits_for_space(supervisor.fleet):
@@ -263,7 +262,7 @@ class RunStarter:
                 loaded,
                 supervisor.fleet,
                 supervisor.plugins,
-                known_data(data),
+                data or {},
             )
         approved = "" if direct else await self.approvals.refuse_unapproved(*files)
         header = RunHeader(

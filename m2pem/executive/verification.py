@@ -110,7 +110,7 @@ def search_request(
         MissionError: there are errors; it has all of them.
         RequirementsError: requirements cannot be read, or do not fit; it has all findings.
     """
-    wrong = findings_for(mission, arbiters, plugins, tuple(data), process)
+    wrong = findings_for(mission, arbiters, plugins, data, process)
     refuse_errors(f"{mission.file} cannot be verified: `m2pem check` finds errors", wrong)
     writes = plugins.service_writes()
     fleet = arbiters.fleet if arbiters is not None else fleet_for(mission)

@@ -22,7 +22,6 @@ from m2pem.errors import AnswersError, MissionError
 from m2pem.executive.executive import Executive
 from m2pem.executive.loading import (
     has_requirements,
-    known_data,
     load_source,
     monitored_requirements,
 )
@@ -323,7 +322,7 @@ class Rehearser:
         if names not in self._admitted:
             process, _ = executive.starter.admit(self.mission, self._process, data)
             required = monitored_requirements(
-                self.mission, self.fleet, self.plugins, known_data(data), self._spec
+                self.mission, self.fleet, self.plugins, data or {}, self._spec
             )
             self._admitted[names] = process, required
         return self._admitted[names]

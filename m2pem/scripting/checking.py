@@ -85,7 +85,7 @@ def check(
     """Check a mission, alone or against a fleet, as `m2pem check` does.
 
     A mission or fleet that cannot be read is a finding, too. `process`: the one to begin with, the
-    main one by default. `data`: what the mission starts with; only the names count here.
+    main one by default. `data`: what the mission starts with; names and kinds count here.
     `search_path`: folders of processes that the mission calls.
 
     Raises:
@@ -100,7 +100,7 @@ def check(
         findings += error.findings
         usable = not any(finding.rule in NO_BPMN_RULES for finding in error.findings)
     try:
-        findings += _against_fleet(loaded, fleet, process, tuple(data or ()))
+        findings += _against_fleet(loaded, fleet, process, data or {})
     except FleetError as error:
         if not error.findings:
             raise
@@ -111,7 +111,10 @@ def check(
 
 
 def _against_fleet(
-    mission: Mission | None, fleet: FleetSource | None, process: str | None, data: tuple[str, ...]
+    mission: Mission | None,
+    fleet: FleetSource | None,
+    process: str | None,
+    data: Mapping[str, Value],
 ) -> list[Finding]:
     """The findings of a mission that was read with its fleet; of a fleet alone without one."""
     if mission is None:

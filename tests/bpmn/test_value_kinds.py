@@ -14,6 +14,7 @@ from m2pem.mission.expression import parse
 from m2pem.mission.expression.kinds import DATA, kinds
 from m2pem.mission.expression.operators import kind
 from m2pem.mission.expression.vocabulary import COERCING
+from m2pem.scripting.checking import check
 from tests.bpmn.bpmn_text import definitions
 
 KINDS = {
@@ -129,6 +130,25 @@ def test_check_knows_what_data_objects_hold(structure: str, condition: str, said
     found = [each.message for each in lint(mission) if each.rule in rules]
     assert len(found) == bool(said)
     assert all(said in each for each in found)
+
+
+def test_check_knows_the_kinds_of_what_the_mission_starts_with() -> None:
+    mission = parse_mission(
+        definitions(
+            '<process id="P"><startEvent id="S"/><sequenceFlow id="f" sourceRef="S" targetRef="G"/>'
+            '<exclusiveGateway id="G" default="j"/>'
+            '<sequenceFlow id="i" sourceRef="G" targetRef="E"><conditionExpression>level &gt; 3'
+            "</conditionExpression></sequenceFlow>"
+            '<sequenceFlow id="j" sourceRef="G" targetRef="E"/><endEvent id="E"/></process>'
+        ),
+        "m.bpmn",
+    )
+    (found,) = check(mission, data={"level": "high"})
+    assert (found.rule, found.element) == ("mixed-kinds", "i")
+    assert "'>' of a text and a number" in found.message
+    for given in (4, None):
+        assert not check(mission, data={"level": given})
+    assert not lint(mission, ["level"])
 
 
 VALUES = {
