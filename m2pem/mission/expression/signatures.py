@@ -1,7 +1,7 @@
 """What a function of an expression takes and gives, as a text says it.
 
 `substring(string: text, start position: number, length?: number) -> text`: each parameter with its
-kinds, separated by `|`, or without any where it takes all, null too. A `?` stands after the name of
+kinds, separated by `|`, or without any where it takes all, null too. A `?` follows the name of
 one that may be left out; `...` says that the last one may be there several times.
 """
 
