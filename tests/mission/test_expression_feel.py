@@ -1,19 +1,25 @@
 """FEEL is that of DMN 1.5, clause 10.3."""
 
 import json
+import math
+import operator
 import os
-from decimal import Decimal
+from collections.abc import Callable
+from decimal import Context, Decimal, getcontext
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from m2pem.errors import ExpressionError, ExpressionSyntaxError
 from m2pem.mission.expression import parse
 from m2pem.mission.expression import temporal as t
 from m2pem.mission.expression.operators import MAX_WORK
 from m2pem.mission.expression.partial import possible_truth
+from tests.seeds import examples
 
 PAIRS = list(pairwise("abcdefghijklmnopqrstuvw"))
 CORPORA = os.environ.get("M2PEM_CORPORA", "")
@@ -227,3 +233,44 @@ def test_expressions_have_the_values_of_the_tests_of_the_standard() -> None:
             wrong.append((case["text"], case["exp"], found))
     assert wrong == []
     assert right >= 0.97 * len(cases)
+
+
+CONTEXT = Context(prec=34, Emin=-6143, Emax=6144)
+SIGNS: dict[str, Callable[[Decimal, Decimal], Any]] = {
+    **{"+": CONTEXT.add, "-": CONTEXT.subtract, "*": CONTEXT.multiply, "/": CONTEXT.divide},
+    **{"<": operator.lt, "<=": operator.le, "=": operator.eq, "!=": operator.ne},
+}
+numbers = st.one_of(
+    st.sampled_from([0, 1, -3, 2**53, 2**53 + 1, -(2**63), 0.0, 0.1, 2.5, 1e22, 2.0**53]),
+    st.integers(-(2**63), 2**63 - 1),
+    st.floats(allow_nan=False, allow_infinity=False),
+)
+
+
+@settings(max_examples=examples(100, 1000), deadline=None)
+@given(numbers, numbers, st.sampled_from([*SIGNS]))
+def test_numbers_are_decimals_of_34_digits(a: float, b: float, sign: str) -> None:
+    """As Python's decimals compute, of the digits that integers and doubles are written with."""
+    try:
+        wanted = SIGNS[sign](Decimal(repr(a)), Decimal(repr(b)))
+    except ArithmeticError:
+        wanted = None
+    if isinstance(wanted, Decimal):
+        whole = wanted == wanted.to_integral_value() and -(2**63) <= wanted < 2**63
+        wanted = int(wanted) if whole else float(wanted)
+    for text in (f"= a {sign} b", f"= a {sign} {b!r}", f"= [a][1] {sign} sum(b)"):
+        if wanted is None or math.isinf(wanted):
+            with pytest.raises(ExpressionError):
+                parse(text).evaluate({"a": a, "b": b}.get)
+        else:
+            found = parse(text).evaluate({"a": a, "b": b}.get)
+            assert (found, type(found)) == (wanted, type(wanted))
+
+
+def test_functions_leave_the_context_of_decimals_as_it_was() -> None:
+    before = getcontext()
+    assert value("sqrt(2) * sqrt(2)") == 2
+    assert value("floor(lap / speed)") == 1
+    with pytest.raises(ExpressionError):
+        value("sqrt(-1)")
+    assert getcontext() is before

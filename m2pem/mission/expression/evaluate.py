@@ -11,6 +11,7 @@ from typing import Any, TypeAlias
 
 from m2pem.errors import ExpressionError
 from m2pem.mission.expression import feel_values as feel
+from m2pem.mission.expression import tree as t
 from m2pem.mission.expression.functions import LISTED
 from m2pem.mission.expression.operators import (
     ORDERS,
@@ -23,36 +24,6 @@ from m2pem.mission.expression.operators import (
 )
 from m2pem.mission.expression.rules import Rules
 from m2pem.mission.expression.temporal import Computed
-from m2pem.mission.expression.tree import (
-    And,
-    Arithmetic,
-    Call,
-    Compare,
-    ContextOf,
-    Every,
-    Filter,
-    For,
-    If,
-    In,
-    Index,
-    InstanceOf,
-    Invoke,
-    Join,
-    Lambda,
-    ListOf,
-    Literal,
-    Name,
-    Negate,
-    Node,
-    Not,
-    Or,
-    Path,
-    RangeOf,
-    Some,
-    TypeName,
-    binds,
-    walk,
-)
 from m2pem.mission.values import ReadValue, Value
 
 Evaluate: TypeAlias = Callable[[ReadValue], Computed]
@@ -61,7 +32,7 @@ Evaluate: TypeAlias = Callable[[ReadValue], Computed]
 MAX_CALLS = 50
 """How deep functions may call each other."""
 
-tracing = ContextVar[Callable[[Node, Evaluate], Evaluate] | None]("tracing", default=None)
+tracing = ContextVar[Callable[[t.Node, Evaluate], Evaluate] | None]("tracing", default=None)
 """Wraps what evaluates each node, to see what fails."""
 
 _calls = ContextVar("_calls", default=0)
@@ -76,7 +47,7 @@ def bind(variable: str, item: Value, read: ReadValue) -> ReadValue:
     """Return a lookup that reads `variable`, and names below it, from the item."""
 
     def bound(name: str) -> Value:
-        return _part(item, name[len(variable) + 1 :]) if binds(variable, name) else read(name)
+        return _part(item, name[len(variable) + 1 :]) if t.binds(variable, name) else read(name)
 
     return bound
 
@@ -88,36 +59,36 @@ def _part(value: Value, path: str) -> Value:
     return value
 
 
-def evaluate(node: Node, read: ReadValue, rules: Rules) -> Computed:
+def evaluate(node: t.Node, read: ReadValue, rules: Rules) -> Computed:
     """The tree's value by the rules of its language; it raises ExpressionError."""
     return evaluator(node, rules)(read)
 
 
-def evaluator(node: Node, rules: Rules) -> Evaluate:
+def evaluator(node: t.Node, rules: Rules) -> Evaluate:
     """Return what evaluates a tree by the rules of its language."""
     run, traced = _MAKE[type(node)](node, rules), tracing.get()
     return run if traced is None else traced(node, run)
 
 
-def _all(nodes: Iterable[Node], rules: Rules) -> list[Evaluate]:
+def _all(nodes: Iterable[t.Node], rules: Rules) -> list[Evaluate]:
     return [evaluator(each, rules) for each in nodes]
 
 
-def _size(node: Node) -> int:
-    return sum(1 for _ in walk(node))
+def _size(node: t.Node) -> int:
+    return sum(1 for _ in t.walk(node))
 
 
-def _literal(node: Literal, rules: Rules) -> Evaluate:
+def _literal(node: t.Literal, rules: Rules) -> Evaluate:
     value = node.value
     return lambda read: value
 
 
-def _name(node: Name, rules: Rules) -> Evaluate:
+def _name(node: t.Name, rules: Rules) -> Evaluate:
     name = node.name
     if not rules.ternary or "." not in name:
         return lambda read: read(name)
     head, _, rest = name.rpartition(".")
-    container = _name(Name(head), rules)
+    container = _name(t.Name(head), rules)
 
     def path(read: ReadValue) -> Computed:
         value = read(name)
@@ -136,7 +107,7 @@ def _truth(run: Evaluate) -> Callable[[ReadValue], bool | None]:
     return truth
 
 
-def _not(node: Not, rules: Rules) -> Evaluate:
+def _not(node: t.Not, rules: Rules) -> Evaluate:
     run = evaluator(node.operand, rules)
 
     def negated(read: ReadValue) -> Computed:
@@ -148,7 +119,7 @@ def _not(node: Not, rules: Rules) -> Evaluate:
     return negated
 
 
-def _decided(by: bool, node: And | Or, rules: Rules) -> Evaluate:
+def _decided(by: bool, node: t.And | t.Or, rules: Rules) -> Evaluate:
     """`by` if one of them is, the rest is not evaluated; in FEEL null if one has no truth."""
     runs, truth = _all(node.operands, rules), rules.truth
     what = "'or'" if by else "'and'"
@@ -176,9 +147,9 @@ def _decided(by: bool, node: And | Or, rules: Rules) -> Evaluate:
     return ternary if rules.ternary else binary
 
 
-def _compare(node: Compare, rules: Rules) -> Evaluate:
+def _compare(node: t.Compare, rules: Rules) -> Evaluate:
     left, test, sign = evaluator(node.left, rules), rules.compare[node.operator], node.operator
-    if not isinstance(node.right, Literal):
+    if not isinstance(node.right, t.Literal):
         right = evaluator(node.right, rules)
         return lambda read: test(left(read), right(read))
     other = node.right.value
@@ -186,7 +157,7 @@ def _compare(node: Compare, rules: Rules) -> Evaluate:
     alike: Container[type] = ()
     if type(other) is str and sign in SAME:
         alike = (str,)
-    elif type(other) in _NUMBERS and abs(other) < _EXACT:
+    elif (type(other) is int or type(other) is float) and abs(other) < _EXACT:
         # JUEL orders -0.0 before 0.0.
         alike = _NUMBERS if other or rules.ternary else (int,) if type(other) is int else ()
     direct = {**ORDERS, **SAME}[sign]
@@ -200,32 +171,32 @@ def _compare(node: Compare, rules: Rules) -> Evaluate:
     return compared if alike else lambda read: test(left(read), other)
 
 
-def _in(node: In, rules: Rules) -> Evaluate:
+def _in(node: t.In, rules: Rules) -> Evaluate:
     container, item = _all((node.container, node.item), rules)
     held = feel.contains if rules.ternary else contains
     return lambda read: held(container(read), item(read))
 
 
-def _negate(node: Negate, rules: Rules) -> Evaluate:
+def _negate(node: t.Negate, rules: Rules) -> Evaluate:
     run, negate = evaluator(node.operand, rules), rules.negate
     return lambda read: negate(run(read))
 
 
-def _arithmetic(node: Arithmetic, rules: Rules) -> Evaluate:
+def _arithmetic(node: t.Arithmetic, rules: Rules) -> Evaluate:
     left, compute = evaluator(node.left, rules), rules.arithmetic[node.operator]
-    if isinstance(node.right, Literal):
+    if isinstance(node.right, t.Literal):
         other = node.right.value
         return lambda read: compute(left(read), other)
     right = evaluator(node.right, rules)
     return lambda read: compute(left(read), right(read))
 
 
-def _index(node: Index, rules: Rules) -> Evaluate:
+def _index(node: t.Index, rules: Rules) -> Evaluate:
     container, key = _all((node.container, node.key), rules)
     return lambda read: index(container(read), key(read))
 
 
-def _if(node: If, rules: Rules) -> Evaluate:
+def _if(node: t.If, rules: Rules) -> Evaluate:
     run, then, otherwise = _all((node.condition, node.then, node.otherwise), rules)
 
     def chosen(read: ReadValue) -> Computed:
@@ -237,7 +208,7 @@ def _if(node: If, rules: Rules) -> Evaluate:
     return chosen
 
 
-def _quantified(by: bool, node: Some | Every, rules: Rules) -> Evaluate:
+def _quantified(by: bool, node: t.Some | t.Every, rules: Rules) -> Evaluate:
     collection, condition = _all((node.collection, node.condition), rules)
     holds, variable, size = _truth(condition), node.variable, _size(node.condition)
 
@@ -278,7 +249,7 @@ def _items(value: Computed) -> list[Computed] | None:
     return [each for each in found if value.descends or feel.in_range(each, value)]
 
 
-def _for(node: For, rules: Rules) -> Evaluate:
+def _for(node: t.For, rules: Rules) -> Evaluate:
     iterators = [(name, evaluator(each, rules)) for name, each in node.iterators]
     result, size = evaluator(node.result, rules), _size(node.result)
 
@@ -302,10 +273,10 @@ def _for(node: For, rules: Rules) -> Evaluate:
     return iterated
 
 
-def _filter(node: Filter, rules: Rules) -> Evaluate:
+def _filter(node: t.Filter, rules: Rules) -> Evaluate:
     container, condition = _all((node.container, node.condition), rules)
     holds, size = _truth(condition), _size(node.condition)
-    may_be_place = isinstance(node.condition, Literal | Negate | Name | Arithmetic | Call)
+    may_be_place = isinstance(node.condition, t.Literal | t.Negate | t.Name | t.Arithmetic | t.Call)
 
     def filtered(read: ReadValue) -> Computed:
         value = container(read)
@@ -341,12 +312,12 @@ def bind_item(item: Computed, read: ReadValue) -> ReadValue:
     return bound
 
 
-def _path(node: Path, rules: Rules) -> Evaluate:
+def _path(node: t.Path, rules: Rules) -> Evaluate:
     container, key = evaluator(node.container, rules), node.key
     return lambda read: feel.path(container(read), key)
 
 
-def _context(node: ContextOf, rules: Rules) -> Evaluate:
+def _context(node: t.ContextOf, rules: Rules) -> Evaluate:
     entries = [(key, evaluator(each, rules)) for key, each in node.entries]
 
     def context(read: ReadValue) -> Computed:
@@ -365,7 +336,7 @@ def _context(node: ContextOf, rules: Rules) -> Evaluate:
     return context
 
 
-def _range(node: RangeOf, rules: Rules) -> Evaluate:
+def _range(node: t.RangeOf, rules: Rules) -> Evaluate:
     low_run, high_run = (
         (lambda read: None) if each is None else evaluator(each, rules)
         for each in (node.low, node.high)
@@ -384,7 +355,7 @@ def _range(node: RangeOf, rules: Rules) -> Evaluate:
     return ranged
 
 
-def _lambda(node: Lambda, rules: Rules) -> Evaluate:
+def _lambda(node: t.Lambda, rules: Rules) -> Evaluate:
     body, size = evaluator(node.body, rules), _size(node.body)
 
     def call(closure: feel.Closure, arguments: list[Computed]) -> Computed:
@@ -404,7 +375,7 @@ def _lambda(node: Lambda, rules: Rules) -> Evaluate:
     return lambda read: feel.Closure(node.parameters, node.body, read, call)
 
 
-def _invoke(node: Invoke, rules: Rules) -> Evaluate:
+def _invoke(node: t.Invoke, rules: Rules) -> Evaluate:
     called, runs = evaluator(node.function, rules), _all(node.arguments, rules)
 
     def invoked(read: ReadValue) -> Computed:
@@ -429,12 +400,12 @@ def _invoke(node: Invoke, rules: Rules) -> Evaluate:
     return invoked
 
 
-def _instance_of(node: InstanceOf, rules: Rules) -> Evaluate:
+def _instance_of(node: t.InstanceOf, rules: Rules) -> Evaluate:
     run, wanted = evaluator(node.value, rules), node.type
     return lambda read: _is_a(run(read), wanted)
 
 
-def _is_a(value: Computed, wanted: TypeName) -> bool:
+def _is_a(value: Computed, wanted: t.TypeName) -> bool:
     name, parts = wanted
     if value is None:
         return name == "Null"
@@ -454,9 +425,9 @@ def _is_a(value: Computed, wanted: TypeName) -> bool:
     return True
 
 
-def _list(node: ListOf, rules: Rules) -> Evaluate:
-    if all(isinstance(each, Literal) for each in node.items):
-        values = [each.value for each in node.items if isinstance(each, Literal)]
+def _list(node: t.ListOf, rules: Rules) -> Evaluate:
+    if all(isinstance(each, t.Literal) for each in node.items):
+        values = [each.value for each in node.items if isinstance(each, t.Literal)]
         size = 1 + sum(1 + len(each) if isinstance(each, str) else 1 for each in values)
 
         def listed(read: ReadValue) -> Computed:
@@ -468,41 +439,41 @@ def _list(node: ListOf, rules: Rules) -> Evaluate:
     return lambda read: bounded_list([run(read) for run in runs])
 
 
-def _call(node: Call, rules: Rules) -> Evaluate:
+def _call(node: t.Call, rules: Rules) -> Evaluate:
     call, runs = LISTED[node.function].of(len(node.arguments)), _all(node.arguments, rules)
     if rules.ternary and not node.function.startswith("FEEL "):
         return lambda read: call([feel.to_data(run(read)) for run in runs])
     return lambda read: call([run(read) for run in runs])
 
 
-def _join(node: Join, rules: Rules) -> Evaluate:
+def _join(node: t.Join, rules: Rules) -> Evaluate:
     runs = _all(node.parts, rules)
     return lambda read: join([run(read) for run in runs])
 
 
-_MAKE: dict[type[Node], Callable[[Any, Rules], Evaluate]] = {
-    Literal: _literal,
-    Name: _name,
-    ListOf: _list,
-    Not: _not,
-    And: partial(_decided, False),
-    Or: partial(_decided, True),
-    Compare: _compare,
-    In: _in,
-    Negate: _negate,
-    Arithmetic: _arithmetic,
-    Call: _call,
-    If: _if,
-    Index: _index,
-    Some: partial(_quantified, True),
-    Every: partial(_quantified, False),
-    For: _for,
-    Filter: _filter,
-    Path: _path,
-    ContextOf: _context,
-    RangeOf: _range,
-    Lambda: _lambda,
-    Invoke: _invoke,
-    InstanceOf: _instance_of,
-    Join: _join,
+_MAKE: dict[type[t.Node], Callable[[Any, Rules], Evaluate]] = {
+    t.Literal: _literal,
+    t.Name: _name,
+    t.ListOf: _list,
+    t.Not: _not,
+    t.And: partial(_decided, False),
+    t.Or: partial(_decided, True),
+    t.Compare: _compare,
+    t.In: _in,
+    t.Negate: _negate,
+    t.Arithmetic: _arithmetic,
+    t.Call: _call,
+    t.If: _if,
+    t.Index: _index,
+    t.Some: partial(_quantified, True),
+    t.Every: partial(_quantified, False),
+    t.For: _for,
+    t.Filter: _filter,
+    t.Path: _path,
+    t.ContextOf: _context,
+    t.RangeOf: _range,
+    t.Lambda: _lambda,
+    t.Invoke: _invoke,
+    t.InstanceOf: _instance_of,
+    t.Join: _join,
 }

@@ -82,7 +82,7 @@ class Expression(Struct, frozen=True, eq=False):
             if kind in _PLAIN or (kind is float and math.isfinite(value)):
                 return value  # type: ignore[no-any-return]
             result = RULES[self.dialect].result
-            return result(value) if result else value  # type: ignore[no-any-return]
+            return result(value) if result else value
         except ExpressionError as error:
             self._explain(error, read)
         except RecursionError:

@@ -9,39 +9,11 @@ import re
 from bisect import bisect_left
 from collections.abc import Iterable, Sequence
 
+from m2pem.mission.expression import tree as t
 from m2pem.mission.expression.calls import CallError, feel_call
 from m2pem.mission.expression.descent import MAX_ITEMS, Descent
 from m2pem.mission.expression.dialect import Span
 from m2pem.mission.expression.feel_functions import FEEL_FUNCTIONS
-from m2pem.mission.expression.tree import (
-    MAX_DEPTH,
-    And,
-    Arithmetic,
-    Call,
-    Compare,
-    Comparison,
-    ContextOf,
-    Every,
-    Filter,
-    For,
-    If,
-    In,
-    InstanceOf,
-    Invoke,
-    Lambda,
-    ListOf,
-    Literal,
-    Name,
-    Negate,
-    Node,
-    Not,
-    Operation,
-    Or,
-    Path,
-    RangeOf,
-    Some,
-    TypeName,
-)
 
 _TOKEN = re.compile(
     r"\s*(?:(?://[^\n]*|/\*.*?\*/)\s*)*"
@@ -66,10 +38,10 @@ KEYWORDS = frozenset(
     }
 )
 _COMPARISONS = {
-    "=": Comparison.EQUAL,
-    **{each.value: each for each in Comparison if each is not Comparison.EQUAL},
+    "=": t.Comparison.EQUAL,
+    **{each.value: each for each in t.Comparison if each is not t.Comparison.EQUAL},
 }
-_OPERATIONS = {each.value: each for each in Operation}
+_OPERATIONS = {each.value: each for each in t.Operation}
 _AFTER = frozenset({".", "[", "(", "instance"})
 _EXACT_DIGITS = 15
 _AND, _COMPARISON = 2, 3
@@ -206,7 +178,7 @@ class FeelParser(Descent):
 
     # --- expressions ------------------------------------------------------------------------------
 
-    def _expression(self) -> Node:
+    def _expression(self) -> t.Node:
         self._nest()
         kind = self._kind
         if kind == "if":
@@ -218,23 +190,23 @@ class FeelParser(Descent):
         self._nesting -= 1
         return node
 
-    def _if(self) -> Node:
+    def _if(self) -> t.Node:
         self._next()
         condition = self._expression()
         self._expect("then", "after 'if'")
         then = self._expression()
         self._expect("else", "after 'if'")
-        return If(condition, then, self._expression())
+        return t.If(condition, then, self._expression())
 
-    def _iteration(self, word: str) -> Node:
+    def _iteration(self, word: str) -> t.Node:
         known = len(self._locals)
-        iterators: list[tuple[str, Node]] = []
+        iterators: list[tuple[str, t.Node]] = []
         while not iterators or self._take(","):
             name = self._variable(f"after '{word}'")
             self._expect("in", f"after '{word}'")
             low = self._expression()
             if self._take(".."):
-                low = RangeOf(low, self._expression(), True, True, descends=True)
+                low = t.RangeOf(low, self._expression(), True, True, descends=True)
             iterators.append((name, low))
             self._locals.append(name)
         if word == "for":
@@ -243,9 +215,9 @@ class FeelParser(Descent):
         node = self._expression()
         del self._locals[known:]
         if word == "for":
-            return For(tuple(iterators), node)
+            return t.For(tuple(iterators), node)
         for name, collection in reversed(iterators):
-            node = (Some if word == "some" else Every)(name, collection, node)
+            node = (t.Some if word == "some" else t.Every)(name, collection, node)
         return node
 
     def _variable(self, why: str) -> str:
@@ -254,47 +226,47 @@ class FeelParser(Descent):
             self._fail(f"expected a name {why}, found {self._found}")
         return self._known(self._next())
 
-    def _operators(self, minimum: int = 0) -> Node:
+    def _operators(self, minimum: int = 0) -> t.Node:
         """The longest expression whose operators bind more strongly than `minimum`."""
         node = self._signed() if self._kind == "-" else self._value()
         while (strength := _STRENGTHS.get(self._kind, 0)) > minimum:
             node = self._binary(node, strength)
         return node
 
-    def _binary(self, left: Node, strength: int) -> Node:
+    def _binary(self, left: t.Node, strength: int) -> t.Node:
         if strength <= _AND:
             return self._joined(left, strength, self._operators)
         word = self._next()
         if strength > _COMPARISON:
-            return Arithmetic(_OPERATIONS[word], left, self._operators(strength))
+            return t.Arithmetic(_OPERATIONS[word], left, self._operators(strength))
         if word == "in":
             node = self._tests(left)
         elif word == "between":
             low = self._operators(_COMPARISON)
             self._expect("and", "after 'between'")
-            node = _within(left, RangeOf(low, self._operators(_COMPARISON), True, True))
+            node = _within(left, t.RangeOf(low, self._operators(_COMPARISON), True, True))
         else:
-            node = Compare(_COMPARISONS[word], left, self._operators(_COMPARISON))
+            node = t.Compare(_COMPARISONS[word], left, self._operators(_COMPARISON))
         if _STRENGTHS.get(self._kind) == _COMPARISON:
             self._fail("comparisons do not chain; write 'a < b and b < c', or use parentheses")
         return node
 
-    def _signed(self) -> Node:
+    def _signed(self) -> t.Node:
         negative = 0
         while self._take("-"):
             negative += 1
-            if negative > MAX_DEPTH:
-                self._fail(f"nested deeper than {MAX_DEPTH} levels")
+            if negative > t.MAX_DEPTH:
+                self._fail(f"nested deeper than {t.MAX_DEPTH} levels")
         node = self._value()
-        if isinstance(node, Literal) and _is_number(node):
-            return Literal(-node.value if negative % 2 else node.value)  # type: ignore[operator]
+        if isinstance(node, t.Literal) and _is_number(node):
+            return t.Literal(-node.value if negative % 2 else node.value)  # type: ignore[operator]
         for _ in range(negative):
-            node = Negate(node)
+            node = t.Negate(node)
         return node
 
     # --- values -----------------------------------------------------------------------------------
 
-    def _value(self) -> Node:
+    def _value(self) -> t.Node:
         node = self._primary()
         while (kind := self._kind) in _AFTER:
             if kind == ".":
@@ -304,7 +276,7 @@ class FeelParser(Descent):
                     return node
                 self._next()
                 self._locals.append("item")
-                node = Filter(node, self._expression())
+                node = t.Filter(node, self._expression())
                 self._locals.pop()
                 self._expect("]", "to close '['")
             elif kind == "instance":
@@ -313,56 +285,56 @@ class FeelParser(Descent):
                     self._fail(f"expected 'of' after 'instance', found {self._found}")
                 self._last += 1
                 self._next()
-                node = InstanceOf(node, self._type())
-            elif isinstance(node, Name):
+                node = t.InstanceOf(node, self._type())
+            elif isinstance(node, t.Name):
                 return node
             else:
-                node = Invoke(node, *self._arguments())
+                node = t.Invoke(node, *self._arguments())
         return node
 
-    def _member(self, node: Node) -> Node:
+    def _member(self, node: t.Node) -> t.Node:
         self._next()
         first = self._first
         name = " ".join(self._tokens[first : first + 2])
         if name in _PROPERTIES:
             self._last = first + 1
             self._next()
-            return Path(node, name)
+            return t.Path(node, name)
         if self._kind != "name" and self._kind not in KEYWORDS:
             self._fail(f"expected a name after '.', found {self._found}")
         name = self._next()
-        if isinstance(node, Name) and node.name.partition(".")[0] not in self._locals:
-            return Name(f"{node.name}.{name}")
-        return Path(node, name)
+        if isinstance(node, t.Name) and node.name.partition(".")[0] not in self._locals:
+            return t.Name(f"{node.name}.{name}")
+        return t.Path(node, name)
 
-    def _primary(self) -> Node:
+    def _primary(self) -> t.Node:
         kind, token = self._kind, self._token
         match kind:
             case "number":
                 self._next()
                 if token.isdecimal() and len(token) <= _EXACT_DIGITS:
-                    return Literal(int(token))
+                    return t.Literal(int(token))
                 if len(token) > _EXACT_DIGITS or math.isinf(value := float(token)):
-                    return Call("FEEL number", (Literal(token),))  # a double has not all of it
-                return Literal(value)
+                    return t.Call("FEEL number", (t.Literal(token),))  # a double has not all of it
+                return t.Literal(value)
             case "name":
                 first = self._first
                 self._next()
-                return self._call(token, first) if self._kind == "(" else Name(token)
+                return self._call(token, first) if self._kind == "(" else t.Name(token)
             case "text":
-                return Literal(self._quoted())
+                return t.Literal(self._quoted())
             case "[" | "]" | "(":
                 return self._bracketed()
             case "{":
                 return self._context()
             case "true" | "false" | "null":
                 self._next()
-                return Literal(_CONSTANTS[token])
+                return t.Literal(_CONSTANTS[token])
             case "@":
                 self._next()
                 if self._kind != "text":
                     self._fail("expected a text after '@'")
-                return Call("FEEL @", (Literal(self._quoted()),))
+                return t.Call("FEEL @", (t.Literal(self._quoted()),))
             case "function":
                 return self._function()
         self._fail(f"expected a value, found {self._found}")
@@ -371,23 +343,23 @@ class FeelParser(Descent):
         text = self._next()[1:-1]
         return _unescaped(text) if "\\" in text else text
 
-    def _call(self, name: str, first: int) -> Node:
+    def _call(self, name: str, first: int) -> t.Node:
         if name == "not":
             self._next()
             node = self._expression()
             self._expect(")", "to close 'not('")
-            return Not(node)
+            return t.Not(node)
         arguments, names = self._arguments()
         if name in self._locals:
-            return Invoke(Name(name), arguments, names)
+            return t.Invoke(t.Name(name), arguments, names)
         try:
             return feel_call(name, arguments, names)
         except CallError as error:
             self._fail(str(error), first)
 
-    def _arguments(self) -> tuple[tuple[Node, ...], tuple[str, ...]]:
+    def _arguments(self) -> tuple[tuple[t.Node, ...], tuple[str, ...]]:
         self._next()
-        arguments: list[Node] = []
+        arguments: list[t.Node] = []
         names: list[str] = []
         while self._kind != ")":
             if arguments and not self._take(","):
@@ -420,7 +392,7 @@ class FeelParser(Descent):
         self._next()
         return name
 
-    def _function(self) -> Node:
+    def _function(self) -> t.Node:
         self._next()
         self._expect("(", "after 'function'")
         known, parameters = len(self._locals), list[str]()
@@ -437,13 +409,13 @@ class FeelParser(Descent):
             self._fail("functions of Java or PMML are not run")
         body = self._expression()
         del self._locals[known:]
-        return Lambda(tuple(parameters), body)
+        return t.Lambda(tuple(parameters), body)
 
-    def _context(self) -> Node:
+    def _context(self) -> t.Node:
         opening = self._first
         self._next()
         known = len(self._locals)
-        entries: list[tuple[str, Node]] = []
+        entries: list[tuple[str, t.Node]] = []
         while self._kind != "}":
             if entries and not self._take(","):
                 break
@@ -459,7 +431,7 @@ class FeelParser(Descent):
                 self._next()  # with the key as a name
         self._expect("}", "to close '{'", opening)
         del self._locals[known:]
-        return ContextOf(tuple(entries))
+        return t.ContextOf(tuple(entries))
 
     def _key(self) -> str:
         if self._kind == "text":
@@ -483,7 +455,7 @@ class FeelParser(Descent):
         self._next()
         return key
 
-    def _bracketed(self) -> Node:
+    def _bracketed(self) -> t.Node:
         """A list, a range, or an expression in parentheses."""
         opening = self._first
         bracket = self._next()
@@ -492,7 +464,7 @@ class FeelParser(Descent):
             self._expect(")", "to close '('")
             return node
         if bracket == "[" and self._take("]"):
-            return ListOf(())
+            return t.ListOf(())
         items = [self._item(bracket)]
         if self._take(".."):
             return self._to_end(items[0], bracket == "[")
@@ -506,36 +478,36 @@ class FeelParser(Descent):
                 self._fail(f"more than {MAX_ITEMS} items")
             items.append(self._item(bracket))
         self._expect("]", "to close '['", opening)
-        return ListOf(tuple(items))
+        return t.ListOf(tuple(items))
 
-    def _to_end(self, low: Node, included: bool) -> RangeOf:
+    def _to_end(self, low: t.Node, included: bool) -> t.RangeOf:
         """The range with its high end; a [ after a number closes it."""
         outer, self._in_range = self._in_range, True
         high = self._expression()
         self._in_range = outer
         if self._kind not in ("]", ")", "["):
             self._fail("expected ']' or ')' to close the range")
-        return RangeOf(low, high, included, self._next() == "]")
+        return t.RangeOf(low, high, included, self._next() == "]")
 
-    def _item(self, bracket: str) -> Node:
+    def _item(self, bracket: str) -> t.Node:
         if bracket == "[" and self._kind in _COMPARISONS and self._kind != "=":
             return self._open_range()
         return self._expression()
 
-    def _open_range(self) -> Node:
+    def _open_range(self) -> t.Node:
         """`< x` and the like, as a range."""
         operator = self._next()
         value = self._operators(_COMPARISON)
         match operator:
             case "<" | "<=":
-                return RangeOf(None, value, False, operator == "<=")
+                return t.RangeOf(None, value, False, operator == "<=")
             case ">" | ">=":
-                return RangeOf(value, None, operator == ">=", False)
+                return t.RangeOf(value, None, operator == ">=", False)
             case "=":
-                return RangeOf(value, value, True, True)
-        return RangeOf(value, None, False, False, negated=True)
+                return t.RangeOf(value, value, True, True)
+        return t.RangeOf(value, None, False, False, negated=True)
 
-    def _tests(self, left: Node) -> Node:
+    def _tests(self, left: t.Node) -> t.Node:
         """What follows `in`: a test, or some of them in parentheses."""
         if self._kind in _COMPARISONS:
             return self._test(left)
@@ -549,20 +521,21 @@ class FeelParser(Descent):
         while self._take(","):
             tests.append(self._test(left))
         self._expect(")", "to close '('", opening)
-        if all(isinstance(each, In) and isinstance(each.container, Literal) for each in tests):
-            return In(left, ListOf(tuple(each.container for each in tests)))  # type: ignore[union-attr]
-        return Or(tuple(tests)) if len(tests) > 1 else tests[0]
+        items = [each.container for each in tests if isinstance(each, t.In)]
+        if len(items) == len(tests) and all(isinstance(each, t.Literal) for each in items):
+            return t.In(left, t.ListOf(tuple(items)))
+        return t.Or(tuple(tests)) if len(tests) > 1 else tests[0]
 
-    def _test(self, left: Node) -> Node:
+    def _test(self, left: t.Node) -> t.Node:
         if self._kind in _COMPARISONS:
             operator = _COMPARISONS[self._next()]
-            return Compare(operator, left, self._operators(_COMPARISON))
+            return t.Compare(operator, left, self._operators(_COMPARISON))
         self._low = self._expression()
         return _within(left, self._low)
 
     # --- types ------------------------------------------------------------------------------------
 
-    def _type(self) -> TypeName:
+    def _type(self) -> t.TypeName:
         first = self._first
         for words in _TYPES:
             after = first + len(words)
@@ -573,8 +546,8 @@ class FeelParser(Descent):
                 return name, tuple(self._parts(name))
         self._fail(f"expected a type such as number or list<string>, found {self._found}")
 
-    def _parts(self, name: str) -> Iterable[tuple[str, TypeName]]:
-        parts = list[tuple[str, TypeName]]()
+    def _parts(self, name: str) -> Iterable[tuple[str, t.TypeName]]:
+        parts = list[tuple[str, t.TypeName]]()
         if name not in ("list", "context", "range", "function") or not self._take("<"):
             return parts
         while self._kind != ">":
@@ -589,17 +562,17 @@ class FeelParser(Descent):
         return parts
 
 
-def _within(item: Node, container: Node) -> Node:
+def _within(item: t.Node, container: t.Node) -> t.Node:
     """`item in container`; of a range, as comparisons, which a verifier translates."""
-    if not isinstance(container, RangeOf) or container.low is None or container.high is None:
-        return In(item, container)
-    above = Comparison.GREATER_EQUAL if container.low_included else Comparison.GREATER
-    below = Comparison.LESS_EQUAL if container.high_included else Comparison.LESS
-    return And((Compare(above, item, container.low), Compare(below, item, container.high)))
+    if not isinstance(container, t.RangeOf) or container.low is None or container.high is None:
+        return t.In(item, container)
+    above = t.Comparison.GREATER_EQUAL if container.low_included else t.Comparison.GREATER
+    below = t.Comparison.LESS_EQUAL if container.high_included else t.Comparison.LESS
+    return t.And((t.Compare(above, item, container.low), t.Compare(below, item, container.high)))
 
 
-def _is_number(node: Node) -> bool:
-    return isinstance(node, Literal) and type(node.value) in (int, float)
+def _is_number(node: t.Node) -> bool:
+    return isinstance(node, t.Literal) and type(node.value) in (int, float)
 
 
 def _unescaped(text: str) -> str:

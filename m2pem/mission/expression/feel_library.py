@@ -324,11 +324,10 @@ def root(value: FeelValue) -> Decimal:
 # --- lists ----------------------------------------------------------------------------------------
 
 
-def numbers(values: list[FeelValue]) -> list[Any]:
-    """Integers and decimals."""
+def numbers(values: list[FeelValue]) -> list[Decimal]:
     if not v.NUMBERS.issuperset(map(type, values)):
         raise NoValueError("not all items are numbers")
-    return [v.as_written[each] if type(each) is float else each for each in values]
+    return [number(each) for each in values]
 
 
 def extreme(sign: int) -> Callable[[list[FeelValue]], FeelValue]:
@@ -348,7 +347,7 @@ def extreme(sign: int) -> Callable[[list[FeelValue]], FeelValue]:
     return compute
 
 
-def of_numbers(compute: Callable[[list[Any]], FeelValue]) -> Callable[..., FeelValue]:
+def of_numbers(compute: Callable[[list[Decimal]], FeelValue]) -> Callable[..., FeelValue]:
     def of(values: list[FeelValue]) -> FeelValue:
         found = numbers(values)
         return compute(found) if found else None
@@ -356,9 +355,10 @@ def of_numbers(compute: Callable[[list[Any]], FeelValue]) -> Callable[..., FeelV
     return of
 
 
-def total(values: list[Any]) -> int | Decimal:
-    found = sum(values)
-    return found if MIN_INTEGER <= found <= MAX_INTEGER else number(found)
+def total(values: list[FeelValue]) -> int | Decimal | None:
+    if {*map(type, values)} == {int} and MIN_INTEGER <= (found := sum(values)) <= MAX_INTEGER:
+        return found
+    return sum(numbers(values), Decimal()) if values else None
 
 
 def truths(decisive: bool) -> Callable[[list[FeelValue]], bool | None]:

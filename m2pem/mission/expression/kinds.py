@@ -4,30 +4,11 @@ from collections.abc import Callable
 from itertools import product
 from typing import TypeAlias
 
+from m2pem.mission.expression import tree as t
 from m2pem.mission.expression.feel_arithmetic import result_kind
 from m2pem.mission.expression.functions import LISTED
 from m2pem.mission.expression.operators import kind
 from m2pem.mission.expression.temporal import DAYS, MONTHS
-from m2pem.mission.expression.tree import (
-    Arithmetic,
-    Call,
-    ContextOf,
-    Filter,
-    For,
-    If,
-    Index,
-    Invoke,
-    Join,
-    Lambda,
-    ListOf,
-    Literal,
-    Name,
-    Negate,
-    Node,
-    Operation,
-    Path,
-    RangeOf,
-)
 
 DATA = frozenset({"boolean", "number", "text", "list", "map"})
 """What a name of data may be."""
@@ -38,45 +19,45 @@ Of: TypeAlias = Callable[[str], frozenset[str]]
 _NEGATED = frozenset({"number", DAYS, MONTHS})
 
 
-def kinds(node: Node, *, coerced: bool = False, of: Of = lambda _: DATA) -> frozenset[str]:
+def kinds(node: t.Node, *, coerced: bool = False, of: Of = lambda _: DATA) -> frozenset[str]:
     """The kinds of its values besides null, as `operators.kind` calls them; none: it has no value
     but null, or an error. `coerced`: as of JUEL and XPath, whose arithmetic gives numbers.
     """
 
-    def within(inner: Node) -> frozenset[str]:
+    def within(inner: t.Node) -> frozenset[str]:
         return kinds(inner, coerced=coerced, of=of)
 
     match node:
-        case Name(name):
+        case t.Name(name):
             return of(name)
-        case Negate() | Arithmetic() if coerced:
+        case t.Negate() | t.Arithmetic() if coerced:
             return frozenset({"number"})
-        case Literal(value):
+        case t.Literal(value):
             return frozenset() if value is None else frozenset({kind(value)})
-        case Index() | Filter() | Path() | Invoke():
+        case t.Index() | t.Filter() | t.Path() | t.Invoke():
             return DATA
-        case Call(function, arguments):
+        case t.Call(function, arguments):
             called = LISTED[function]
             fits = called.fits([within(each) for each in arguments])
             return (frozenset(called.gives) or DATA) if fits else frozenset()
-        case If(_, then, otherwise):
+        case t.If(_, then, otherwise):
             return within(then) | within(otherwise)
-        case Negate(operand):
+        case t.Negate(operand):
             return within(operand) & _NEGATED
-        case Arithmetic(sign, left, right):
+        case t.Arithmetic(sign, left, right):
             pairs = product(within(left), within(right))
             found = (_result(one, sign, other) for one, other in pairs)
             return frozenset(each for each in found if each is not None)
-        case Join():
+        case t.Join():
             return frozenset({"text"})
-        case ListOf() | For():
+        case t.ListOf() | t.For():
             return frozenset({"list"})
-        case ContextOf() | RangeOf() | Lambda():
+        case t.ContextOf() | t.RangeOf() | t.Lambda():
             return frozenset({"map"})
     return frozenset({"boolean"})
 
 
-def _result(left: str, sign: Operation, right: str) -> str | None:
-    if left == right and (left == "number" or (left == "text" and sign is Operation.ADD)):
+def _result(left: str, sign: t.Operation, right: str) -> str | None:
+    if left == right and (left == "number" or (left == "text" and sign is t.Operation.ADD)):
         return left
     return result_kind(left, sign, right)

@@ -1,14 +1,12 @@
 """Splits an expression into tokens."""
 
 import re
-from typing import NamedTuple, NoReturn
+from typing import NoReturn, TypeAlias
 
 from m2pem.errors import ExpressionSyntaxError
 from m2pem.mission.expression.dialect import Dialect, Span
 from m2pem.mission.expression.literals import NUMBER, unescape
 from m2pem.mission.expression.vocabulary import LOWEST, MEANINGS, SYMBOLS
-
-_new = tuple.__new__  # takes half as long as calling the class
 
 _HINTS = {
     "=": "'=' compares nothing here; write '==' (or a leading '=' for FEEL)",
@@ -42,15 +40,12 @@ _NOTHING = "(?!)"
 _ALONE = r"(?![\w.]|[^\x00-\x7f])"
 
 
-class Token(NamedTuple):
-    """An operator, bracket or comma, whose kind is its name in the bare dialect; a "number",
-    "name", "constant" or the "end". `position`: in the whole text. `strength`: how strongly it
-    binds as an operator after a value."""
+Token: TypeAlias = tuple[str, str, int, int]
+"""Its kind, text, place in the whole text, and how strongly it binds as an operator after a value.
 
-    kind: str
-    text: str
-    position: int
-    strength: int
+The kind of an operator, bracket or comma is its name in the bare dialect; others are a "number",
+"name", "constant" or the "end".
+"""
 
 
 def _pattern(dialect: Dialect) -> re.Pattern[str]:
@@ -119,8 +114,8 @@ def tokenize(text: str, span: Span, dialect: Dialect) -> list[Token]:
             kind = "name"
         elif written in meanings:
             kind, written, strength = meanings[written]
-        tokens.append(_new(Token, (kind, written, start, strength)))
-    tokens.append(Token("end", "the end", span.stop, LOWEST))
+        tokens.append((kind, written, start, strength))
+    tokens.append(("end", "the end", span.stop, LOWEST))
     return tokens
 
 

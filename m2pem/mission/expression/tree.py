@@ -7,7 +7,7 @@ does; compare `repr` where the type matters.
 
 from collections.abc import Iterator, Sequence
 from enum import StrEnum
-from typing import TypeAlias, Union, get_args
+from typing import TypeAlias
 
 from msgspec import Struct
 
@@ -40,160 +40,164 @@ class Operation(StrEnum):
     __hash__ = str.__hash__
 
 
-class Literal(Struct, frozen=True, gc=False):
+class Node(Struct, frozen=True, gc=False):
+    """What an expression is made of."""
+
+
+class Literal(Node, frozen=True, gc=False):
     """A value as written."""
 
     value: bool | int | float | str | None
 
 
-class Name(Struct, frozen=True, gc=False):
+class Name(Node, frozen=True, gc=False):
     """The value under a dotted name of the data store; null when it is not there."""
 
     name: str
 
 
-class ListOf(Struct, frozen=True, gc=False):
+class ListOf(Node, frozen=True, gc=False):
     """`[a, b]`."""
 
-    items: "tuple[Node, ...]"
+    items: tuple[Node, ...]
 
 
-class Not(Struct, frozen=True, gc=False):
+class Not(Node, frozen=True, gc=False):
     """`not a`; null counts as false."""
 
-    operand: "Node"
+    operand: Node
 
 
-class And(Struct, frozen=True, gc=False):
+class And(Node, frozen=True, gc=False):
     """`a and b and ...`, from left to right until one is false."""
 
-    operands: "tuple[Node, ...]"
+    operands: tuple[Node, ...]
 
 
-class Or(Struct, frozen=True, gc=False):
+class Or(Node, frozen=True, gc=False):
     """`a or b or ...`, from left to right until one is true."""
 
-    operands: "tuple[Node, ...]"
+    operands: tuple[Node, ...]
 
 
-class Compare(Struct, frozen=True, gc=False):
+class Compare(Node, frozen=True, gc=False):
     """`left operator right`, always true or false."""
 
     operator: Comparison
-    left: "Node"
-    right: "Node"
+    left: Node
+    right: Node
 
 
-class In(Struct, frozen=True, gc=False):
+class In(Node, frozen=True, gc=False):
     """`item in container`: whether a list has an item that is equal."""
 
-    item: "Node"
-    container: "Node"
+    item: Node
+    container: Node
 
 
-class Negate(Struct, frozen=True, gc=False):
+class Negate(Node, frozen=True, gc=False):
     """`-a`."""
 
-    operand: "Node"
+    operand: Node
 
 
-class Arithmetic(Struct, frozen=True, gc=False):
+class Arithmetic(Node, frozen=True, gc=False):
     """`left operator right`; null when either is null."""
 
     operator: Operation
-    left: "Node"
-    right: "Node"
+    left: Node
+    right: Node
 
 
-class Call(Struct, frozen=True, gc=False):
+class Call(Node, frozen=True, gc=False):
     """A listed function; `function` is its name in `functions.LISTED`, whatever the dialect."""
 
     function: str
-    arguments: "tuple[Node, ...]"
+    arguments: tuple[Node, ...]
 
 
-class If(Struct, frozen=True, gc=False):
+class If(Node, frozen=True, gc=False):
     """`then` where `condition` is true, else `otherwise`; null counts as false."""
 
-    condition: "Node"
-    then: "Node"
-    otherwise: "Node"
+    condition: Node
+    then: Node
+    otherwise: Node
 
 
-class Index(Struct, frozen=True, gc=False):
+class Index(Node, frozen=True, gc=False):
     """`container[key]`: an item of a list, counted from 0 (from -1 backwards), or of a map."""
 
-    container: "Node"
-    key: "Node"
+    container: Node
+    key: Node
 
 
-class Some(Struct, frozen=True, gc=False):
+class Some(Node, frozen=True, gc=False):
     """Whether the condition is true with `variable` as one of the items; never, of null."""
 
     variable: str
-    collection: "Node"
-    condition: "Node"
+    collection: Node
+    condition: Node
 
 
-class Every(Struct, frozen=True, gc=False):
+class Every(Node, frozen=True, gc=False):
     """As `Some`: whether the condition is true with each item. FEEL's."""
 
     variable: str
-    collection: "Node"
-    condition: "Node"
+    collection: Node
+    condition: Node
 
 
-class For(Struct, frozen=True, gc=False):
+class For(Node, frozen=True, gc=False):
     """The list of `result` for each combination of items; `partial` is what there is so far."""
 
-    iterators: "tuple[tuple[str, Node], ...]"
-    result: "Node"
+    iterators: tuple[tuple[str, Node], ...]
+    result: Node
 
 
-class Filter(Struct, frozen=True, gc=False):
+class Filter(Node, frozen=True, gc=False):
     """`container[condition]` of FEEL: the item of a number, or the items for which it is true."""
 
-    container: "Node"
-    condition: "Node"
+    container: Node
+    condition: Node
 
 
-class Path(Struct, frozen=True, gc=False):
+class Path(Node, frozen=True, gc=False):
     """`container.key` of FEEL: an entry, of lists that of each item, or a property."""
 
-    container: "Node"
+    container: Node
     key: str
 
 
-class ContextOf(Struct, frozen=True, gc=False):
+class ContextOf(Node, frozen=True, gc=False):
     """`{key: value}`; a value may read the entries before it."""
 
-    entries: "tuple[tuple[str, Node], ...]"
+    entries: tuple[tuple[str, Node], ...]
 
 
-class RangeOf(Struct, frozen=True, gc=False):
+class RangeOf(Node, frozen=True, gc=False):
     """`[low..high]`; None: without that end. `negated`: all but `low`. `descends`: of an iteration,
     which may go from a higher value to a lower one."""
 
-    low: "Node | None"
-    high: "Node | None"
+    low: Node | None
+    high: Node | None
     low_included: bool
     high_included: bool
     negated: bool = False
     descends: bool = False
 
 
-class Lambda(Struct, frozen=True, gc=False):
+class Lambda(Node, frozen=True, gc=False):
     """`function(a, b) body`."""
 
     parameters: tuple[str, ...]
-    body: "Node"
+    body: Node
 
 
-class Invoke(Struct, frozen=True, gc=False):
+class Invoke(Node, frozen=True, gc=False):
     """A call of a function that an expression defines. `names`: of its arguments, or none."""
 
-    function: "Node"
-    arguments: "tuple[Node, ...]"
+    function: Node
+    arguments: tuple[Node, ...]
     names: tuple[str, ...] = ()
 
 
@@ -201,50 +205,22 @@ TypeName: TypeAlias = tuple[str, tuple[tuple[str, "TypeName"], ...]]
 """A type of FEEL: its name, and the types of its parts by their names ("" where they have none)."""
 
 
-class InstanceOf(Struct, frozen=True, gc=False):
+class InstanceOf(Node, frozen=True, gc=False):
     """`value instance of type`."""
 
-    value: "Node"
+    value: Node
     type: TypeName
 
 
-class Join(Struct, frozen=True, gc=False):
+class Join(Node, frozen=True, gc=False):
     """A text with `${...}` parts; each part's value is written into it."""
 
-    parts: "tuple[Node, ...]"
-
-
-Node: TypeAlias = Union[
-    Literal,
-    Name,
-    ListOf,
-    Not,
-    And,
-    Or,
-    Compare,
-    In,
-    Negate,
-    Arithmetic,
-    Call,
-    If,
-    Index,
-    Some,
-    Every,
-    For,
-    Filter,
-    Path,
-    ContextOf,
-    RangeOf,
-    Lambda,
-    Invoke,
-    InstanceOf,
-    Join,
-]
+    parts: tuple[Node, ...]
 
 
 _BELOW = {
     each: tuple(name for name, of in each.__annotations__.items() if "Node" in str(of))
-    for each in get_args(Node)
+    for each in Node.__subclasses__()
 }
 """The fields of each node that hold nodes: one, several, or several with names."""
 
