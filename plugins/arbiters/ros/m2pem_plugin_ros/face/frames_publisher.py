@@ -51,8 +51,8 @@ log = logging.getLogger("m2pem.face.ros")
 
 @dataclass(slots=True)
 class _Left:
-    """A frame that is left to other nodes. `received_s`: when they published it last, by the clock of
-    the event loop. `own`: the static transform that the face has for it."""
+    """A frame that is left to other nodes. `received_s`: when they published it last, by the clock
+    of the event loop. `own`: the static transform that the face has for it."""
 
     topic: str
     received_s: float
