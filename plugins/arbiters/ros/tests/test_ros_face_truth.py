@@ -21,6 +21,7 @@ from tf2_msgs.msg import TFMessage
 from m2pem.api import ArbiterContext, Connection, LinkState, ResourceId, VehicleState
 from m2pem.simulation.arbiters import SimArbiter
 from m2pem.testing import scenarios
+from m2pem.testing.harness import run_executive
 
 PEER = Path(__file__).with_name("ros_plain_peer.py")
 SENSORS = Path(__file__).with_name("ros_sensors_peer.py")
@@ -122,6 +123,29 @@ async def test_what_faces_say_of_a_vehicle_of_the_same_name_does_not_make_ours_n
     names = {(each.name, each.hardware_id) for message in said for each in message.status}
     assert {("m2pem: /a/face: ugv1", "a/ugv1"), ("m2pem: /b/face: ugv1", "b/ugv1")} <= names
     assert {(each.ready, each.not_ready_reasons) for each in states[-10:]} == {(True, ())}
+
+
+async def test_a_vehicle_that_the_face_of_another_fleet_shows_is_not_taken_for_ours(
+    ros_domain: int,
+) -> None:
+    ours = scenarios.fleet(
+        "ros", {"ugv1": {"namespace": "/ugv1", "domain_id": ros_domain, "driver": "base"}}
+    )
+    async with (
+        faced(ros_domain, speed=1.0),
+        run_executive(ours, arbiters={"ros": RosArbiter}) as control,
+    ):
+        states = control.telemetry()
+        async with asyncio.timeout(40):
+            async for state in states:
+                assert isinstance(state, VehicleState)
+                if any("the face of another executive" in each for each in state.not_ready_reasons):
+                    break
+        assert state.ready is False
+        goto = scenarios.one_behavior("goto", "ugv1", target=f"[{LATITUDE}, {LONGITUDE}]")
+        ended = await control.wait(await control.start(goto))
+    assert "is published by /face (gid " in ended.detail
+    assert "give that face a namespace" in ended.detail
 
 
 async def test_a_satellite_fix_is_used_while_there_is_no_odometry(ros_domain: int) -> None:

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from m2pem_plugin_ros.sensors.graph import Graph, node_of
+from m2pem_plugin_ros.sensors.graph import NAMELESS, Graph, node_of
 from m2pem_plugin_ros.settings import DriverName, Settings, Via
 
 if TYPE_CHECKING:
@@ -72,10 +72,16 @@ class Endpoints:
 
     @property
     def problem(self) -> str:
-        """Why the vehicle must not be commanded: too many publishers, a wrong type, or a QoS that
-        cannot match; "" if all is right."""
+        """Why the vehicle must not be commanded: too many publishers, the face of another fleet, a
+        wrong type, or a QoS that cannot match; "" if all is right."""
         for single in self._singles:
             found = self._node.get_publishers_info_by_topic(single.topic)
+            if faces := [each for each in found if self._is_face(each)]:
+                return (
+                    f"{single.topic} in ROS domain {self.domain} is published by {_named(faces)},"
+                    " the face of another executive, for a vehicle of its fleet: give that face a"
+                    " namespace"
+                )
             if len(found) > 1:
                 return (
                     f"{single.topic} in ROS domain {self.domain} has {len(found)} publishers:"
@@ -165,6 +171,11 @@ class Endpoints:
         if self._settings.domain_id is None:
             return environment
         return f"its connection says domain_id: {self.domain}, {environment}"
+
+    def _is_face(self, endpoint: Any) -> bool:
+        """Whether an endpoint is of the face of an executive, which shows vehicles of its fleet."""
+        name = node_of(endpoint)
+        return name != NAMELESS and self._node.count_publishers(f"{name}/fleet_state") > 0
 
     def _wrong_command(self) -> str:
         settings = self._settings
