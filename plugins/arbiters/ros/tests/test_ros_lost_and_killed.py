@@ -61,21 +61,32 @@ def face_states(domain: int) -> Iterator[list[Any]]:
 
 
 def cut_off_and_killed(
-    m2pem: Programs, watch: Watch, lost_after: str, *, noticed: bool
+    m2pem: Programs, watch: Watch, lost_after: str, *, noticed: bool, stands_by: bool = False
 ) -> tuple[Program, Program]:
     """The vehicles are cut off on their ways, and the executive killed, before or after it has
-    noticed that. Returns the vehicles, which are silent, and the next executive."""
+    noticed that. Returns the vehicles, which are silent, and the next executive; `stands_by`:
+    whether that waits from the beginning."""
     fleet = fleet_file(m2pem.folder, WATCHED, LENGTH_M, lost_after=lost_after, faces={"ros": {}})
     simulated = m2pem.simulate(fleet, SPEED)
     watch.until_heard()
-    first = m2pem.run(convoy(m2pem.folder, WATCHED, role=ROLE), fleet, SPEED)
+    mission = convoy(m2pem.folder, WATCHED, role=ROLE)
+    if stands_by:
+        words = ("--fleet", fleet, "--speed", f"{SPEED:g}", "--ocu", "none", "--format", "json")
+        first = m2pem.m2pem("serve", *words)
+        first.until_line("serving")
+        again = m2pem.m2pem("serve", *words, "--standby")
+        again.until_line("standing by for")
+        assert m2pem.m2pem("start", mission).rest() == 0
+    else:
+        first = m2pem.run(mission, fleet, SPEED)
     first.until_record("BehaviorProgressed", len(WATCHED), state="RUNNING")
     watch.until(lambda: all(track.north_m > 5.0 for _, track in watch.items()))
     simulated.process.send_signal(signal.SIGSTOP)
     if noticed:
         first.until_record("WorkReassigned", len(WATCHED))
     first.kill()
-    again = m2pem.m2pem("resume", "r1", "--ocu", "none", "--format", "json")
+    if not stands_by:
+        again = m2pem.m2pem("resume", "r1", "--ocu", "none", "--format", "json")
     again.until_record("RunClaimed")
     return simulated, again
 
@@ -110,11 +121,12 @@ def test_robots_whose_loss_nothing_had_noticed_are_held_until_an_operator_decide
     assert not again.those("BehaviorRequested")
 
 
+@pytest.mark.parametrize("stands_by", [False, pytest.param(True, marks=pytest.mark.long)])
 def test_the_face_of_the_next_executive_says_at_once_that_a_robot_is_lost(
-    m2pem: Programs, watch: Watch, ros_domain: int
+    m2pem: Programs, watch: Watch, ros_domain: int, stands_by: bool
 ) -> None:
     with face_states(ros_domain) as states:
-        simulated, _ = cut_off_and_killed(m2pem, watch, "10 s", noticed=True)
+        simulated, _ = cut_off_and_killed(m2pem, watch, "10 s", noticed=True, stands_by=stands_by)
 
         def shown() -> list[Any]:
             return [each for state in states[-1:] for each in state.resources]
