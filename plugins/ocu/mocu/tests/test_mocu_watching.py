@@ -7,9 +7,11 @@ import signal
 from itertools import pairwise
 
 import pytest
+from m2pem_plugin_mocu.ocu import MocuOcu
 from m2pem_plugin_mocu.publish_throttle import MIN_PERIOD_S
+from m2pem_plugin_mocu.settings import NAMESPACE
 from m2pem_plugin_mocu.topics import Topics
-from mocu_world import Client, Message, World, until, values
+from mocu_world import OTHER, Client, Message, World, until, values
 
 from m2pem.errors import JournalError
 
@@ -253,6 +255,25 @@ async def test_diagnostics_tell_of_executive_journal_and_vehicles(
         "diagnostics", lambda each: by_name(each)["m2pem: journal"]["level"] == ERROR
     )
     assert "disk" in by_name(failed)["m2pem: journal"]["message"]
+
+
+async def test_units_in_two_namespaces_have_different_names_in_diagnostics(
+    world: World, client: Client
+) -> None:
+    def ids(message: Message) -> set[tuple[str, str]]:
+        return {(each["name"], each["hardware_id"]) for each in message["status"]}
+
+    other = MocuOcu(world.control, environment={NAMESPACE: OTHER}, domain_id=world.domain)
+    serving = asyncio.create_task(other.serve())
+    one = await client.hears("diagnostics", lambda each: ("m2pem: link ugv1", "ugv1") in ids(each))
+    two = await client.hears(
+        "diagnostics",
+        lambda each: ("m2pem: link team_b/m2pem/ugv1", "team_b/m2pem/ugv1") in ids(each),
+    )
+    serving.cancel()
+    await asyncio.wait([serving])
+    assert "m2pem: team_b/m2pem/journal" in {name for name, _ in ids(two)}
+    assert not {name for name, _ in ids(one)} & {name for name, _ in ids(two)}
 
 
 async def test_who_cancels_a_unit_twice_leaves_nothing_that_still_publishes(
