@@ -32,8 +32,9 @@ _FRAMES: Mapping[int, str] = {
 POSITION_IGNORED = 1 | 2 | 4
 """POSITION_TARGET_TYPEMASK of the three coordinates."""
 
-ENDLESS_TURNS = 10_000
-"""DO_ORBIT without a number of turns goes on until another command."""
+ENDLESS_TURNS, MOST_TURNS = 10.0, 20.0
+"""Of DO_ORBIT without a number of turns, which autopilots circle until another command; and of one
+with them: to check a way against fences takes longer by the square of its turns."""
 
 YAW_LOCK = 16
 """GIMBAL_MANAGER_FLAGS: the yaw is from north."""
@@ -214,7 +215,10 @@ def _orbit(command: Command, vehicle: ShownVehicle) -> Order:
     if math.isfinite(speed) and speed > 0:
         parameters["speed"] = f"{speed} m/s"
     endless = not math.isfinite(turned_rad) or turned_rad == 0
-    parameters["turns"] = ENDLESS_TURNS if endless else turned_rad / math.tau
+    turns = ENDLESS_TURNS if endless else turned_rad / math.tau
+    if not 0 < turns <= MOST_TURNS:
+        raise RefusedCommandError(f"DO_ORBIT needs a number of turns up to {MOST_TURNS:g}")
+    parameters["turns"] = turns
     return Order(vehicle.resource, "orbit", parameters)
 
 
