@@ -110,19 +110,26 @@ def test_a_copter_whose_frames_come_in_pieces_or_again_late_flies_on(late_s: flo
     run_on_loopback(main, SPEED)
 
 
-@pytest.mark.sitl("M2PEM_ARDUROVER")
+@pytest.mark.parametrize(
+    ("frame", "variable"),
+    [
+        pytest.param(*each, marks=pytest.mark.sitl(each[1]))
+        for each in (("rover", "M2PEM_ARDUROVER"), ("quad", "M2PEM_ARDUCOPTER"))
+    ],
+)
 @pytest.mark.parametrize("late_s", [0.0, 1.4, 24.0])
-async def test_a_real_rover_whose_frames_come_in_pieces_or_again_late_drives_on(
-    tmp_path: Path, late_s: float
+async def test_a_real_autopilot_whose_frames_come_in_pieces_or_again_late_goes_on(
+    tmp_path: Path, frame: str, variable: str, late_s: float
 ) -> None:
-    binary = sitl.program("M2PEM_ARDUROVER")
+    binary = sitl.program(variable)
     assert binary is not None
+    domain, height_m = ("ground", None) if frame == "rover" else ("air", 15.0)
     port = sitl.free_port()
     clock = SystemClock(sitl.SPEED)
     loop = asyncio.get_running_loop()
-    with sitl.running([sitl.ardupilot(binary, "rover", 0, port)], tmp_path):
+    with sitl.running([sitl.ardupilot(binary, frame, 0, port)], tmp_path):
         async with listening(late_s / sitl.SPEED, port, loop) as inner:
-            arbiter = MavlinkArbiter(connection("ground", inner), context(clock))
+            arbiter = MavlinkArbiter(connection(domain, inner), context(clock))
             async with ArbiterHarness(arbiter, clock) as bench:
 
                 def ready() -> bool:
@@ -130,9 +137,14 @@ async def test_a_real_rover_whose_frames_come_in_pieces_or_again_late_drives_on(
                     return isinstance(state, VehicleState) and state.ready is True
 
                 assert await bench.until(ready, 600.0), bench.latest(V1)
-                for number, place in enumerate([(30, 0), (30, 30), (0, 0)]):
-                    target = Point((*at(*place), None))
-                    await bench.start(f"r1.b{number}", "goto", V1, target=target)
+                todo: list[tuple[str, dict[str, Any]]] = [
+                    ("goto", {"target": Point((*at(*place), height_m), "relative")})
+                    for place in ((30, 0), (30, 30), (0, 0))
+                ]
+                if frame == "quad":
+                    todo = [("takeoff", {"altitude": 10.0}), *todo, ("land", {})]
+                for number, (behavior, given) in enumerate(todo):
+                    await bench.start(f"r1.b{number}", behavior, V1, **given)
                     end = await bench.ended(f"r1.b{number}", 400.0)
                     assert end.state is BehaviorState.SUCCEEDED, end
 
