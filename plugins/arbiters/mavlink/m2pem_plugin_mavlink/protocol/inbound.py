@@ -3,6 +3,7 @@ listeners."""
 
 import logging
 import math
+from array import array
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
@@ -36,8 +37,8 @@ MOST_SENDERS = 1_024
 """Most senders of one peer; those that were silent for longest are forgotten first."""
 
 KEPT_S = 60.0
-MOST_KEPT = 8_192
-"""So long, and so many, are frames known that were received, to know their copies."""
+KEPT = 8192
+"""So long, and so many, are frames known that were received."""
 
 LATE_S = 0.5
 LATE_FRAMES = 16
@@ -63,10 +64,13 @@ NOTHING: WantedById = {}
 
 class Sender(Reception):
     """One component of a system, as one peer sends it; messages in `wanted` are decoded and passed
-    on. `check` None: its frames need no signature. `kept`: when each was received, by its sequence
-    number and checksum. `next_copy`: the number after the last late copy."""
+    on. `check` None: its frames need no signature. `next_copy`: the number after the last late
+    copy. `checksums`, `times_s`: of the last frames, by the count of their numbers; of one that is
+    not used, none."""
 
-    __slots__ = ("_copied_s", "address", "check", "kept", "next_copy", "wanted")
+    __slots__ = (
+        "_copied_s", "address", "check", "checksums", "next_copy", "times_s", "wanted",
+    )  # fmt: skip
 
     def __init__(
         self, address: Address, sequence: int, now_s: float, check: SignatureCheck | None = None
@@ -75,14 +79,14 @@ class Sender(Reception):
         self.address = address
         self.check = check
         self.wanted: WantedById = NOTHING
-        self.kept: dict[int, float] = {}
+        self.checksums, self.times_s = array("H"), array("d")
         self.next_copy = -1
         self._copied_s = -math.inf
 
-    def is_copy(self, sequence: int, key: int, now_s: float) -> bool:
+    def is_copy(self, sequence: int, checksum: int, now_s: float) -> bool:
         """Whether a frame that is out of sequence, or follows a copy, was received before, or comes
         over a second way on which frames come late. It is counted."""
-        late_s = now_s - self.kept.get(key, -math.inf)
+        late_s = now_s - self._kept_s(sequence, checksum)
         ahead = (sequence - self.expected) & 255
         if late_s <= KEPT_S:
             if ahead in (0, 255) and (
@@ -103,14 +107,20 @@ class Sender(Reception):
         self.doubled += 1
         return True
 
-    def keep(self, key: int, now_s: float) -> None:
-        """Note a frame as received."""
-        kept = self.kept
-        if len(kept) >= MOST_KEPT:
-            newest = list(kept.items())[MOST_KEPT // 2 :]
-            self.kept = kept = {each: at_s for each, at_s in newest if now_s - at_s <= KEPT_S}
-        kept.pop(key, None)  # the dictionary is in the order of the times
-        kept[key] = now_s
+    def keep(self, sequence: int, checksum: int, now_s: float) -> None:
+        """Note a frame as received; call it after it is counted."""
+        if not self.checksums:
+            self.checksums = array("H", bytes(2 * KEPT))
+            self.times_s = array("d", [-math.inf]) * KEPT
+        last = self.expected - 1
+        place = (last - ((last - sequence) & 255)) % KEPT
+        self.checksums[place], self.times_s[place] = checksum, now_s
+
+    def _kept_s(self, sequence: int, checksum: int) -> float:
+        """Return when a frame was received last; long ago: it was not."""
+        times_s, sums = self.times_s, self.checksums
+        places = range(sequence, len(sums), 256)
+        return max((times_s[at] for at in places if sums[at] == checksum), default=-math.inf)
 
 
 AdmitSender: TypeAlias = Callable[[Sender], bool]
@@ -165,8 +175,8 @@ class Inbound:
                 sender = self.senders.get(source)
                 if sender is None or (not flags and sender.check is not None):
                     signed = data if flags else b""
-                    payload, checksum = data[10 : end - 2], data[end - 2 : end]
-                    frame = Frame(sequence, source, id_, payload, False, signed, checksum)
+                    payload, sum_of = data[10 : end - 2], data[end - 2 : end]
+                    frame = Frame(sequence, source, id_, payload, False, signed, sum_of)
                     self._frame(frame, data[:end], now_s)
                     return
                 check = sender.check
@@ -177,16 +187,20 @@ class Inbound:
                     sum_ = mcrf4xx(EXTRA[id_], mcrf4xx(data[1 : end - 2], CRC_START))
                     if data[end - 2] != sum_ & 255 or data[end - 1] != sum_ >> 8:
                         return
-                key = sequence | data[end - 2] << 8 | data[end - 1] << 16
+                checksum = data[end - 2] | data[end - 1] << 8
                 if sequence == sender.expected & 255 and sequence != sender.next_copy:
                     sender.expected += 1
-                elif sender.is_copy(sequence, key, now_s):
+                elif sender.is_copy(sequence, checksum, now_s):
                     return
                 else:
                     sender.count(sequence, now_s)
                 sender.received_s = now_s
                 if sender.wanted:
-                    sender.keep(key, now_s)
+                    place = (sender.expected - 1) % KEPT  # as in `keep`, without its call
+                    if place & 255 == sequence and sender.checksums:
+                        sender.checksums[place], sender.times_s[place] = checksum, now_s
+                    else:
+                        sender.keep(sequence, checksum, now_s)
                 if wanted is not None:
                     self._hand_over(wanted, data[10 : end - 2], sender.address)
                 return
@@ -238,13 +252,13 @@ class Inbound:
         wanted = sender.wanted.get(id_)
         if wanted is not None and not checked and not right(raw, id_):
             return
-        key = sequence | checksum[0] << 8 | checksum[1] << 16
+        sum_ = checksum[0] | checksum[1] << 8
         in_order = sequence == sender.expected & 255 and sequence != sender.next_copy
-        if not in_order and sender.is_copy(sequence, key, now_s):
+        if not in_order and sender.is_copy(sequence, sum_, now_s):
             return
         sender.count(sequence, now_s)
         if sender.wanted:
-            sender.keep(key, now_s)
+            sender.keep(sequence, sum_, now_s)
         if wanted is not None:
             self._hand_over(wanted, payload, sender.address)
 
