@@ -115,7 +115,6 @@ def participant_of(
 
 
 def stands(state: VehicleState) -> bool:
-    """Whether a vehicle does not move."""
     return _speed_m_s(state) < STANDS_BELOW_M_S
 
 
@@ -149,7 +148,6 @@ class FlightParameters(BehaviorParameters):
         self._height_of = height_of
 
     def to_local(self, place: Coordinate) -> EastNorth:
-        """A coordinate in the frame."""
         return self.frame.to_local(place[:2])
 
     def ring(self, area: Area) -> list[EastNorth]:
@@ -157,7 +155,6 @@ class FlightParameters(BehaviorParameters):
         return [self.to_local(corner) for corner in area.rings[0][:-1]]
 
     def waypoint_spans(self, route: Route) -> list[Span]:
-        """The height at each waypoint of a route."""
         return [
             self.span(each[2], frame)
             for each, frame in zip(route.waypoints, route.frames, strict=True)

@@ -213,7 +213,6 @@ class Reservations:
             self._reservations[request.id] = Reservation(request, kind)
 
     def has_reserved(self, behavior: BehaviorId) -> bool:
-        """Whether volumes are reserved for a behavior."""
         return behavior in self._reservations
 
     def delay(self, vehicle: ResourceId) -> None:

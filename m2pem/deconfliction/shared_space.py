@@ -107,7 +107,6 @@ class SpaceConflict:
 
 
 def regions_of(fleet: Fleet, frame: LocalFrame) -> tuple[SharedRegion, ...]:
-    """Return the shared spaces of a fleet."""
     return tuple(
         SharedRegion(space, region_of(fleet.geometries[space.name], space.width_m, frame))
         for space in fleet.shared_space.values()

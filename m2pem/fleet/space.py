@@ -44,7 +44,6 @@ def participants_of(fleet: Fleet) -> tuple[ResourceId, ...]:
 
 
 def waits_for_space(fleet: Fleet) -> bool:
-    """Whether tasks of some vehicles wait for space."""
     return bool(_waiting_domains(fleet))
 
 
@@ -70,7 +69,6 @@ def without_space(fleet: Fleet) -> Fleet:
 
 
 def _waiting_domains(fleet: Fleet) -> set[Domain]:
-    """Return the domains whose vehicles may have to wait."""
     found = {
         domain for space in fleet.shared_space.values() if space.waits for domain in space.domains
     }

@@ -235,7 +235,6 @@ class Raster(ElevationFile):
         return values
 
     def _read(self, *block: int) -> Floats:
-        """Return the samples of a block."""
         from rasterio.errors import RasterioError  # noqa: PLC0415
 
         window = tuple((_BLOCK * each, _BLOCK * (each + 1)) for each in block)

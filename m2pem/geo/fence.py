@@ -329,7 +329,6 @@ def rings_of(area: "BaseGeometry") -> list[list[EastNorth]]:
 
 
 def polygons(geometry: "BaseGeometry") -> list[Any]:
-    """Return the polygons that a geometry is made of."""
     return [part for part in getattr(geometry, "geoms", [geometry]) if part.area > 0]
 
 

@@ -102,10 +102,10 @@ def near_stretch(
 ) -> tuple[float, float] | None:
     """Return from which to which share of its length a straight way is nearer to a convex polygon
     than a distance; None: nowhere."""
-    line = _shape(way)
+    line = shapely.LineString(way)
     near = shapely.get_coordinates(line.intersection(_shape(hull).buffer(distance_m, 64)))
-    shares = shapely.line_locate_point(line, shapely.points(near), normalized=True)
-    return (float(min(shares)), float(max(shares))) if len(near) else None
+    shares = [line.project(shapely.Point(each), normalized=True) for each in near]
+    return (min(shares), max(shares)) if shares else None
 
 
 def meeting_place(a: Hull | None, b: Hull | None) -> EastNorth | None:
@@ -144,7 +144,6 @@ class Region:
         return self.distance_m(hull) == 0.0
 
     def hulls(self) -> list[Hull]:
-        """Return the convex hull of each part."""
         return [convex_hull(_corners(each)) for each in self.parts]
 
     def common_place(self, hull: Hull | None) -> EastNorth | None:

@@ -13,6 +13,31 @@ EastNorthUp: TypeAlias = tuple[float, float, float]
 """East, north and up of the origin of a local frame, in metres."""
 
 
+SHARPEST_BEND_RAD = math.radians(150)
+"""A sharper turn is made on the spot."""
+
+FARTHEST_MISS_M = 3.5
+"""A bend passes its waypoint no farther off: the sharper the corner, the tighter the bend."""
+
+SMALLEST_RADIUS_M = 0.5
+
+
+def bend(
+    turn_rad: float, before_m: float, after_m: float, radius_m: float
+) -> tuple[float, float] | None:
+    """Return the radius of the bend with which vehicles round a corner between two legs, and how
+    much it cuts off each; None: they stop and turn on the spot.
+
+    `radius_m`: at most.
+    """
+    half = max(5e-7, abs(turn_rad) / 2)
+    radius_m = min(radius_m, FARTHEST_MISS_M / (1 / math.cos(half) - 1 + 1e-9))
+    cut_m = min(radius_m * math.tan(half), before_m / 2, after_m / 2)
+    radius_m = cut_m / math.tan(half)
+    sharp = abs(turn_rad) > SHARPEST_BEND_RAD or radius_m < SMALLEST_RADIUS_M
+    return None if sharp else (radius_m, cut_m)
+
+
 @dataclass(frozen=True, slots=True)
 class Segment:
     """A straight line. `yaw_rad`: its direction, from east, counter-clockwise."""
@@ -23,7 +48,6 @@ class Segment:
 
     @classmethod
     def between(cls, start: EastNorth, end: EastNorth) -> "Segment":
-        """Return the segment from one point to another."""
         yaw_rad = math.atan2(end[1] - start[1], end[0] - start[0])
         return cls(start, yaw_rad, math.dist(start, end))
 

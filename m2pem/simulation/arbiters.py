@@ -178,7 +178,6 @@ class SimArbiter:
     # --- the protocol ---------------------------------------------------------------------------
 
     def catalogue(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
-        """What the resource can do."""
         return self._planner.catalogue(resource)
 
     def limits(self, resource: ResourceId) -> Limits:
@@ -290,7 +289,6 @@ class SimArbiter:
         self._turn(resource, "hold")
 
     async def resume(self, resource: ResourceId) -> None:
-        """Let the resource go on."""
         self._turn(resource, "resume")
 
     def reports(self) -> AsyncIterator[BehaviorReport]:
@@ -343,7 +341,6 @@ class SimArbiter:
 
     @property
     def vehicles(self) -> Sequence[SimVehicle]:
-        """The vehicles that are simulated."""
         return [body for body in self._bodies.values() if isinstance(body, SimVehicle)]
 
     def doing(self, resource: ResourceId) -> BehaviorId:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Self, TypeAlias, Union
 
+from m2pem.geo.polyline import bend
 from m2pem.simulation.kinematics import STANDING_LOAD, Kinematics
 from m2pem.simulation.segments import (
     Curve,
@@ -21,13 +22,6 @@ from m2pem.simulation.segments import (
 )
 from m2pem.simulation.trajectory import Plan
 
-SHARPEST_BEND_RAD = math.radians(150)
-"""A sharper turn is made on the spot."""
-
-FARTHEST_MISS_M = 3.5
-"""A bend passes its waypoint no farther off: the sharper the corner, the tighter the bend."""
-
-SMALLEST_RADIUS_M = 0.5
 _NOTHING_M = 1e-3
 
 
@@ -46,12 +40,10 @@ class Line:
 
     @property
     def climb_m(self) -> float:
-        """Difference of height."""
         return self.end[2] - self.start[2]
 
     @property
     def length_m(self) -> float:
-        """Length in space."""
         return math.hypot(self.level_m, self.climb_m)
 
     @property
@@ -88,7 +80,6 @@ class Bend:
 
     @property
     def length_m(self) -> float:
-        """Length in space."""
         return math.hypot(self.level_m, self.climb_m)
 
 
@@ -112,20 +103,20 @@ def rounded(points: list[Vector], radius_m: float) -> list[list[Piece]]:
         if math.dist(a, b) > _NOTHING_M
     ]
     runs: list[list[Piece]] = [[]]
-    bend: Bend | None = None
+    arc: Bend | None = None
     cut_m = 0.0
     for index, leg in enumerate(legs):
         start = leg.start
         if index:
-            if bend is not None:
-                runs[-1].append(bend)
+            if arc is not None:
+                runs[-1].append(arc)
                 start = leg.point(cut_m)
             elif cut_m < 0:
                 runs.append([])
         end = leg.end
         if index + 1 < len(legs):
-            bend, cut_m = _bend(leg, legs[index + 1], radius_m)
-            if bend is not None:
+            arc, cut_m = _bend(leg, legs[index + 1], radius_m)
+            if arc is not None:
                 end = leg.point(leg.level_m - cut_m)
         if math.dist(start, end) > _NOTHING_M:
             runs[-1].append(Line(start, end, leg.leg))
@@ -141,18 +132,16 @@ def _bend(before: Line, after: Line, radius_m: float) -> tuple[Bend | None, floa
     sweep = turned(before_rad, after.yaw_rad)
     if abs(sweep) < 1e-6:
         return None, 0.0
-    tangent = math.tan(abs(sweep) / 2)
-    radius_m = min(radius_m, FARTHEST_MISS_M / (1 / math.cos(sweep / 2) - 1 + 1e-9))
-    cut_m = min(radius_m * tangent, before_m / 2, after_m / 2)
-    radius_m = cut_m / tangent
-    if abs(sweep) > SHARPEST_BEND_RAD or radius_m < SMALLEST_RADIUS_M:
+    found = bend(sweep, before_m, after_m, radius_m)
+    if found is None:
         return None, -1.0
+    radius_m, cut_m = found
     start, end = before.point(before_m - cut_m), after.point(cut_m)
     aside = before_rad + math.copysign(math.pi / 2, sweep)
     centre = (start[0] + radius_m * math.cos(aside), start[1] + radius_m * math.sin(aside))
     climb_m = end[2] - start[2]
-    bend = Bend(centre, radius_m, aside + math.pi, sweep, start[2], climb_m, after.leg)
-    return bend, cut_m
+    made = Bend(centre, radius_m, aside + math.pi, sweep, start[2], climb_m, after.leg)
+    return made, cut_m
 
 
 _LOOK_RAD = math.radians(3)
@@ -202,7 +191,6 @@ class Craft:
 
     @property
     def aloft(self) -> bool:
-        """Whether it is in the air."""
         return self.flies and self.pose.place[2] - self.home[2] > ALOFT_M
 
 
@@ -228,7 +216,6 @@ class Course:
 
     @property
     def duration_s(self) -> float:
-        """How long it lasts so far."""
         return sum(phase.duration_s for phase in self._phases)
 
     def plan(self, cycle_from: int | None = None) -> Plan[Pose]:
@@ -237,7 +224,6 @@ class Course:
         return Plan(phases, cycle_from)
 
     def stand(self, seconds: float) -> Self:
-        """Stay where it is."""
         aloft = self._craft.flies and self.place[2] - self._craft.home[2] > ALOFT_M
         if seconds > 0:
             load = 1.0 if aloft else STANDING_LOAD
@@ -254,7 +240,6 @@ class Course:
         return self
 
     def climb_to(self, up_m: float) -> Self:
-        """Straight up or down."""
         return self.through([(self.place[0], self.place[1], up_m)])
 
     def through(

@@ -143,7 +143,6 @@ class Execution:
         return self.last is not None and self.last.state.terminal
 
     def next_report(self, outcome: Outcome) -> BehaviorReport:
-        """Make and remember the next report."""
         self.number += 1
         before = self.last.remaining if self.last is not None else None
         done = outcome.state is BehaviorState.SUCCEEDED
@@ -160,7 +159,6 @@ class Execution:
         return self.last
 
     def forget_timers(self) -> None:
-        """Nothing more is scheduled for it."""
         timers = [timer for part in self.parts for timer in (part.timer, part.work_timer)]
         for entry in (self.timer, *timers):
             if entry is not None:

@@ -37,7 +37,6 @@ class FaultList:
         self._waiting: list[Fault] = list(faults)
 
     def add(self, fault: Fault) -> None:
-        """One more."""
         self._waiting.append(fault)
 
     def take(self, behavior: str) -> Fault | None:

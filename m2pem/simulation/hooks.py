@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
 @hookimpl
 def m2pem_register_arbiters(register: "Callable[[str, Callable[..., Arbiter]], None]") -> None:
-    """Register `sim`."""
     from m2pem.simulation.arbiters import SimArbiter  # noqa: PLC0415  # starting up must stay fast
 
     register("sim", SimArbiter)

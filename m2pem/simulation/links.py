@@ -32,7 +32,6 @@ class Links:
         self._cuts: dict[ResourceId, int] = {}
 
     def up(self, vehicle: ResourceId) -> bool:
-        """Whether the link to the vehicle is up."""
         return vehicle not in self._broken
 
     def lost(self, vehicle: ResourceId) -> bool:
@@ -54,13 +53,11 @@ class Links:
             self._broken[vehicle].reports.append((execution, outcome))
 
     def cut(self, vehicle: ResourceId) -> None:
-        """Break a link."""
         if vehicle not in self._broken:
             self._broken[vehicle] = _Broken()
             self._cuts[vehicle] = self.cuts(vehicle) + 1
 
     def cuts(self, vehicle: ResourceId) -> int:
-        """How often the link was cut."""
         return self._cuts.get(vehicle, 0)
 
     def give_up(self, vehicle: ResourceId) -> None:

@@ -109,7 +109,6 @@ class SimPayload:
         self.track = Track(Plan([Slew(look, look, 0.0)]), then_us)
 
     def mount(self, now_us: int, carrier: Pose | None, ground_up_m: float) -> Mount:
-        """As a behavior sees it."""
         look = self.look(now_us)
         return Mount(self.id, self.settings.gimbal, look, carrier, ground_up_m)
 
@@ -147,7 +146,6 @@ class SimPayload:
         detections: tuple[Detection, ...] = (),
         footprint: tuple[GeoPosition, ...] = (),
     ) -> PayloadState:
-        """What it says about itself."""
         look = self.look(now_us)
         return PayloadState(
             resource=self.id,

@@ -82,7 +82,6 @@ class Assignment:
     work: RemainingWork | None = None
 
     def time_scaled(self, factor: float) -> "Assignment":
-        """Return the same, which takes `factor` times as long."""
         return dataclasses.replace(
             self,
             plan=self.plan and self.plan.time_scaled(factor),
@@ -190,7 +189,6 @@ class Planner:
         return None if fence is None else fence.in_frame(self._frame)
 
     def catalogue(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
-        """What the resource can do."""
         body = self._body(resource)
         if isinstance(body, SimVehicle):
             return vehicle_behaviors(body.domain)

@@ -20,17 +20,14 @@ class Profile(msgspec.Struct, frozen=True):
 
     @property
     def accelerating_s(self) -> float:
-        """How long it speeds up."""
         return max(0.0, self.v_peak - self.v_in) / self.accel
 
     @property
     def braking_s(self) -> float:
-        """How long it slows down."""
         return max(0.0, self.v_peak - self.v_out) / self.decel
 
     @property
     def cruising_s(self) -> float:
-        """How long it goes at `v_peak`."""
         ramps = (self.v_peak**2 - self.v_in**2) / (2 * self.accel)
         ramps += (self.v_peak**2 - self.v_out**2) / (2 * self.decel)
         rest = self.length - ramps
@@ -38,7 +35,6 @@ class Profile(msgspec.Struct, frozen=True):
 
     @property
     def duration_s(self) -> float:
-        """The whole time."""
         return self.accelerating_s + self.cruising_s + self.braking_s
 
     def time_scaled(self, factor: float) -> "Profile":
@@ -189,15 +185,12 @@ class Travel(msgspec.Struct, frozen=True, tag=True):
     yaw: float
     profile: Profile
     load: ClassVar[float] = 1.0
-    """Battery load; 1.0 is that of moving."""
 
     @property
     def duration_s(self) -> float:
-        """How long it lasts, in s."""
         return self.profile.duration_s
 
     def at(self, t: float) -> Pose:
-        """Where the vehicle is, so many seconds after the start."""
         gone, speed = self.profile.at(t)
         velocity = along((0.0, 0.0, 0.0), self.direction, speed)
         return Pose(along(self.start, self.direction, gone), self.yaw, velocity)
@@ -214,15 +207,12 @@ class Curve(msgspec.Struct, frozen=True, tag=True):
     climb: float
     profile: Profile
     load: ClassVar[float] = 1.0
-    """Battery load; 1.0 is that of moving."""
 
     @property
     def duration_s(self) -> float:
-        """How long it lasts, in s."""
         return self.profile.duration_s
 
     def at(self, t: float) -> Pose:
-        """Where the vehicle is, so many seconds after the start."""
         gone, speed = self.profile.at(t)
         length = self.profile.length
         part = gone / length
@@ -248,10 +238,8 @@ class Pivot(msgspec.Struct, frozen=True, tag=True):
     sweep: float
     duration_s: float
     load: ClassVar[float] = 1.0
-    """Battery load; 1.0 is that of moving."""
 
     def at(self, t: float) -> Pose:
-        """Where the vehicle is, so many seconds after the start."""
         part = min(1.0, max(0.0, t / self.duration_s)) if self.duration_s > 0 else 1.0
         return Pose(self.place, self.yaw + self.sweep * part)
 
@@ -265,7 +253,6 @@ class Stand(msgspec.Struct, frozen=True, tag=True):
     load: float
 
     def at(self, _: float) -> Pose:
-        """Where the vehicle is, so many seconds after the start."""
         return Pose(self.place, self.yaw)
 
 
@@ -281,7 +268,6 @@ class Steer(msgspec.Struct, frozen=True, tag=True):
     load: float = 1.0
 
     def at(self, t: float) -> Pose:
-        """Where the vehicle is, so many seconds after the start."""
         t = min(t, self.duration_s)
         halfway = along(self.velocity, self.acceleration, t / 2)
         return Pose(
@@ -298,10 +284,8 @@ class Slew(msgspec.Struct, frozen=True, tag=True):
     end: Look
     duration_s: float
     load: ClassVar[float] = 0.0
-    """Battery load; 1.0 is that of moving."""
 
     def at(self, t: float) -> Look:
-        """Where the payload looks, so many seconds after the start."""
         if math.isinf(self.duration_s):
             return self.start
         part = min(1.0, max(0.0, t / self.duration_s)) if self.duration_s > 0 else 1.0

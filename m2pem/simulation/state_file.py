@@ -28,7 +28,6 @@ from m2pem.simulation.executions import (
     Strike,
 )
 from m2pem.simulation.gimbals import Shots
-from m2pem.simulation.payloads import SimPayload
 from m2pem.simulation.pursuit import Pursuit
 from m2pem.simulation.segments import PayloadPhase, VehiclePhase
 from m2pem.simulation.trajectory import Plan, Track, Warp
@@ -59,27 +58,24 @@ class StateFileError(M2pemError):
     exit_status = 2
 
 
-class _Vehicle(msgspec.Struct):
-    phases: list[VehiclePhase]
+class _Body(msgspec.Struct, kw_only=True):
     cycle_from: int | None
     started_us: int
-    counted_us: int
     warp: Warp
     behavior: str
     doing: str
     held: bool
+
+
+class _Vehicle(_Body, kw_only=True):
+    phases: list[VehiclePhase]
+    counted_us: int
     battery: float
     cruise_m_s: float
 
 
-class _Payload(msgspec.Struct):
+class _Payload(_Body, kw_only=True):
     phases: list[PayloadPhase]
-    cycle_from: int | None
-    started_us: int
-    warp: Warp
-    behavior: str
-    doing: str
-    held: bool
 
 
 class _Part(msgspec.Struct):
@@ -149,7 +145,6 @@ class StateFile:
             raise StateFileError(f"{path}: is of format {found}, not {FORMAT}; remove it")
 
     def close(self) -> None:
-        """Let go of the file."""
         self._connection.close()
 
     def meta(self, key: str, default: str) -> str:
@@ -159,7 +154,6 @@ class StateFile:
         return str(row[0])
 
     def set_meta(self, key: str, value: str) -> None:
-        """Keep `value` under `key`."""
         self._connection.execute("INSERT OR REPLACE INTO meta VALUES (?, ?)", (key, value))
 
     def epochs(self) -> dict[str, int]:
@@ -219,19 +213,14 @@ class StateFile:
         """Put the bodies that the file knows where they were."""
         for resource, data in self._connection.execute("SELECT resource, state FROM bodies"):
             body = bodies.get(ResourceId(resource))
+            if body is None:
+                continue
+            kept = self._decode(data, _Vehicle if isinstance(body, SimVehicle) else _Payload)
+            body.behavior, body.doing, body.held = self._read(kept.behavior), kept.doing, kept.held
+            plan, counted_us = Plan(kept.phases, kept.cycle_from), getattr(kept, "counted_us", None)
+            body.track = Track(plan, kept.started_us, kept.warp, counted_us)
             if isinstance(body, SimVehicle):
-                vehicle = self._decode(data, _Vehicle)
-                body.behavior, body.doing = self._read(vehicle.behavior), vehicle.doing
-                body.held = vehicle.held
-                body.battery, body.cruise_m_s = vehicle.battery, vehicle.cruise_m_s
-                plan = Plan(vehicle.phases, vehicle.cycle_from)
-                body.track = Track(plan, vehicle.started_us, vehicle.warp, vehicle.counted_us)
-            elif isinstance(body, SimPayload):
-                payload = self._decode(data, _Payload)
-                body.behavior, body.doing = self._read(payload.behavior), payload.doing
-                body.held = payload.held
-                looks = Plan(payload.phases, payload.cycle_from)
-                body.track = Track(looks, payload.started_us, payload.warp)
+                body.battery, body.cruise_m_s = kept.battery, kept.cruise_m_s
 
     def load_behaviors(self, bodies: dict[ResourceId, Body], frame: LocalFrame) -> list[Execution]:
         """The behaviors that are remembered, in the order of their first start."""
@@ -275,28 +264,15 @@ def recorded_effects(path: str | Path) -> Sequence[Effect]:
 
 def _body_record(body: Body) -> _Vehicle | _Payload:
     track = body.track
-    if isinstance(body, SimVehicle):
-        return _Vehicle(
-            list(body.track.plan.phases),  # type: ignore[arg-type]  # only such phases are made
-            track.plan.cycle_from,
-            track.started_us,
-            track.counted_us,
-            track.warp,
-            body.behavior,
-            body.doing,
-            body.held,
-            body.battery,
-            body.cruise_m_s,
-        )
-    return _Payload(
-        list(body.track.plan.phases),  # type: ignore[arg-type]  # only such phases are made
-        track.plan.cycle_from,
-        track.started_us,
-        track.warp,
-        body.behavior,
-        body.doing,
-        body.held,
-    )
+    kept: dict[str, Any] = {
+        **{name: getattr(body, name) for name in ("behavior", "doing", "held")},
+        **{"phases": list(track.plan.phases), "cycle_from": track.plan.cycle_from},
+        **{"started_us": track.started_us, "warp": track.warp},
+    }
+    if not isinstance(body, SimVehicle):
+        return _Payload(**kept)
+    counted_us, battery, cruise_m_s = track.counted_us, body.battery, body.cruise_m_s
+    return _Vehicle(**kept, counted_us=counted_us, battery=battery, cruise_m_s=cruise_m_s)
 
 
 def _behavior_record(execution: Execution) -> _Behavior:
@@ -362,12 +338,10 @@ class Memory:
                 del self.executions[oldest]
 
     def note(self, effect: Effect) -> None:
-        """Remember an effect."""
         self.effects.append(effect)
         self._unsaved.append(effect)
 
     def note_of(self, execution: Execution, kind: EffectKind, now_us: int) -> None:
-        """Remember an effect of a behavior."""
         self.note(Effect(now_us, kind, execution.resources[0], execution.id))
 
     def save(self, execution: Execution | None, *bodies: Body) -> None:

@@ -274,7 +274,6 @@ class Track(Generic[S]):
         self._counted_work = plan.work(self._counted_tau)
 
     def at(self, now_us: int) -> S:
-        """Where the body is."""
         tau, rate = self.warp.at(now_us)
         found = self.plan.at(tau)
         return found if rate == 1.0 else found.slowed(rate)

@@ -58,11 +58,9 @@ class SimVehicle:
         self.track = Track(Plan([Stand(pose.place, pose.yaw, 0.0, 0.0)]), then_us)
 
     def pose(self, now_us: int) -> Pose:
-        """Where it is, and how it moves."""
         return self.track.at(now_us)
 
     def craft(self, now_us: int) -> Craft:
-        """As a manoeuvre sees it."""
         return Craft(
             self.id, self.domain, self.kinematics, self.pose(now_us), self.cruise_m_s, self.home
         )
@@ -119,7 +117,6 @@ class SimVehicle:
         self.track.count_from(now_us)
 
     def aloft(self, now_us: int) -> bool:
-        """Whether it flies."""
         return self.domain == "air" and self._is_aloft(self.pose(now_us))
 
     def _is_aloft(self, pose: Pose) -> bool:
@@ -163,7 +160,6 @@ class SimVehicle:
         return high
 
     def state(self, now_us: int, frame: FlatFrame) -> VehicleState:
-        """What it says about itself."""
         pose = self.pose(now_us)
         aloft = self._is_aloft(pose)
         battery = max(0.0, self._battery(now_us, aloft=aloft) - self.spare)

@@ -95,15 +95,9 @@ class Teams:
         self, behaviors: Sequence[BehaviorId], resources: Sequence[ResourceId]
     ) -> tuple[BehaviorId, ...]:
         """Return the behaviors to preempt, with the parts of theirs that resources carry out."""
-        parts = []
-        for name in behaviors:
-            behavior = self._behaviors.get(name)
-            if behavior is not None:
-                parts += [
-                    member.part
-                    for member in behavior.members.values()
-                    if member.id in resources and member.active
-                ]
+        teams = (self._behaviors[name] for name in behaviors if name in self._behaviors)
+        members = (each for team in teams for each in team.members.values())
+        parts = [each.part for each in members if each.id in resources and each.active]
         return (*behaviors, *parts)
 
     # --- the protocol ---------------------------------------------------------------------------
@@ -112,7 +106,6 @@ class Teams:
         """Do nothing: the members have arbiters of their own."""
 
     async def start(self, request: BehaviorRequest) -> None:
-        """Start a team behavior."""
         await self._situation.until_seen(request, self._context.clock)
         made: list[TeamPlan] = []
 
@@ -137,7 +130,6 @@ class Teams:
         behavior.start()
 
     async def cancel(self, behavior: BehaviorId, epoch: int) -> None:
-        """End a team behavior."""
         remains = self._remains.pop(behavior, None)
         if remains is not None:
             self._ledger.adopt(behavior, remains.request.resources, remains.kept.text())
@@ -194,11 +186,9 @@ class Teams:
         await (self._behavior_of(resource) or self._arbiter_of(resource)).resume(resource)
 
     def reports(self) -> AsyncIterator[BehaviorReport]:
-        """Yield the reports of team behaviors."""
         return self._ledger.reports()
 
     def telemetry(self) -> AsyncIterator[TeamState]:
-        """Yield the states of teams on the march."""
         return self._states.read()
 
     async def close(self) -> None:

@@ -215,16 +215,12 @@ def observe(context: PlanningContext) -> Plan:
     return Plan(tuple(legs), stays=True, duration_s=context.parameters.duration_s)
 
 
-def _reach(
-    ring: Sequence[tuple[float, float]], centre: tuple[float, float], angle_rad: float
-) -> float:
+def _reach(ring: Sequence[Place], centre: Place, angle_rad: float) -> float:
     """Return the distance from the centre to the outermost edge in a direction, in metres."""
-    found = 0.0
-    around = [(east - centre[0], north - centre[1]) for east, north in ring]
-    for (ax, ay), (bx, by) in pairwise(turned(corner, angle_rad) for corner in around):
-        if (ay <= 0) != (by <= 0):
-            found = max(found, ax + (bx - ax) * ay / (ay - by))
-    return found
+    far_m = 2 * max(math.dist(centre, corner) for corner in ring)
+    there = (centre[0] + far_m * math.cos(angle_rad), centre[1] + far_m * math.sin(angle_rad))
+    edge = shapely.LineString([centre, there]).intersection(shapely.LineString(ring))
+    return max((math.dist(centre, each) for each in shapely.get_coordinates(edge)), default=0.0)
 
 
 def escort(context: PlanningContext) -> Plan:

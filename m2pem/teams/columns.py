@@ -143,7 +143,6 @@ def _formed_up(
 
 
 def lane_mates(a: Marcher, b: Marcher, spacing_m: float) -> bool:
-    """Whether two members are in one lane."""
     return abs(a.left_m - b.left_m) < spacing_m / 2
 
 
@@ -203,7 +202,6 @@ class _Way:
         return Marcher(self.member, path, self._back_m, self._left_m, motion, self._fence)
 
     def corners(self, frame: LocalFrame) -> list[LatLon]:
-        """The corners of its lane."""
         return [frame.to_latlon(place[:2]) for place in self.lane.places]
 
     def shorten(self, by_m: float) -> None:

@@ -109,7 +109,6 @@ class FormationController:
 
     @property
     def spacing_m(self) -> float:
-        """The spacing between two members in a row."""
         return self._march.spacing_m
 
     @property

@@ -93,7 +93,6 @@ class Member:
     def begin(
         self, part: str, leg: Leg, epoch: int, preempts: tuple[str, ...], now_us: int
     ) -> None:
-        """Start a part."""
         self.part, self.state, self.native_ref, self.begun_us = part, None, None, now_us
         self.halted = False
         speed = leg.parameters.get("speed")
@@ -139,7 +138,6 @@ class Member:
             self._enqueue(self._go_on)
 
     def cancel(self, epoch: int) -> None:
-        """Cancel its part, once."""
         part = self.part
         if self.active and self._cancelled != part:
             self._cancelled = part

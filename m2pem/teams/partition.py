@@ -64,7 +64,6 @@ class Partition:
 
     @property
     def all_over(self) -> bool:
-        """Whether all shares are done or given up."""
         return all(share.over for share in self._shares.values())
 
     @property
@@ -103,7 +102,6 @@ class Partition:
         return self._plan.shared
 
     def finish(self, part: str) -> None:
-        """Mark a part as succeeded."""
         for share in self._shares.values():
             if share.part == part:
                 share.done = True

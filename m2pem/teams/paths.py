@@ -8,7 +8,7 @@ from itertools import accumulate, chain, pairwise
 from m2pem.geo.fence import Fence
 from m2pem.geo.lazy_imports import shapely
 from m2pem.geo.local_frame import EastNorth
-from m2pem.geo.polyline import EastNorthUp, Polyline, Segment, shifted, trimmed
+from m2pem.geo.polyline import EastNorthUp, Polyline, Segment, bend, shifted, trimmed
 
 SPACING_M = 15.0
 """The default spacing between members."""
@@ -71,9 +71,8 @@ _WRONG_WAY_M = 10.0
 """What a path in the opposite direction seems farther away, to one who looks along it."""
 
 
-_BEND_RADIUS_M, _FARTHEST_MISS_M = 10.0, 3.5
-_SMALLEST_RADIUS_M, _SHARPEST_BEND_RAD = 0.5, math.radians(150)
-"""Vehicles round corners, at most so far from the corner; in sharper ones they turn on the spot."""
+_BEND_RADIUS_M = 10.0
+"""Of vehicles that round corners, at most."""
 
 _BEND_PARTS = 4
 
@@ -161,12 +160,10 @@ def _interpolated(at: float, from_m: Sequence[float], to_m: Sequence[float]) -> 
 def _arc(before: Segment, after: Segment) -> list[EastNorth]:
     """Return the places of the bend between two segments; of none, the corner."""
     turn = math.remainder(after.yaw_rad - before.yaw_rad, math.tau)
-    half = max(1e-6, abs(turn) / 2)
-    radius_m = min(_BEND_RADIUS_M, _FARTHEST_MISS_M / (1 / math.cos(half) - 1))
-    cut_m = min(radius_m * math.tan(half), before.length_m / 2, after.length_m / 2)
-    radius_m = cut_m / math.tan(half)
-    if half > _SHARPEST_BEND_RAD / 2 or radius_m < _SMALLEST_RADIUS_M:
+    found = bend(turn, before.length_m, after.length_m, _BEND_RADIUS_M)
+    if found is None:
         return [after.start]
+    radius_m, cut_m = found
     begin = before.at(before.length_m - cut_m)
     sweeps = [turn * part / _BEND_PARTS for part in range(_BEND_PARTS + 1)]
     return [

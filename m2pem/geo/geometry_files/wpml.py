@@ -35,7 +35,6 @@ _AS_ROUTES = ("", "followWayline")
 
 
 def has_waylines(root: Element) -> bool:
-    """Whether a document is WPML."""
     return next(root.iter("{*}waylineId", "{*}templateType", "{*}executeHeight"), None) is not None
 
 

@@ -91,7 +91,8 @@ def _as_seen(
         return np.empty((0, 3))
     places = camera_pose.place + far[:, None] * (rays @ camera_pose.enu)
     latitude, longitude, _ = pymap3d.ecef2geodetic(*places.T)
-    return places[shapely.contains_xy(region, latitude, longitude)]
+    seen: Vector = places[shapely.contains_xy(region, latitude, longitude)]
+    return seen
 
 
 def _ecef(points: Vector, ground_m: float) -> Vector:
