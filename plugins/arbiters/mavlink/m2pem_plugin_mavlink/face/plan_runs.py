@@ -146,12 +146,14 @@ class PlanRuns:
         areas, problems = read_fence_items(mission_items(items))
         if problems:
             return UNSUPPORTED, str(problems[0])
+        own = {f"{vehicle.resource}.{name}": area for name, area in areas.items()}
+        before = own_areas(vehicle.resource, shown_geometries(self._control))
         try:
-            for name in own_areas(vehicle.resource, shown_geometries(self._control)):
+            # What is not done of it leaves more areas that bound the vehicle, and never fewer.
+            for name, area in own.items():
+                await self._control.set_geometry(name, as_geojson(area), by=by)
+            for name in before.keys() - own.keys():
                 await self._control.delete_geometry(name, by=by)
-            for name, area in areas.items():
-                own = f"{vehicle.resource}.{name}"
-                await self._control.set_geometry(own, as_geojson(area), by=by)
         except M2pemError as error:
             return DENIED, str(error)
         finally:
