@@ -110,7 +110,6 @@ class LostResources:
             if (was := self._out_of_reach(resource)) is not None:
                 self._mark(resource, was.behavior, was.native_ref)
         self._withdraw(resource, reason)
-        self._publish_lost(resource)
 
     def lost_before(
         self, resource: ResourceId, behavior: BehaviorId, native_ref: str | None
@@ -122,7 +121,6 @@ class LostResources:
         self._lost[resource] = _Lost(behavior, is_earlier=True, native_ref=native_ref)
         self._mark(resource, behavior, native_ref)
         self._withdraw(resource, _why_lost(behavior))
-        self._publish_as_before(resource)
 
     def take_up(self, resources: Iterable[ResourceId]) -> None:
         """Withdraw what the marks say that runs which are over have lost."""
@@ -133,13 +131,14 @@ class LostResources:
                 lost = _Lost(mark.behavior, is_earlier=True, native_ref=mark.native_ref)
                 self._lost[resource] = lost
                 self._withdraw(resource, mark.why)
-                self._publish_as_before(resource)
 
     def is_lost_since_before(self, resource: ResourceId) -> bool:
-        """Whether a resource was lost before the executive was started again, and was not received
-        since then."""
+        """Whether a resource was lost before the executive was started again, was not received
+        since then, and does nothing for a run that was resumed."""
         lost = self._lost.get(resource)
-        return lost is not None and lost.is_earlier and resource not in self._stopping
+        if lost is None or resource in self._stopping:
+            return False
+        return lost.is_earlier and not self._is_commanded(resource)
 
     def epoch_before(self, behavior: BehaviorId) -> int:
         """Return with which epoch the run of a behavior was driven that a lost resource may still
@@ -159,6 +158,7 @@ class LostResources:
         self._silent[resource] = f"lost: {reason}"
         if resource not in self._handover.taken:
             self._availability.withdraw(resource, self._silent[resource])
+        self._publish_lost(resource)
 
     def shown(self, resource: ResourceId) -> str:
         """Return how a resource is that was lost: why it is not free, or that it is held. "": it
@@ -288,14 +288,6 @@ class LostResources:
         else:
             state = replace(state, link=LinkState.LOST, detections=())
         self._bus.publish(self.annotated(state))
-
-    def _publish_as_before(self, resource: ResourceId) -> None:
-        """Publish what was lost before this executive began, unless it was received since then."""
-        state = self._bus.latest(resource)
-        if state is None:
-            self._publish_lost(resource)
-        else:
-            self._bus.publish(self.annotated(state))
 
     def _explain(self, resource: ResourceId, why: str) -> None:
         self._why[resource] = why

@@ -166,3 +166,26 @@ def test_what_a_run_left_that_is_deleted_is_ended(play, journal):
     for story, left in ((before, 0), (after, 1), (at_last, 0)):
         play(story, "ugv1", journal=journal)
         journal.until_marks(left)
+
+
+def test_a_resumed_run_whose_vehicle_is_not_received_loses_it_although_it_was_lost_before(
+    play, journal
+):
+    """The executive died before it had removed the mark of an earlier run."""
+
+    async def before(world: World):
+        await drive(world)
+        await world.clock.sleep(1.0)
+        world.executive.runner("r1").fail(OSError("killed"))
+        await world.clock.sleep(1.0)
+
+    async def after(world: World):
+        world.fake.known["r1.b1"] = BehaviorReport("r1.b1", 2, BehaviorState.RUNNING)
+        await world.executive.resume("r1")
+        return (await world.executive.control.wait("r1")).detail
+
+    play(before, "ugv1", journal=journal)
+    marks = LostMarks(journal.file, journal.identity, fleet("ugv1"))
+    marks.put(UGV1, LostMark("r0.b1", None, 1, "why"))
+    journal.until_marks(1)
+    assert "LINK_LOST" in play(after, "ugv1", journal=journal, watch_links=True)
