@@ -81,6 +81,8 @@ class Expression(Struct, frozen=True, eq=False):
             kind = type(value)
             if kind in _PLAIN or (kind is float and math.isfinite(value)):
                 return value  # type: ignore[no-any-return]
+            if value is None:
+                feel_values.refuse_null()
             result = RULES[self.dialect].result
             return result(value) if result else value
         except ExpressionError as error:
@@ -105,10 +107,10 @@ class Expression(Struct, frozen=True, eq=False):
             value = (self._run or self._prepare())(read)
             if value is True or value is False:
                 return value
-            rules = RULES[self.dialect]
-            if rules.result:
-                value = rules.result(value)
-            return None if value is None else rules.truth(value, "a condition")
+            if value is None:
+                return feel_values.refuse_null()
+            result = self.rules.result
+            return self.rules.truth(result(value) if result else value, "a condition")
         except ExpressionError as error:
             self._explain(error, read)
         except RecursionError:

@@ -285,7 +285,7 @@ def rounded(how: str) -> Callable[..., Decimal | None]:
     def compute(value: FeelValue, scale: FeelValue = 0) -> Decimal | None:
         if scale is None:
             return None
-        places = int(number(scale))
+        places = scale if type(scale) is int else int(number(scale))
         if not _SCALES[0] <= places <= _SCALES[1]:
             raise NoValueError(f"a scale is {_SCALES[0]} to {_SCALES[1]}")
         found = number(value)

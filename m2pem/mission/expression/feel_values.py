@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from datetime import UTC, date, datetime, time, timedelta, timezone
 from decimal import Context, Decimal
 from functools import partial
+from math import isfinite
 from typing import Any, TypeAlias
 
 from m2pem.errors import ExpressionError
@@ -146,9 +147,10 @@ def to_data(value: FeelValue) -> Any:
         return value
     if kind is Decimal:
         double = float(value)
-        if double.is_integer() and value == (whole := int(value)):
+        exact = double if abs(double) < 2**53 else value
+        if double.is_integer() and value == (whole := int(exact)):
             return whole if MIN_INTEGER <= whole <= MAX_INTEGER else double
-        return bounded(double, "the expression")
+        return double if isfinite(double) else bounded(double, "the expression")
     if isinstance(value, list):
         return [to_data(each) for each in value]
     if isinstance(value, dict):
@@ -160,15 +162,10 @@ def to_data(value: FeelValue) -> Any:
     return text(value) if isinstance(value, Range | Closure) else value
 
 
-def result(value: FeelValue) -> Any:
-    """What data holds of the value of an expression.
-
-    Raises:
-        ExpressionError: it is null because an operation had no value, or does not fit into data.
-    """
-    if value is None and (why := _cause.get()):
+def refuse_null() -> None:
+    """Raise ExpressionError where the value of an expression is null as an operation had none."""
+    if why := _cause.get():
         raise ExpressionError(f"it has no value: {why}")
-    return to_data(value)
 
 
 # --- texts ----------------------------------------------------------------------------------------

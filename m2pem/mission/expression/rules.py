@@ -38,7 +38,7 @@ RULES = {
         feel_values.COMPARISONS,
         feel_arithmetic.ARITHMETIC,
         feel_arithmetic.negate,
-        feel_values.result,
+        feel_values.to_data,
         ternary=True,
     ),
     Dialect.JUEL: _JUEL,
