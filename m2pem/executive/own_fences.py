@@ -8,12 +8,14 @@ from m2pem.api.arbiter import BehaviorRequest
 from m2pem.api.behavior_parameters import BehaviorParameters
 from m2pem.api.bus import FleetBus
 from m2pem.api.fence_check import find_breach, known_yaw_rad, stance_on
+from m2pem.api.runs import HandedOver
 from m2pem.api.telemetry import VehicleState
 from m2pem.fleet.fence import own_fences
 from m2pem.geo.fence import Fence
+from m2pem.geo.geojson import parse_geojson
 from m2pem.geo.local_frame import LatLon, offset
 from m2pem.mission.catalogue import ResourceId
-from m2pem.mission.geometry import Area, Geometry, Point, Route
+from m2pem.mission.geometry import Point
 
 ORBIT_RADIUS_M = 30.0
 """Of an `orbit` that does not say it, as far as m2pem's own arbiters choose it."""
@@ -21,19 +23,20 @@ _PLACES = 16
 
 
 class OwnFences:
-    """`geometries` returns what was handed over for all runs."""
+    """`handed_over` returns the geometries that were handed over for all runs."""
 
-    def __init__(self, geometries: Callable[[], Mapping[str, Geometry]], bus: FleetBus) -> None:
-        self._geometries = geometries
+    def __init__(self, handed_over: Callable[[], Mapping[str, HandedOver]], bus: FleetBus) -> None:
+        self._handed_over = handed_over
         self._bus = bus
         self._stance_of = stance_on(bus)
 
     def refusal(self, request: BehaviorRequest) -> str:
         """Return where a behavior would leave the own fence of one of its vehicles; "": nowhere."""
+        starts = tuple(f"{resource}." for resource in request.resources)
         geometries = {
-            name: each
-            for name, each in self._geometries().items()
-            if isinstance(each, Point | Route | Area)
+            name: parse_geojson(each.geometry)
+            for name, each in self._handed_over().items()
+            if name.startswith(starts)
         }
         for resource in request.resources:
             for fence in own_fences(resource, geometries):

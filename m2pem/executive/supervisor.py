@@ -176,7 +176,7 @@ class Supervisor:
             self._post_report,
             self._refused,
             self.ownership,
-            OwnFences(lambda: self.drawings.geometries, bus),
+            OwnFences(lambda: self.drawings.handed_over, bus),
             self._separation,
         )
         self.allocator = Allocator(

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from mavlink_gcs import gateway, ground_station
+from mavlink_gcs import FLEET, gateway, ground_station
 from mavlink_plan_upload import LAND, RETURN, TAKEOFF, WAYPOINT, Item, download, upload
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -274,5 +274,22 @@ def test_a_transfer_survives_lost_repeated_and_late_messages(tmp_path: Path) -> 
             await station.hears("MISSION_ACK", of(ROVER1, type=cancelled))
             await station.told("the upload is given up: item 0 did not come within 8 s")
             assert len(await download(other, ROVER1)) == 3
+
+    asyncio.run(main())
+
+
+def test_a_plan_waits_for_the_approvals_that_the_fleet_asks_for(tmp_path: Path) -> None:
+    async def main() -> None:
+        fleet = FLEET + "approval: {persons: 1}\n"
+        async with (
+            gateway(tmp_path, fleet=fleet, commands="all") as (control, port),
+            ground_station(port) as station,
+        ):
+            await station.hears("HEARTBEAT", of(ROVER1))
+            assert await upload(station, ROVER1, [Item(WAYPOINT, A)]) == 0
+            result = await station.command(ROVER1, START)
+            assert result == dialect.MAV_RESULT_TEMPORARILY_REJECTED
+            await station.told("MISSION_START", "approv")
+            assert not await control.runs()
 
     asyncio.run(main())

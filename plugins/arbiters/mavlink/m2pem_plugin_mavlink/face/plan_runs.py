@@ -98,6 +98,7 @@ class PlanRuns:
             warnings.append(f"{_where(task.items)}: it has no camera: the pictures are left out")
             tasks.remove(task)
         plan = UploadedPlan(items, tasks)
+        self.restore_fence(vehicle)  # operators may have changed it
         if tasks:
             try:
                 reason = self._misfit(vehicle, tasks) or await self._findings(vehicle, plan)
@@ -146,14 +147,14 @@ class PlanRuns:
         areas, problems = read_fence_items(mission_items(items))
         if problems:
             return UNSUPPORTED, str(problems[0])
-        own = {f"{vehicle.resource}.{name}": area for name, area in areas.items()}
-        before = own_areas(vehicle.resource, shown_geometries(self._control))
+        new = {f"{vehicle.resource}.{name}": area for name, area in areas.items()}
         try:
-            # What is not done of it leaves more areas that bound the vehicle, and never fewer.
-            for name, area in own.items():
+            # The old ones go last: a fault between leaves the vehicle less room, not more.
+            for name, area in new.items():
                 await self._control.set_geometry(name, as_geojson(area), by=by)
-            for name in before.keys() - own.keys():
-                await self._control.delete_geometry(name, by=by)
+            for name in own_areas(vehicle.resource, shown_geometries(self._control)):
+                if name not in new:
+                    await self._control.delete_geometry(name, by=by)
         except M2pemError as error:
             return DENIED, str(error)
         finally:
