@@ -7,13 +7,15 @@ from pathlib import Path
 from typing import Any
 
 from m2pem_plugin_mavlink.face.face import MavlinkFace
-from mavlink_gcs import FLEET, HOME, gateway, ground_station
+from mavlink_gcs import FLEET, HOME, gateway, ground_station, served, write_fleet
 from mavlink_mavsdk_world import free_port
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from m2pem import load_fleet
 from m2pem.api import LinkState, Route, RunStatus, as_geojson, distance_m
 from m2pem.plugins import PluginManager
 from m2pem.testing import scenarios
+from m2pem.testing.harness import run_executive
 
 ROVER1, UAV1, ROVER2 = 1, 2, 3
 NEAR = (38.1076, -77.3191)
@@ -144,6 +146,50 @@ def test_an_allowed_command_drives_the_rover_and_the_journal_says_who_asked(tmp_
             assert await station.go_to(ROVER2, NEAR) == dialect.MAV_RESULT_DENIED
 
     asyncio.run(main())
+
+
+class SlowControl:
+    """A `MissionControl` that begins no behavior before it is released."""
+
+    def __init__(self, control: Any) -> None:
+        self._control = control
+        self.released = asyncio.Event()
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._control, name)
+
+    async def execute_behavior(self, *args: Any, **named: Any) -> Any:
+        await self.released.wait()
+        return await self._control.execute_behavior(*args, **named)
+
+
+def test_a_command_is_in_progress_only_while_its_result_is_not_known(tmp_path: Path) -> None:
+    """Simple programs take the first acknowledgement for the result."""
+
+    async def main() -> None:
+        port = free_port()
+        fleet = load_fleet(str(write_fleet(tmp_path)))
+        async with run_executive(fleet) as control:
+            slow = SlowControl(control)
+            settings = {"url": f"udpin://127.0.0.1:{port}", "commands": "all"}
+            async with served(slow, **settings), ground_station(port) as station:  # type: ignore[arg-type]
+                await station.hears("HEARTBEAT", lambda each: each.get_srcSystem() == ROVER1)
+                going = asyncio.create_task(station.go_to(ROVER1, NEAR))
+                in_progress = dialect.MAV_RESULT_IN_PROGRESS
+                await station.hears("COMMAND_ACK", lambda each: each.result == in_progress)
+                slow.released.set()
+                assert await going == dialect.MAV_RESULT_ACCEPTED
+                since = len(station.received)
+                # What is refused at once has one answer.
+                assert await station.go_to(UAV1, NEAR, 10.0) == dialect.MAV_RESULT_FAILED
+                answers = [each for each in station.received[since:] if is_answer(each)]
+                assert len(answers) == 1
+
+    asyncio.run(main())
+
+
+def is_answer(message: Any) -> bool:
+    return bool(message.get_type() == "COMMAND_ACK")
 
 
 def test_a_vehicle_is_armed_for_what_follows_and_not_for_ever(tmp_path: Path) -> None:
