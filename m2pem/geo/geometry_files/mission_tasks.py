@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
 from m2pem.findings import Severity
-from m2pem.geo.geojson import GeometryError
+from m2pem.geo.geojson import GeometryError, coordinate
 from m2pem.geo.geometry_files.contents import Contents, FileProblem
 from m2pem.geo.geometry_files.mission_commands import (
     LANDING_SECTION,
@@ -229,7 +229,7 @@ class _Reader:
         self.end_route()
         place: Coordinate | None = None
         if latitude and longitude:
-            place = latitude, longitude, altitude
+            place = coordinate(latitude, longitude, altitude, item.where)
         elif self._place is not None:
             place = self._place[0]
         if place is None:
@@ -248,7 +248,8 @@ class _Reader:
                 near = max(abs(here[0] - latitude), abs(here[1] - longitude)) < _SAME_PLACE_DEG
             if self._place is None or not near:
                 self.end_route()
-                point = Point((latitude, longitude, altitude), frame)
+                place = coordinate(latitude, longitude, altitude, item.where)
+                point = Point(place, frame)
                 self._do("goto", [item.number], target=point)
         self._end("land", item, title)
 

@@ -87,6 +87,8 @@ def test_what_a_route_has_no_place_for_is_a_task_between_two() -> None:
         ([item(0, 16, (98.0, 1.0, 2.0))], "item 0: MAV_CMD_NAV_WAYPOINT: latitude 98"),
         ([item(0, 16, A, goes_on=False)], "item 0: it does not go on by itself"),
         ([item(0, 18, A, (1.0, 0.0, -9.0, 0.0))], "item 0: circles need a radius above 0"),
+        ([item(0, 18, (98.0, 1.0, 2.0), (1.0, 0.0, 9.0, 0.0))], "item 0: MAV_CMD_NAV_LOITER_TURNS"),
+        ([item(0, 21, (98.0, 1.0, 2.0))], "item 0: MAV_CMD_NAV_LAND: latitude 98"),
         ([item(0, 31, A)], "item 0: MAV_CMD_NAV_LOITER_TO_ALT cannot be carried out"),
         ([item(0, 61, A)], "item 0: MAV_CMD_61, which is not known, cannot"),
     ],

@@ -3,6 +3,7 @@ after the other (https://mavlink.io/en/services/mission.html).
 """
 
 import asyncio
+import logging
 import math
 from collections.abc import Awaitable, Callable, Coroutine, Sequence
 from dataclasses import dataclass, field
@@ -14,6 +15,8 @@ from m2pem.api import MissionItem
 from m2pem_plugin_mavlink.face.plan_messages import plan_id
 from m2pem_plugin_mavlink.face.requests import Request, Say, acknowledge_plan
 from m2pem_plugin_mavlink.protocol.messages import Message, message_type
+
+_logger = logging.getLogger(__name__)
 
 MOST_ITEMS = 1_000
 REQUEST_EVERY_S = 1.0
@@ -131,7 +134,11 @@ class Uploads:
                     item = f"item {len(transfer.items)} did not come within {GIVEN_UP_S:g} s"
                     self._say(request.station, request.vehicle, f"the upload is given up: {item}")
                     return
-            result, reason = await self._store(request, transfer.type, transfer.items)
+            try:
+                result, reason = await self._store(request, transfer.type, transfer.items)
+            except Exception:
+                _logger.exception("an upload of %s", request.station.name)
+                result, reason = dialect.MAV_MISSION_ERROR, "it was not checked: see m2pem's log"
             id_ = plan_id(transfer.items) if result == dialect.MAV_MISSION_ACCEPTED else 0
             acknowledge_plan(request, result, transfer.type, id_)
             if reason:
