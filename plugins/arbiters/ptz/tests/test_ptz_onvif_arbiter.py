@@ -176,6 +176,8 @@ async def test_a_camera_that_reports_where_it_will_be_is_there_when_it_rests(tmp
 
 @on_loopback
 async def test_two_seconds_of_server_errors_are_no_lost_link(tmp_path, monkeypatch):
+    """The answer is a text: for it, zeep 4.3.3 raises AttributeError, not TransportError."""
+
     def fails(_):
         raise web.HTTPInternalServerError
 

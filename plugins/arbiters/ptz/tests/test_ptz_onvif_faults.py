@@ -54,6 +54,7 @@ async def test_a_camera_that_reboots_with_another_clock_is_taken_up_again(tmp_pa
 async def test_a_camera_with_another_clock_that_checks_every_token_is_taken_up(
     tmp_path, monkeypatch
 ):
+    """onvif-zeep-async 4.3.0 forgets the camera's clock before it asks GetServices."""
     monkeypatch.setattr(device, "FREE", frozenset({"GetSystemDateAndTime"}))
     wrong = camera(account=ACCOUNT, skew_s=7200.0)
     async with wrong as server, driven(server, tmp_path) as bench:
