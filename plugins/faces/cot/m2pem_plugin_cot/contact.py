@@ -6,7 +6,9 @@ write to each other in a room does not.
 """
 
 import logging
+import math
 import platform
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -21,24 +23,23 @@ log = logging.getLogger("m2pem.cot")
 CONTACT_EVERY_S = 10.0
 EVERY_ROOM = "All Chat Rooms"
 MAX_TEXT = 2000
+READ_WITHIN_S = 2.0
+"""A word that comes sooner may be the answer to the question before."""
 
 
 @dataclass(frozen=True, slots=True)
 class Contact:
-    """As others see m2pem. `team`: a color of TAK; `chat`: whether prompts are sent as chat."""
+    """As others see m2pem. `chat`: whether prompts are sent as chat."""
 
     uid: str
     callsign: str
-    team: str
     chat: bool
 
     def event(self, origin: tuple[float, float, float], now_us: int) -> bytes:
         """Return the event by which a server and other contacts know it."""
         device = platform.node() or "host"
         software = ("m2pem", version("m2pem"), platform.system(), device)
-        return contact_event(
-            self.uid, self.callsign, self.team, software, origin, now_us, 3 * CONTACT_EVERY_S
-        )
+        return contact_event(self.uid, self.callsign, software, origin, now_us, 3 * CONTACT_EVERY_S)
 
     def is_meant(self, received: Received) -> bool:
         """Whether an event is for everyone, or for this contact among others."""
@@ -58,14 +59,17 @@ class Chat:
         self._control, self._contact = control, contact
         self._send, self._now_us = send, now_us
         self._number = 0
+        self._since_s: dict[tuple[str, str], float] = {}
 
     async def follow(self) -> None:
         """Send each prompt that opens, and how it was closed."""
         async for event in self._control.subscribe():
             match event:
                 case OpenPrompt():
+                    self._since_s[event.run, event.prompt] = time.monotonic()
                     self._say(_asked(event))
                 case PromptClosed(run, prompt, decision, by):
+                    self._since_s.pop((run, prompt), None)
                     how = f"{decision} ({by or 'no name'})" if decision else "withdrawn"
                     self._say(f"{run} {prompt}: {how}")
 
@@ -89,20 +93,21 @@ class Chat:
         Raises:
             ValueError: it is none, or may be one of several.
         """
-        found = []
-        words = _folded(text)
-        for prompt in self._control.prompts():
-            for each in prompt.decisions:
-                for said in {_folded(each.label), _folded(each.value)}:
-                    if words in (said, f"{_folded(_name(prompt))} {said}"):
-                        found.append((prompt, each.value))
-        if len({prompt for prompt, _ in found}) > 1:
+        words, prompts = _folded(text), self._control.prompts()
+        choices = [(prompt, each) for prompt in prompts for each in prompt.decisions]
+        named = [(p, d) for p, d in choices if words == _folded(f"{_name(p)} {d.label or d.value}")]
+        found = named or [(p, d) for p, d in choices if words == _folded(d.label or d.value)]
+        if len(found) > 1:
             names = ", ".join(f"{_name(prompt)} {words}" for prompt, _ in found)
             raise ValueError(f"{printable(text)!r} may answer several questions; write: {names}")
         if not found:
-            asked = "; ".join(map(_asked, self._control.prompts())) or "nothing is asked now"
+            asked = "; ".join(map(_asked, prompts)) or "nothing is asked now"
             raise ValueError(f"{printable(text)!r} is no answer: {asked}")
-        return found[0]
+        prompt, decision = found[0]
+        open_s = time.monotonic() - self._since_s.get((prompt.run, prompt.prompt), math.inf)
+        if not named and open_s < READ_WITHIN_S:
+            raise ValueError(f"{printable(text)!r} may be meant for another: {_asked(prompt)}")
+        return prompt, decision.value
 
     def _say(self, text: str, to: tuple[str, str] = (EVERY_ROOM, EVERY_ROOM)) -> None:
         self._number += 1

@@ -99,7 +99,6 @@ def deletion_event(uid: str, now_us: int) -> bytes:
 def contact_event(
     uid: str,
     callsign: str,
-    team: str,
     software: tuple[str, str, str, str],
     at: tuple[float, float, float],
     now_us: int,
@@ -113,7 +112,7 @@ def contact_event(
     # The address by which a server sends to it over its connection.
     _add(detail, "contact", callsign=callsign, endpoint="*:-1:stcp")
     _add(detail, "uid", Droid=callsign)
-    _add(detail, "__group", name=team, role="HQ")
+    _add(detail, "__group", name="Cyan", role="HQ")
     return etree.tostring(event)
 
 

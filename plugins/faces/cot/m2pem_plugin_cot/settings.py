@@ -15,11 +15,7 @@ from m2pem_plugin_cot.received import MAX_NAME
 SCHEMES = ("udp", "tcp", "tls")
 KNOWN = (
     *("url", "listen", "interface", "rate", "stale", "types", "receive", "tls"),
-    *("callsign", "team", "chat"),
-)
-TEAMS = (
-    *("White", "Yellow", "Orange", "Magenta", "Red", "Maroon", "Purple", "Dark Blue", "Blue"),
-    *("Cyan", "Teal", "Green", "Dark Green", "Brown"),
+    *("callsign", "chat"),
 )
 TYPE = re.compile(r"[a-z](-[A-Za-z0-9.]+)+")
 
@@ -95,16 +91,13 @@ def read_settings(given: FaceSettings, fleet: Fleet) -> Settings:
 
 def _contact(given: FaceSettings, fleet: Fleet, url: Address) -> Contact | None:
     callsign, chat = given.text("callsign", ""), given.flag("chat", False)
-    team = given.text("team", "Cyan")
-    if team not in TEAMS:
-        raise given.error("team", f"{team!r} is no team of TAK: {', '.join(TEAMS)}")
     if chat and not callsign:
         raise given.error("chat", "it needs a `callsign`: answers are sent to a contact")
     if chat and url.scheme != "tls":
         raise given.error("chat", "it needs a tls:// url: over UDP and TCP anyone could answer")
     if callsign and not (callsign.isprintable() and len(callsign) <= MAX_NAME):
         raise given.error("callsign", f"{callsign!r} is no callsign: at most {MAX_NAME} characters")
-    return Contact(f"m2pem.{fleet.name}.contact", callsign, team, chat) if callsign else None
+    return Contact(f"m2pem.{fleet.name}.contact", callsign, chat) if callsign else None
 
 
 def _address(given: FaceSettings, key: str, schemes: tuple[str, ...]) -> Address | None:
