@@ -276,3 +276,25 @@ def test_members_abreast_have_no_gap_and_are_off_their_own_lanes() -> None:
     assert other.gap_m is None
     assert other.along_m == pytest.approx(-2.0, abs=0.1)
     assert other.aside_m == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_member_slows_down_behind_one_that_says_nothing_for_a_second() -> None:
+    """That one may stand where it was."""
+    field = Field(
+        [(0, 0), (400, 0)], [(-5, 0), (-25, 0)], "column", 20.0, 3.0, frozenset(), 0.0, [1.0, 1.0]
+    )
+    lead, other = field.carts
+    said = [
+        field.controller.step(
+            {
+                lead: MemberPose((min(100.0 + 3.0 * tick * PERIOD_S, heard_m), 0.0), 0.0, 3.0, 0.0),
+                other: MemberPose((78.0 + 3.0 * tick * PERIOD_S, 0.0), 0.0, 3.0, 0.0),
+            }
+        )[other]
+        for heard_m in (math.inf, 100.0)
+        for tick in range(6)
+    ]
+    heard, unheard = said[:6], said[6:]
+    assert min(heard) > 2.5
+    assert min(unheard[:4]) > 1.0
+    assert max(unheard[4:]) < 1.0
