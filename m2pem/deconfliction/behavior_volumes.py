@@ -11,12 +11,7 @@ from dataclasses import replace
 from itertools import pairwise
 
 from m2pem.deconfliction.operational_volume import NOTHING_M, Piece, Volume
-from m2pem.deconfliction.participant import (
-    ANY_HEIGHT,
-    FlightParameters,
-    Span,
-    SurfaceParameters,
-)
+from m2pem.deconfliction.participant import ANY_HEIGHT, FlightParameters, Span, SurfaceParameters
 from m2pem.geo.local_frame import EastNorth
 from m2pem.geo.polygon import Hull, buffered_hull, convex_hull, middle_of
 from m2pem.geo.survey_tracks import SURVEY_SPACING_M

@@ -11,13 +11,7 @@ from dataclasses import dataclass, field, replace
 from m2pem.api.arbiter import BehaviorId, BehaviorRequest
 from m2pem.api.telemetry import LinkState, VehicleState
 from m2pem.deconfliction.behavior_volumes import volume_of
-from m2pem.deconfliction.conflicts import (
-    Again,
-    Conflict,
-    Occupant,
-    Refusal,
-    conflict_text,
-)
+from m2pem.deconfliction.conflicts import Again, Conflict, Occupant, Refusal, conflict_text
 from m2pem.deconfliction.operational_volume import Piece, Separation, Volume, too_near
 from m2pem.deconfliction.participant import (
     FlightParameters,
@@ -291,11 +285,7 @@ class Reservations:
         return self._conflict(request, kind, volumes, occupants)
 
     def _volumes(
-        self,
-        request: BehaviorRequest,
-        kind: BehaviorType,
-        now_us: int,
-        from_m: float | None = None,
+        self, request: BehaviorRequest, kind: BehaviorType, now_us: int, from_m: float | None = None
     ) -> dict[ResourceId, Volume]:
         """`from_m`: the altitude above home that its aircraft have by then; None: the present."""
         volumes = {}

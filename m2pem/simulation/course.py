@@ -300,9 +300,7 @@ class Course:
         radius, angle = math.hypot(east, north), math.atan2(north, east)
         accel, decel = kinematics.acceleration_m_s2, kinematics.deceleration_m_s2
         limit = min(
-            speed_m_s or self._craft.cruise_m_s,
-            self._upwind(),
-            radius * kinematics.turn_rate_rad_s,
+            speed_m_s or self._craft.cruise_m_s, self._upwind(), radius * kinematics.turn_rate_rad_s
         )
         self.turn_to(angle + math.pi / 2)
         if sweep_rad is None and seconds is None:

@@ -4,12 +4,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from m2pem.api.remaining import (
-    RemainingRoute,
-    RemainingSurvey,
-    RemainingWork,
-    raw_parameters,
-)
+from m2pem.api.remaining import RemainingRoute, RemainingSurvey, RemainingWork, raw_parameters
 from m2pem.fleet.behaviors import takeoff_first
 from m2pem.geo.polygon import middle_of
 from m2pem.geo.polyline import Polyline

@@ -31,7 +31,7 @@ from m2pem.simulation.vehicles import SimVehicle, carrier_of
 from m2pem.suggestions import suggest
 
 _EVERYWHERE = (FLOWN - {"change_altitude"}) | {
-    *("hold", "drive_stop", "return_to_launch", "teleop", "set_speed", "deploy"),
+    *("hold", "drive_stop", "return_to_launch", "teleop", "set_speed", "deploy")
 }
 _BY_DOMAIN: Mapping[str, frozenset[str]] = {
     "ground": _EVERYWHERE | {"reverse"},

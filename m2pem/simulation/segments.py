@@ -98,11 +98,7 @@ def chain(
 
     From there one must be able to stop at the end, and before each piece to be as slow as it asks.
     """
-    joints = [
-        v_in,
-        *(min(a, b) for (_, a), (_, b) in pairwise(pieces)),
-        0.0,
-    ]
+    joints = [v_in, *(min(a, b) for (_, a), (_, b) in pairwise(pieces)), 0.0]
     for index, (length, _) in enumerate(pieces):
         joints[index + 1] = min(
             joints[index + 1], math.sqrt(joints[index] ** 2 + 2 * accel * length)
@@ -112,14 +108,7 @@ def chain(
         joints[index] = min(joints[index], math.sqrt(joints[index + 1] ** 2 + 2 * decel * length))
     joints[0] = v_in
     return tuple(
-        fit(
-            length,
-            limit,
-            v_in=joints[index],
-            v_out=joints[index + 1],
-            accel=accel,
-            decel=decel,
-        )
+        fit(length, limit, v_in=joints[index], v_out=joints[index + 1], accel=accel, decel=decel)
         for index, (length, limit) in enumerate(pieces)
     )
 

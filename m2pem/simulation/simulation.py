@@ -337,11 +337,7 @@ class Simulation:
             self._finish(execution, Outcome(BehaviorState.CANCELLED), now_us)
 
     def _finish(
-        self,
-        execution: Execution,
-        outcome: Outcome,
-        now_us: int,
-        keep: Collection[ResourceId] = (),
+        self, execution: Execution, outcome: Outcome, now_us: int, keep: Collection[ResourceId] = ()
     ) -> None:
         """End it; its bodies stop, but those in `keep`: another behavior takes them on the move."""
         if outcome.state is BehaviorState.FAILED:

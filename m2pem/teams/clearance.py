@@ -108,10 +108,7 @@ class _Pair:
             ends_a, ends_b = (np.array(shapely.points(each[:, style])) for each in (a, b))
             i, k = shapely.STRtree(other).query(one, predicate="dwithin", distance=apart_m)
             keys = np.union1d(keys, i * len(b) + k)
-            for step, ends, leg in (
-                (len(b), ends_a[i + 1], other[k]),
-                (1, ends_b[k + 1], one[i]),
-            ):
+            for step, ends, leg in ((len(b), ends_a[i + 1], other[k]), (1, ends_b[k + 1], one[i])):
                 linked = (i * len(b) + k)[shapely.distance(ends, leg) < apart_m]
                 edges.append(np.stack([linked, linked + step], 1))
         links = np.concatenate(edges)

@@ -15,15 +15,7 @@ from m2pem.geo.polyline import EastNorthUp, Polyline, Segment
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.geometry import Route
 from m2pem.teams.clearance import NEAREST_SHARE, Clearance
-from m2pem.teams.paths import (
-    SHAPES,
-    SPACING_M,
-    MemberPath,
-    beside,
-    lane,
-    lead_around,
-    slot,
-)
+from m2pem.teams.paths import SHAPES, SPACING_M, MemberPath, beside, lane, lead_around, slot
 from m2pem.teams.plan import (
     NO_MEETING,
     Leg,
@@ -247,10 +239,7 @@ def _formation(
 
 
 def _ways(
-    context: PlanningContext,
-    route: Route,
-    offsets: Sequence[tuple[float, float]],
-    spacing_m: float,
+    context: PlanningContext, route: Route, offsets: Sequence[tuple[float, float]], spacing_m: float
 ) -> tuple[list[_Way], bool]:
     """Return the members' ways, and whether they set off in their order: where they are in each
     other's ways else.
@@ -272,10 +261,7 @@ def _ways(
 
 
 def _ways_in_order(
-    context: PlanningContext,
-    route: Route,
-    offsets: Sequence[tuple[float, float]],
-    spacing_m: float,
+    context: PlanningContext, route: Route, offsets: Sequence[tuple[float, float]], spacing_m: float
 ) -> list[_Way]:
     """Return ways around those that have not set off, and those that have arrived."""
     ways = _drawn(context, route, offsets)

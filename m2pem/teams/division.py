@@ -77,8 +77,7 @@ def from_nearer_end(
         turned["heading"] = (given.heading_rad + math.pi) % math.tau
     works = [(each, work_of(behavior, each, frame)) for each in (parameters, turned)]
     return min(
-        works,
-        key=lambda each: 0.0 if each[1] is None else _way_m(place, each[1].line.points[0]),
+        works, key=lambda each: 0.0 if each[1] is None else _way_m(place, each[1].line.points[0])
     )[0]
 
 

@@ -18,13 +18,7 @@ from m2pem.mission.catalogue import ResourceId
 from m2pem.teams.clearance import NEAREST_SHARE, Clearance
 from m2pem.teams.columns import GAP_SHARE, lane_mates
 from m2pem.teams.paths import lead_around
-from m2pem.teams.plan import (
-    SOON_S,
-    START_SHARE,
-    March,
-    Marcher,
-    MemberPose,
-)
+from m2pem.teams.plan import SOON_S, START_SHARE, March, Marcher, MemberPose
 
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry

@@ -98,13 +98,7 @@ class Member:
         speed = leg.parameters.get("speed")
         self._speed_m_s = float(speed) if isinstance(speed, int | float) else None
         request = BehaviorRequest(
-            part,
-            epoch,
-            leg.behavior,
-            leg.parameters,
-            (self.id,),
-            {"member": (self.id,)},
-            preempts,
+            part, epoch, leg.behavior, leg.parameters, (self.id,), {"member": (self.id,)}, preempts
         )
 
         async def start() -> None:

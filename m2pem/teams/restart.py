@@ -127,10 +127,7 @@ def _doer(part: str) -> ResourceId:
 
 
 async def _ask(
-    behavior: str,
-    part: str,
-    native_ref: str | None,
-    arbiter_of: Callable[[ResourceId], Arbiter],
+    behavior: str, part: str, native_ref: str | None, arbiter_of: Callable[[ResourceId], Arbiter]
 ) -> BehaviorReport:
     name = f"{behavior}.{part}"
     try:

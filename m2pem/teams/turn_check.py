@@ -62,12 +62,7 @@ def _add_meeting(
     said, remedy, place = turns(context, behavior.name, least_m)
     if said:
         findings.add(
-            "members-meet",
-            said,
-            remedy,
-            line=behavior.line,
-            severity=Severity.WARNING,
-            place=place,
+            "members-meet", said, remedy, line=behavior.line, severity=Severity.WARNING, place=place
         )
 
 
