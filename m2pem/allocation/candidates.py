@@ -124,11 +124,7 @@ class Candidates:
             facts["vehicle.endurance"] = vehicle.endurance_s * battery
         if state.position is not None:
             place = state.position
-            facts["vehicle.position"] = [
-                place.latitude_deg,
-                place.longitude_deg,
-                place.altitude_m,
-            ]
+            facts["vehicle.position"] = [place.latitude_deg, place.longitude_deg, place.altitude_m]
         return facts
 
     def breach(self, resource: ResourceId, place: Place) -> str:

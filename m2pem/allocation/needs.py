@@ -368,13 +368,7 @@ class RoleEvaluator:
         known.used = True
         return known.found
 
-    def _why_not(
-        self,
-        resource: ResourceId,
-        need: Need,
-        group: Group,
-        task: Task,
-    ) -> str:
+    def _why_not(self, resource: ResourceId, need: Need, group: Group, task: Task) -> str:
         """Return why a resource cannot fill a role now; "": it can."""
         fleet, graph, behavior = self.candidates.fleet, self.candidates.graph, task.behavior
         if reason := unfit(fleet, graph, behavior.name, behavior.type, resource):

@@ -21,12 +21,7 @@ from m2pem.fleet.task_findings import TaskFindings
 from m2pem.geo.positions import NO_ORIGIN, geometry_out_of_reach
 from m2pem.mission.behavior import Behavior, BehaviorType, Role, RoleKind, ServiceCall
 from m2pem.mission.catalogue import BehaviorSpec, ParameterKind, ResourceId
-from m2pem.mission.elements import (
-    Activity,
-    ScriptTask,
-    SendTask,
-    ServiceTask,
-)
+from m2pem.mission.elements import Activity, ScriptTask, SendTask, ServiceTask
 from m2pem.mission.mission import Mission
 from m2pem.suggestions import did_you_mean, suggest
 from m2pem.units import Dimension, UnitError, article, quantity
@@ -171,10 +166,7 @@ FAST = 5
 
 
 def check_mission(
-    mission: Mission,
-    fleet: Fleet,
-    catalogue: Catalogue,
-    handed_over: Container[str] = (),
+    mission: Mission, fleet: Fleet, catalogue: Catalogue, handed_over: Container[str] = ()
 ) -> list[Finding]:
     """Everything about a mission's roles, behaviors and parameters that does not fit the fleet.
 

@@ -210,12 +210,7 @@ def _check_loss(
         return
     text = f"onLoss='reassign', and {why}"
     findings.add(
-        "no-other",
-        text,
-        remedy,
-        line=role.line,
-        role=role.name,
-        severity=Severity.WARNING,
+        "no-other", text, remedy, line=role.line, role=role.name, severity=Severity.WARNING
     )
 
 

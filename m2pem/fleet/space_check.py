@@ -17,10 +17,7 @@ COLUMNS = frozenset({"road_following_formation"})
 
 
 def check_space(
-    behavior: Behavior,
-    fleet: Fleet,
-    geometries: Mapping[str, Geometry],
-    findings: TaskFindings,
+    behavior: Behavior, fleet: Fleet, geometries: Mapping[str, Geometry], findings: TaskFindings
 ) -> None:
     """Check that a team has a place for each member in the shared spaces of its route or area.
 

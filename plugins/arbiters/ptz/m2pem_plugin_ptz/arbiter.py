@@ -25,12 +25,7 @@ from m2pem.api.unit_arbiter import UnitArbiter
 from m2pem_plugin_ptz.catalogue import offered
 from m2pem_plugin_ptz.checkpoint import Checkpoint, decode_checkpoint, encode_checkpoint
 from m2pem_plugin_ptz.drivers import make_driver as _make_driver
-from m2pem_plugin_ptz.drivers.driver import (
-    FOUND_WITHIN_S,
-    CameraDriver,
-    Discovering,
-    DriverSetup,
-)
+from m2pem_plugin_ptz.drivers.driver import FOUND_WITHIN_S, CameraDriver, Discovering, DriverSetup
 from m2pem_plugin_ptz.settings import read_settings
 
 if TYPE_CHECKING:

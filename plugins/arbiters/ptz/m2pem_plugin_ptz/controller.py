@@ -10,12 +10,7 @@ from dataclasses import dataclass
 
 from m2pem.api import BehaviorId, BehaviorState, BehaviorTracker, LatestTask, Limits
 from m2pem.api.latest_task import cancel_and_wait
-from m2pem_plugin_ptz.behaviors.behavior import (
-    LEAST_SHARE,
-    REPORTED_SHARE,
-    TICK_S,
-    Behavior,
-)
+from m2pem_plugin_ptz.behaviors.behavior import LEAST_SHARE, REPORTED_SHARE, TICK_S, Behavior
 from m2pem_plugin_ptz.camera_model.model import CameraModel
 from m2pem_plugin_ptz.drivers.driver import FOUND_WITHIN_S, CameraError, Discovering
 

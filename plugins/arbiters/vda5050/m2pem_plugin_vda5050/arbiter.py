@@ -236,11 +236,7 @@ class Vda5050Arbiter(UnitArbiter[Vehicle]):
         return unknown
 
     async def _query(
-        self,
-        vehicle: Vehicle,
-        behavior: BehaviorId,
-        checkpoint: Checkpoint,
-        reference: str | None,
+        self, vehicle: Vehicle, behavior: BehaviorId, checkpoint: Checkpoint, reference: str | None
     ) -> BehaviorReport:
         """Ask the state of the vehicle. There is no `await` between it and `adopt`, so that no end
         of the behavior is missed."""

@@ -11,13 +11,7 @@ from urllib.parse import urlsplit
 from m2pem.api import Connection, ConnectionReader, Dimension, ResourceId
 from m2pem.errors import PluginError
 from m2pem_plugin_vda5050.catalogue import OwnBehavior, read_own_behaviors
-from m2pem_plugin_vda5050.messages import (
-    SPOKEN,
-    Factsheet,
-    MessageError,
-    decode,
-    other_version,
-)
+from m2pem_plugin_vda5050.messages import SPOKEN, Factsheet, MessageError, decode, other_version
 
 ARBITER = "vda5050"
 DOMAINS = ("ground",)

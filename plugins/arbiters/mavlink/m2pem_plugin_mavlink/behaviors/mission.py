@@ -73,9 +73,7 @@ def fingerprint(items: Sequence[MissionItem]) -> Fingerprint:
         for item in placed
     )
     return Fingerprint(
-        len(placed),
-        zlib.crc32(lines.encode()),
-        sum(item.altitude_m for item in placed),
+        len(placed), zlib.crc32(lines.encode()), sum(item.altitude_m for item in placed)
     )
 
 

@@ -84,12 +84,7 @@ _COPTER_GCS = _Setting(
 _COPTER_RC = _Setting(
     ("FS_THR_ENABLE",),
     {RETURN: (1, 4, 6), LAND: (3,), HOLD: (7,)},
-    {
-        **_COPTER_ACTIONS,
-        3: "land",
-        4: "SmartRTL, else return to launch",
-        5: "SmartRTL, else land",
-    },
+    {**_COPTER_ACTIONS, 3: "land", 4: "SmartRTL, else return to launch", 5: "SmartRTL, else land"},
 )
 """On loss of the remote control. Its numbers are not those of FS_GCS_ENABLE."""
 _PLANE_ENABLE = _Setting(

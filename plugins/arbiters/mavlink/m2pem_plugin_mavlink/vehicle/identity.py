@@ -54,8 +54,7 @@ _KINDS = {
     ),
     dialect.MAV_TYPE_FIXED_WING: Kind.PLANE,
     **dict.fromkeys(
-        range(dialect.MAV_TYPE_VTOL_DUOROTOR, dialect.MAV_TYPE_VTOL_RESERVED5 + 1),
-        Kind.VTOL,
+        range(dialect.MAV_TYPE_VTOL_DUOROTOR, dialect.MAV_TYPE_VTOL_RESERVED5 + 1), Kind.VTOL
     ),
     dialect.MAV_TYPE_GROUND_ROVER: Kind.ROVER,
     dialect.MAV_TYPE_SURFACE_BOAT: Kind.BOAT,

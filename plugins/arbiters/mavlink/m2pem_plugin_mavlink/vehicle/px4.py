@@ -96,8 +96,7 @@ class Px4Driver(Autopilot):
             math.nan if place.heading_rad is None else place.heading_rad,
         )
         await self._by_command(
-            "AUTO.LOITER",
-            lambda: self.command(dialect.MAV_CMD_DO_REPOSITION, *params, place=at),
+            "AUTO.LOITER", lambda: self.command(dialect.MAV_CMD_DO_REPOSITION, *params, place=at)
         )
 
     async def orbit(self, center: TargetPosition, radius_m: float, speed_m_s: float | None) -> bool:

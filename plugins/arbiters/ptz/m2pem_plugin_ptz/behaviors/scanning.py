@@ -8,11 +8,7 @@ import pymap3d
 from numpy.typing import NDArray
 
 from m2pem.api import Area, Value, convex_hull, raw_parameters
-from m2pem_plugin_ptz.behaviors.behavior import (
-    REPORTED_SHARE,
-    BehaviorContext,
-    BehaviorFailedError,
-)
+from m2pem_plugin_ptz.behaviors.behavior import REPORTED_SHARE, BehaviorContext, BehaviorFailedError
 from m2pem_plugin_ptz.behaviors.pointing import THERE_RAD, Pointing
 from m2pem_plugin_ptz.camera_model.coverage import next_row, points_in_area
 from m2pem_plugin_ptz.camera_model.field_of_view import FieldOfView, visible

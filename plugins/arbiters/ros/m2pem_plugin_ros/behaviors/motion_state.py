@@ -118,10 +118,7 @@ def position_of(pose: Pose) -> Place:
 
 def point_beyond(place: Place, yaw_rad: float, distance_m: float) -> Place:
     """Return the position at a distance in a direction."""
-    return (
-        place[0] + distance_m * math.cos(yaw_rad),
-        place[1] + distance_m * math.sin(yaw_rad),
-    )
+    return (place[0] + distance_m * math.cos(yaw_rad), place[1] + distance_m * math.sin(yaw_rad))
 
 
 def direction_to(start: Place, end: Place) -> float:

@@ -34,11 +34,7 @@ from m2pem_plugin_vda5050.messages import (
     decode,
 )
 from m2pem_plugin_vda5050.simulator.motion import Chassis, Leg, Motion
-from m2pem_plugin_vda5050.simulator.order_check import (
-    OrderError,
-    check_doable,
-    check_shape,
-)
+from m2pem_plugin_vda5050.simulator.order_check import OrderError, check_doable, check_shape
 
 USED_PER_M = 2e-5
 """Of the battery, as a fraction."""

@@ -12,10 +12,7 @@ _NUMBERS = ("x", "y", "theta", "height", "depth")
 
 def factsheet(spec: AgvSpec, header: dict[str, Any]) -> bytes:
     """Return the message. `header`: its header, by the names of Python."""
-    names = {
-        "header_id": "headerId",
-        "serial_number": "serialNumber",
-    }
+    names = {"header_id": "headerId", "serial_number": "serialNumber"}
     body = {names.get(key, key): value for key, value in header.items()}
     body |= {
         "typeSpecification": {

@@ -151,10 +151,7 @@ def read_settings(connection: Connection) -> RosSettings:
 def _joints(own: ConnectionReader) -> Joints:
     inner = own.inner("joints", "{pan: pan_joint, tilt: tilt_joint}")
     inner.refuse_others(_JOINTS)
-    names = {
-        Axis.PAN: inner.text("pan", "pan_joint"),
-        Axis.TILT: inner.text("tilt", "tilt_joint"),
-    }
+    names = {Axis.PAN: inner.text("pan", "pan_joint"), Axis.TILT: inner.text("tilt", "tilt_joint")}
     if "zoom" in inner.values:
         names[Axis.ZOOM] = inner.text("zoom", "zoom_joint")
     if len(set(names.values())) < len(names):
