@@ -216,5 +216,6 @@ def test_a_member_that_hangs_at_its_start_fails_the_team_and_the_others_have_sto
     (ended, speeds), summary = play(story)
     assert (ended.state, ended.code) == (BehaviorState.FAILED, "REJECTED")
     assert ended.reason.startswith("e: its arbiter did not return within 10 s")
-    assert max(speeds) < 0.1, "at 3.1 m/s, the last one comes to rest at about that time"
+    # They crawl with 0.3 m/s at least, and brake from that within 0.15 s of a cancel.
+    assert max(speeds) < 0.2
     assert summary.status is RunStatus.FAILED
