@@ -108,7 +108,8 @@ class Expression(Struct, frozen=True, eq=False):
             if value is True or value is False:
                 return value
             if value is None:
-                return feel_values.refuse_null()
+                feel_values.refuse_null()
+                return None
             result = self.rules.result
             return self.rules.truth(result(value) if result else value, "a condition")
         except ExpressionError as error:
