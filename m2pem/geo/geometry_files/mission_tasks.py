@@ -48,24 +48,15 @@ class MissionTask:
     of_payload: bool = False
 
     @property
-    def way(self) -> Sequence[Coordinate]:
-        """The places that it leads to, one for each item; empty: it has none."""
-        for value in self.parameters.values():
-            if isinstance(value, Route):
-                return value.waypoints
-            if isinstance(value, Point) and self.behavior == "goto":
-                return (value.position,)
-        return ()
-
-    @property
-    def frames(self) -> Sequence[str]:
-        """The altitude frames of `way`."""
-        for value in self.parameters.values():
-            if isinstance(value, Route):
-                return value.frames
-            if isinstance(value, Point):
-                return (value.altitude_frame,)
-        return ()
+    def places(self) -> list[tuple[Coordinate, str]]:
+        """The places that it leads to with their altitude frames, one for each item; empty: it
+        leads to none."""
+        route, target = self.parameters.get("route"), self.parameters.get("target")
+        if isinstance(route, Route):
+            return list(zip(route.waypoints, route.frames, strict=True))
+        if isinstance(target, Point):
+            return [(target.position, target.altitude_frame)]
+        return []
 
 
 @dataclass(frozen=True, slots=True)

@@ -124,7 +124,7 @@ class PlanRuns:
         way: list[LatLon] = []
         names: list[str] = []
         for task in tasks:
-            for number, place in zip(task.items, task.way, strict=False):
+            for number, (place, _) in zip(task.items, task.places, strict=False):
                 way.append(place[:2])
                 names.append(f"item {number}")
         for fence in vehicle.fences if way else ():
@@ -288,8 +288,7 @@ def _from_here(vehicle: ShownVehicle, tasks: Sequence[MissionTask]) -> Sequence[
         return [climb, *tasks[1:]] if climb.behavior in vehicle.behaviors else tasks[1:]
     if first.behavior == "takeoff":
         return tasks
-    height_m = next((each.way[0][2] for each in tasks if each.way), None)
-    frame = next((each.frames[0] for each in tasks if each.way), "")
+    (*_, height_m), frame = next((each.places[0] for each in tasks if each.places), ((None,), ""))
     known = height_m if frame == "relative" and height_m and height_m > 0 else TAKEOFF_M
     return [MissionTask("takeoff", (), {"altitude": f"{known} m"}), *tasks]
 
