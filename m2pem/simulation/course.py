@@ -151,9 +151,15 @@ def track_of(plan: Plan[Pose]) -> list[tuple[float, float]]:
     """Return the places on the map that a plan passes, with many of a curve."""
     track = []
     for phase in plan.phases:
-        steps = max(1, math.ceil(abs(phase.sweep) / _LOOK_RAD)) if isinstance(phase, Curve) else 1
-        times = (phase.duration_s * step / steps if step else 0.0 for step in range(steps))
-        track += [phase.at(time_s).place[:2] for time_s in times]
+        if not isinstance(phase, Curve):
+            track.append(phase.at(0.0).place[:2])
+            continue
+        # Every turn of a circle is the same: one is looked at, and what goes beyond whole turns.
+        sweep, turn = abs(phase.sweep), math.tau
+        looked_rad = sweep if sweep <= turn else turn + sweep % turn
+        steps = max(1, math.ceil(looked_rad / _LOOK_RAD))
+        step_rad = math.copysign(looked_rad / steps, phase.sweep)
+        track += [phase.place(step * step_rad) for step in range(steps)]
     return [*track, plan.phases[-1].at(plan.phases[-1].duration_s).place[:2]]
 
 

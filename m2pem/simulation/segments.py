@@ -201,6 +201,12 @@ class Curve(msgspec.Struct, frozen=True, tag=True):
     def duration_s(self) -> float:
         return self.profile.duration_s
 
+    def place(self, sweep: float) -> tuple[float, float]:
+        """Return the place on the map when a part of the sweep is done, in rad."""
+        angle = self.angle + sweep
+        east = self.centre[0] + self.radius * math.cos(angle)
+        return east, self.centre[1] + self.radius * math.sin(angle)
+
     def at(self, t: float) -> Pose:
         gone, speed = self.profile.at(t)
         length = self.profile.length
@@ -209,11 +215,7 @@ class Curve(msgspec.Struct, frozen=True, tag=True):
         yaw = angle + math.copysign(math.pi / 2, self.sweep)
         level = speed * self.radius * abs(self.sweep) / length
         return Pose(
-            (
-                self.centre[0] + self.radius * math.cos(angle),
-                self.centre[1] + self.radius * math.sin(angle),
-                self.up + self.climb * part,
-            ),
+            (*self.place(self.sweep * part), self.up + self.climb * part),
             yaw,
             (level * math.cos(yaw), level * math.sin(yaw), speed * self.climb / length),
         )

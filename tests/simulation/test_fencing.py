@@ -115,6 +115,11 @@ YARD = SQUARE.difference(POND)
             "between waypoint 3 of the route and waypoint 1 of the route",
         ),
         ("orbit", {"target": Point(place(30, 100)), "radius": 40.0}, "its way leaves"),
+        (
+            "orbit",
+            {"target": Point(place(30, 100)), "radius": 40.0, "turns": 10_000.5},
+            "its way leaves",
+        ),
         ("area_survey", {"area": area(shapely.box(20, 20, 195, 50)), "overshoot": 20.0}, "its way"),
         ("area_observe", {"area": area(shapely.box(190, 90, 199, 110)), "duration": 60.0}, "way"),
         ("reverse", {"distance": 120.0}, "the place behind it, ["),

@@ -30,8 +30,6 @@ _PICTURES = 2000
 NAV_LAND and NAV_VTOL_LAND, NAV_TAKEOFF and NAV_VTOL_TAKEOFF, IMAGE_START_CAPTURE."""
 
 _SAME_PLACE_DEG = 1e-6
-MOST_TURNS = 20
-"""To check a way against fences takes longer by the square of its turns."""
 _FRAME_NUMBERS = {"amsl": 0, "relative": 3, "terrain": 10}
 """MAV_FRAME."""
 
@@ -213,8 +211,8 @@ class _Reader:
     def _circle(self, item: MissionItem) -> None:
         turns, _, radius_m = item.params[:3]
         latitude, longitude, altitude = item.params[4:]
-        if not turns or not 0 < turns <= MOST_TURNS:
-            raise GeometryError(f"circles need a number of turns up to {MOST_TURNS} (parameter 1)")
+        if not turns or turns < 0:
+            raise GeometryError("circles need a number of turns above 0 (parameter 1)")
         if not radius_m or radius_m < 0:
             raise GeometryError("circles need a radius above 0 (parameter 3): clockwise")
         self.end_route()

@@ -32,9 +32,8 @@ _FRAMES: Mapping[int, str] = {
 POSITION_IGNORED = 1 | 2 | 4
 """POSITION_TARGET_TYPEMASK of the three coordinates."""
 
-ENDLESS_TURNS, MOST_TURNS = 10.0, 20.0
-"""Of DO_ORBIT without a number of turns, which autopilots circle until another command; and of one
-with them: to check a way against fences takes longer by the square of its turns."""
+ENDLESS_TURNS = 1_000.0
+"""Of DO_ORBIT without a number of turns, which autopilots circle until another command."""
 
 YAW_LOCK = 16
 """GIMBAL_MANAGER_FLAGS: the yaw is from north."""
@@ -216,8 +215,8 @@ def _orbit(command: Command, vehicle: ShownVehicle) -> Order:
         parameters["speed"] = f"{speed} m/s"
     endless = not math.isfinite(turned_rad) or turned_rad == 0
     turns = ENDLESS_TURNS if endless else turned_rad / math.tau
-    if not 0 < turns <= MOST_TURNS:
-        raise RefusedCommandError(f"DO_ORBIT needs a number of turns up to {MOST_TURNS:g}")
+    if turns < 0:
+        raise RefusedCommandError("DO_ORBIT needs a number of turns above 0")
     parameters["turns"] = turns
     return Order(vehicle.resource, "orbit", parameters)
 
