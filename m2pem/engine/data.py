@@ -14,7 +14,7 @@ from m2pem.mission.elements import Activity, Process
 from m2pem.mission.expression.temporal import NOW
 from m2pem.mission.loops import INSTANCE_COUNTS, LOOP_COUNTER
 from m2pem.mission.timers import date_text
-from m2pem.mission.values import ReadValue, Value
+from m2pem.mission.values import ReadValue, Value, value_within
 
 Store: TypeAlias = TokenOrScope | DataStores
 """What holds values."""
@@ -128,20 +128,12 @@ def _entry_of_map(context: TokenOrScope, name: str) -> Value:
         for each in _outwards(context):
             value = _value(each, head) if _holds(each, head) else None
             if isinstance(value, dict):
-                return _descend(value, tail)
+                return value_within(value, tail)
             if _declares(each, head):
                 break
         head, dot, rest = head.rpartition(".")
         tail = f"{rest}.{tail}"
     return None
-
-
-def _descend(value: Value, path: str) -> Value:
-    for key in path.split("."):
-        if not isinstance(value, dict):
-            return None
-        value = value.get(key)
-    return value
 
 
 def store_for(context: TokenOrScope, key: str) -> Store:

@@ -9,6 +9,7 @@ import re
 from m2pem.errors import ExpressionSyntaxError
 from m2pem.mission.behavior import Assignment, Script, ThrowError
 from m2pem.mission.expression import Dialect, parse
+from m2pem.mission.expression.dialect import outside_quotes
 from m2pem.mission.expression.lexer import scan_name
 from m2pem.mission.expression.literals import shorten
 from m2pem.mission.expression.vocabulary import is_reserved
@@ -16,7 +17,6 @@ from m2pem.mission.expression.vocabulary import is_reserved
 _THROW = re.compile(r"throw\s+error\s+(\S+)")
 _CODE = re.compile(r"[\w.:-]+")
 _FORM = "write 'name = expression' or 'throw error CODE'"
-_QUOTES = "'\""
 
 
 class _StatementError(Exception):
@@ -32,7 +32,7 @@ def parse_script(text: str, line: int = 1) -> tuple[Script, list[tuple[int, str]
     statements: list[Assignment | ThrowError] = []
     problems: list[tuple[int, str]] = []
     for number, content in enumerate(text.replace("\r\n", "\n").split("\n"), line):
-        statement = _without_comment(content).strip()
+        statement = content[: outside_quotes(content, "#")].strip()
         if not statement:
             continue
         try:
@@ -56,24 +56,3 @@ def _statement(text: str, line: int) -> Assignment | ThrowError:
     if is_reserved(key, Dialect.BARE):
         raise _StatementError(f"{key!r} is a word of the language and cannot be a name")
     return Assignment(key, parse(rest[1:].strip(), Dialect.BARE), line)
-
-
-def _without_comment(line: str) -> str:
-    """The line up to a `#` that is not inside a quoted text."""
-    if "#" not in line:
-        return line
-    quote = ""
-    position = 0
-    while position < len(line):
-        character = line[position]
-        if quote:
-            if character == "\\":
-                position += 1
-            elif character == quote:
-                quote = ""
-        elif character in _QUOTES:
-            quote = character
-        elif character == "#":
-            return line[:position]
-        position += 1
-    return line

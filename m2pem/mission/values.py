@@ -17,6 +17,15 @@ MAX_DEPTH = 50
 """Levels of lists and maps in each other. Deeper values could not be written to a journal."""
 
 
+def value_within(value: Value, path: str) -> Value:
+    """Return what maps in each other have under a dotted name; None: nothing."""
+    for key in path.split("."):
+        if not isinstance(value, dict):
+            return None
+        value = value.get(key)
+    return value
+
+
 def is_too_deep(value: Value, levels: int = MAX_DEPTH) -> bool:
     """Whether lists and maps are nested deeper than `levels`."""
     layer = [value]

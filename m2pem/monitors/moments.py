@@ -15,7 +15,7 @@ from m2pem.fleet.allocation import spelled_out
 from m2pem.fleet.fleet import Fleet
 from m2pem.mission.elements import EndEvent, Gateway, IntermediateThrowEvent, Process, SendTask
 from m2pem.mission.mission import Mission
-from m2pem.mission.values import Value
+from m2pem.mission.values import Value, value_within
 from m2pem.verify.ltl.formula import Active, Commanded, Completed, Data, Ended, Proposition
 
 _ROOT = 1
@@ -381,18 +381,10 @@ class Moments:
             for store in stores:
                 value = store.get(head)
                 if isinstance(value, dict):
-                    return _entry(value, tail)
+                    return value_within(value, tail)
             head, dot, rest = head.rpartition(".")
             tail = f"{rest}.{tail}"
         return None
-
-
-def _entry(value: Value, path: str) -> Value:
-    for key in path.split("."):
-        if not isinstance(value, dict):
-            return None
-        value = value.get(key)
-    return value
 
 
 _READERS: Mapping[type, Callable[[Moments, Any], None]] = {

@@ -102,9 +102,8 @@ def _limit(text: str) -> None:
         raise ExpressionSyntaxError(message, shorten(text), 0)
 
 
-def _close(text: str, mark: int) -> Span:
-    """The inside of the `${` at `mark`; a brace inside quotes does not close it."""
-    position = mark + 2
+def outside_quotes(text: str, wanted: str, position: int = 0) -> int | None:
+    """Return where a character is first that is not inside a quoted text; None: nowhere."""
     quote = ""
     while position < len(text):
         character = text[position]
@@ -115,10 +114,18 @@ def _close(text: str, mark: int) -> Span:
                 quote = ""
         elif character in "'\"":
             quote = character
-        elif character == "}":
-            return slice(mark + 2, position)
+        elif character == wanted:
+            return position
         position += 1
-    raise ExpressionSyntaxError(f"'{text[mark : mark + 2]}' is not closed by '}}'", text, mark)
+    return None
+
+
+def _close(text: str, mark: int) -> Span:
+    """The inside of the `${` at `mark`; a brace inside quotes does not close it."""
+    end = outside_quotes(text, "}", mark + 2)
+    if end is None:
+        raise ExpressionSyntaxError(f"'{text[mark : mark + 2]}' is not closed by '}}'", text, mark)
+    return slice(mark + 2, end)
 
 
 @lru_cache(maxsize=16)
