@@ -16,7 +16,8 @@ import msgspec
 
 from m2pem.api.alerts import AlertSeverity, OperatorAlert
 from m2pem.api.runs import Alert
-from m2pem.errors import JournalError, OperatorError, StaleAlertsError
+from m2pem.errors import OperatorError, StaleAlertsError
+from m2pem.executive.emergency import written_in_time
 from m2pem.journal.base import Journal
 
 log = logging.getLogger("m2pem.alerts")
@@ -32,9 +33,6 @@ MOST_OPEN = 1000
 """Alerts that are open and were said once; of more, the oldest count as over."""
 
 MOST_DETAILS = 20
-
-WRITTEN_WITHIN_S = 1.5
-"""An operator gets an error if the journal has not written an acknowledgement within this time."""
 
 SHOWN_NAMES = 5
 
@@ -333,7 +331,7 @@ class AlertList:
         )
         if line.group is not None:
             self._clear(number, line)
-        await self._written(f"{alert} is acknowledged")
+        await written_in_time(self.write, f"{alert} is acknowledged")
 
     async def own(self, alert: str, owner: str) -> None:
         """Note who takes care of an alert; "": no operator any more.
@@ -345,7 +343,7 @@ class AlertList:
         number, line = self._find(alert)
         owned_us = self._now_us() if owner else None
         self._change(number, line, replace(line.alert, owner=owner, owned_us=owned_us))
-        await self._written(f"{alert}: the owner is {owner or 'no operator'}")
+        await written_in_time(self.write, f"{alert}: the owner is {owner or 'no operator'}")
 
     def _find(self, alert: str) -> tuple[int, _Line]:
         digits = alert.removeprefix("a")
@@ -387,18 +385,6 @@ class AlertList:
                     self._last_kept = max((last, *taken))
                     self._first_new = self._last_kept + 1
                     return
-
-    async def _written(self, what: str) -> None:
-        try:
-            async with asyncio.timeout(WRITTEN_WITHIN_S):
-                await self.write()
-        except TimeoutError:
-            why = f"has not written it within {WRITTEN_WITHIN_S:g} s"
-        except JournalError as error:
-            why = f"cannot write it: {error}"
-        else:
-            return
-        raise OperatorError(f"{what} here, but the journal {why}: it may not outlive a restart")
 
     # --- inside ---------------------------------------------------------------------------------
 

@@ -7,7 +7,8 @@ from contextlib import suppress
 
 from m2pem.api.alerts import AlertsChanged
 from m2pem.errors import JournalError
-from m2pem.executive.alert_list import WRITTEN_WITHIN_S, AlertList
+from m2pem.executive.alert_list import AlertList
+from m2pem.executive.emergency import WRITTEN_WITHIN_S
 
 log = logging.getLogger("m2pem.alerts")
 

@@ -15,8 +15,8 @@ import msgspec
 
 from m2pem.api.runs import GeometryVersion, HandedOver
 from m2pem.engine.state import RunState
-from m2pem.errors import JournalError, OperatorError, StaleDrawingsError
-from m2pem.executive.emergency import WRITTEN_WITHIN_S
+from m2pem.errors import StaleDrawingsError
+from m2pem.executive.emergency import written_in_time
 from m2pem.fleet.fleet import Fleet
 from m2pem.geo.geojson import GeometryError, parse_geojson
 from m2pem.journal.base import Journal
@@ -144,16 +144,7 @@ class Drawings:
         Raises:
             OperatorError: it is not written in time, or cannot be.
         """
-        try:
-            async with asyncio.timeout(WRITTEN_WITHIN_S):
-                await self._write()
-        except TimeoutError:
-            why = f"has not written it within {WRITTEN_WITHIN_S:g} s"
-        except JournalError as error:
-            why = f"cannot write it: {error}"
-        else:
-            return
-        raise OperatorError(f"{done} here, but the journal {why}: it may not outlive a restart")
+        await written_in_time(self._write, done)
 
     async def _write(self) -> None:
         async with self._writing:

@@ -5,7 +5,7 @@ under way: a disk that hangs, or a mission that never waits, does not delay them
 """
 
 import asyncio
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from uuid import UUID
@@ -16,7 +16,7 @@ from m2pem.engine import inputs as i
 from m2pem.engine import records as r
 from m2pem.engine.run import Step
 from m2pem.engine.state import RunStatus
-from m2pem.errors import M2pemError, OperatorError, StaleEpochError
+from m2pem.errors import JournalError, M2pemError, OperatorError, StaleEpochError
 from m2pem.executive.control_events import ControlEvents
 from m2pem.executive.dispatcher import Dispatcher, Order
 from m2pem.executive.ended_runs import in_words
@@ -28,7 +28,25 @@ ACKNOWLEDGED_WITHIN_S = 1.0
 """An arbiter that has not taken a STOP or hold by then: operators are alerted."""
 
 WRITTEN_WITHIN_S = 1.5
-"""How long an operator's STOP or pause waits for the journal, before it says how things are."""
+"""So long what an operator does, such as a STOP, waits for the journal before it is said."""
+
+
+async def written_in_time(write: Callable[[], Awaitable[None]], done: str) -> None:
+    """Wait until the journal has what an operator did. `done`: what that is.
+
+    Raises:
+        OperatorError: it is not written in time, or cannot be.
+    """
+    try:
+        async with asyncio.timeout(WRITTEN_WITHIN_S):
+            await write()
+    except TimeoutError:
+        why = f"has not written it within {WRITTEN_WITHIN_S:g} s"
+    except JournalError as error:
+        why = f"cannot write it: {error}"
+    else:
+        return
+    raise OperatorError(f"{done} here, but the journal {why}: it may not outlive a restart")
 
 
 _NOT_STOPPED = (BehaviorState.LOST, BehaviorState.FAILED)
