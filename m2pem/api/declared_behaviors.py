@@ -24,6 +24,7 @@ from typing import Any
 
 from m2pem.errors import PluginError
 from m2pem.fleet.behaviors import SHARED
+from m2pem.fleet.parameters import DIMENSIONS
 from m2pem.mission.behavior import BehaviorType
 from m2pem.mission.catalogue import (
     BehaviorSpec,
@@ -33,20 +34,12 @@ from m2pem.mission.catalogue import (
     ResumePolicy,
 )
 from m2pem.suggestions import did_you_mean
-from m2pem.units import Dimension, UnitError, quantity
+from m2pem.units import UnitError, quantity
 
 _BEHAVIOR_KEYS = ("parameters", "required_one_of", "resume", "ends", "writes", "doc")
 _PARAMETER_KEYS = ("kind", "required", "minimum", "maximum", "choices", "default", "doc")
 _DOTTED = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*")
 _PLAIN = frozenset({ParameterKind.NUMBER, ParameterKind.COUNT})
-_DIMENSIONS: Mapping[ParameterKind, Dimension] = {
-    ParameterKind.DURATION: Dimension.DURATION,
-    ParameterKind.DISTANCE: Dimension.DISTANCE,
-    ParameterKind.ALTITUDE: Dimension.DISTANCE,
-    ParameterKind.SPEED: Dimension.SPEED,
-    ParameterKind.ANGLE: Dimension.ANGLE,
-    ParameterKind.ANGULAR_SPEED: Dimension.ANGULAR_SPEED,
-}
 
 
 def read_declared_behaviors(
@@ -180,9 +173,9 @@ def _choices(place: str, value: Any, kind: ParameterKind) -> tuple[str, ...]:
 def _number(place: str, value: Any, kind: ParameterKind) -> float | None:
     if value is None:
         return None
-    if kind in _DIMENSIONS:
+    if kind in DIMENSIONS:
         try:
-            return quantity(value, _DIMENSIONS[kind])
+            return quantity(value, DIMENSIONS[kind])
         except UnitError as error:
             raise _error(place, str(error)) from None
     if kind not in _PLAIN:
