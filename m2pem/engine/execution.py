@@ -152,6 +152,14 @@ class Execution:
         """Record why an input changes nothing."""
         self.emit(r.InputIgnored(reason))
 
+    def open_prompt(
+        self, token: Token, text: str, decisions: Iterable[dict[str, str]], role: str = ""
+    ) -> None:
+        """Ask operators what a token waits for."""
+        node, number = token.node, self.state.last_prompt + 1
+        place = self.process_of(node), node.id, token.scope.id
+        self.emit(r.PromptOpened(token.id, *place, f"p{number}", text, tuple(decisions), role))
+
     def process_of(self, node: FlowNode) -> str:
         """Return the id of the process that contains a node."""
         return self.process_ids[node.index]

@@ -50,8 +50,12 @@ class MemoryJournal:
     """A `Journal` until the process ends.
 
     `keep`: how many of a run's last entries are kept at least (at most twice as many are held), for
-    long runs that are not read; None: all.
+    long runs that are not read; None: all. It has no file, and no lease.
     """
+
+    file: Path | None = None
+    lease_s: float | None = None
+    owned_until_s: float | None = None
 
     def __init__(self, keep: int | None = None) -> None:
         self._keep = keep
@@ -71,19 +75,6 @@ class MemoryJournal:
     @property
     def identity(self) -> UUID:
         return self._identity
-
-    @property
-    def file(self) -> Path | None:
-        """See `Journal.file`: there is none."""
-        return None
-
-    @property
-    def lease_s(self) -> float | None:
-        return None
-
-    @property
-    def owned_until_s(self) -> float | None:
-        return None
 
     def abandon(self, fleet: str) -> FleetServer | None:
         """See `Journal.abandon`: no other executive has this journal."""

@@ -217,17 +217,7 @@ def _ask(x: Execution, token: Token, node: AdHocSubProcess, scope: Scope) -> Non
         if x.state.prompts[token.prompt].decisions == tuple(decisions):
             return
         _withdraw_prompt(x, token)
-    x.emit(
-        r.PromptOpened(
-            token.id,
-            x.process_of(node),
-            node.id,
-            token.scope.id,
-            f"p{x.state.last_prompt + 1}",
-            f"{node.label}: what is to be done next?",
-            tuple(decisions),
-        )
-    )
+    x.open_prompt(token, f"{node.label}: what is to be done next?", decisions)
 
 
 def _decision(node: FlowNode) -> dict[str, str]:

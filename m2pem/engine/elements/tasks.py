@@ -42,18 +42,8 @@ def user_task(x: Execution, token: Token) -> None:
             throw_error(x, token, "EXPRESSION", f"timeout of {node.id}: {error}")
             return
         await_event(x, token, node, Trigger.TIMER, due_us=due_us)
-    x.emit(
-        r.PromptOpened(
-            token.id,
-            x.process_of(node),
-            node.id,
-            token.scope.id,
-            f"p{x.state.last_prompt + 1}",
-            prompt.text,
-            tuple({"value": d.value, "label": d.label} for d in prompt.decisions),
-            prompt.role,
-        )
-    )
+    decisions = ({"value": each.value, "label": each.label} for each in prompt.decisions)
+    x.open_prompt(token, prompt.text, decisions, prompt.role)
 
 
 def prompt_timed_out(x: Execution, token: Token) -> None:
