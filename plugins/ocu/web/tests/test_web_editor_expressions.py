@@ -1,5 +1,7 @@
 """Expressions in the editor, in a browser: completed, explained, marked, and saved as typed."""
 
+import re
+
 import pytest
 from playwright.async_api import Locator, Page, expect
 from web_desk import IN_ONE_LOOP, Desk
@@ -99,3 +101,28 @@ async def test_what_is_wrong_is_marked_at_its_place(desk: Desk, typed: str, wron
     await condition.fill("user.decision == 'continue'")
     await expect(mark).to_have_count(0)
     await expect(page.locator(".m2-code-text")).to_have_text("'continue'")
+
+
+async def test_a_parameter_that_is_an_expression_is_written_with_completion(desk: Desk) -> None:
+    page = await desk.edit()
+    drawing = Drawing(page)
+    await drawing.select("Reverse")
+    await drawing.fill("Distance", "= 1")
+    distance = page.get_by_label(re.compile("^Distance")).first
+    await expect(distance).to_have_class(re.compile("cm-content"))
+    await distance.fill("")
+    await page.keyboard.type("= user.")
+    await choose(page, "user.decision")
+    await page.keyboard.press("Escape")
+    await page.keyboard.press("Tab")
+    await drawing.save()
+    mission = load_mission(desk.executive.missions / "vignette1.bpmn")
+    (behavior,) = (each for task, each in mission.commands() if task.id == "Reverse")
+    (value,) = (each.value for each in behavior.parameters if each.name == "distance")
+    assert str(value) == "= user.decision"
+    # While somebody writes in it, the field stays the same one.
+    await distance.fill("5 m")
+    await expect(distance).to_be_focused()
+    await expect(distance).to_have_class(re.compile("cm-content"))
+    await page.keyboard.press("Tab")
+    await expect(distance).to_have_value("5 m")

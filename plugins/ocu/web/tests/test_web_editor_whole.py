@@ -31,4 +31,4 @@ async def test_the_first_load_of_the_editor_is_small(desk: Desk) -> None:
     session.on("Network.loadingFinished", lambda event: received.append(event["encodedDataLength"]))
     await desk.edit("vignette1", page)
     await page.wait_for_load_state("networkidle")
-    assert sum(received) < 470_000
+    assert sum(received) < 485_000

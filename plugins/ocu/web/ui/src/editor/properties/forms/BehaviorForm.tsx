@@ -72,6 +72,7 @@ function Parameters({ form, use, meant, write }: ParametersProps) {
   const field = (spec: Parameter) => (
     <ParameterField
       key={`${use.name} ${spec.name}`}
+      form={form}
       editor={form.editor}
       parameter={spec}
       value={valueOf(spec.name)}
@@ -95,6 +96,7 @@ function Parameters({ form, use, meant, write }: ParametersProps) {
       {unknown.map(({ name, value }) => (
         <ParameterField
           key={`${use.name} ${name}`}
+          form={form}
           editor={form.editor}
           parameter={unknownParameter(name)}
           value={value}

@@ -6,6 +6,7 @@ import { ComboField } from "../fields/ComboField";
 import { TextField } from "../fields/TextField";
 import { apply, definitionsOf, factoryOf, objectOf, set, type FormProps } from "../form";
 import { Rows } from "./Rows";
+import { ValueField } from "./ValueField";
 
 const words = strings.editor.call;
 const CALLABLE = [
@@ -61,6 +62,13 @@ function Mappings({ form, direction }: { form: FormProps; direction: Direction }
   }));
   const write = (next: Mapping[]) =>
     apply(form, setMappings(factoryOf(form), call, direction, next));
+  const source = (row: Mapping, index: number) => ({
+    id: `m2-${direction}-source-${index}`,
+    label: words.source,
+    required: true,
+    value: row.source,
+    write: (said: string) => write(mappings.with(index, { ...row, source: said.trim() })),
+  });
   return (
     <>
       <h2 class="m2-heading">{words[direction]}</h2>
@@ -73,15 +81,13 @@ function Mappings({ form, direction }: { form: FormProps; direction: Direction }
         label={({ source, target }) => `${source || "?"} → ${target || "?"}`}
         render={(row, index) => (
           <>
-            <ComboField
-              id={`m2-${direction}-source-${index}`}
-              label={words.source}
-              required
-              mono
-              value={row.source}
-              suggestions={direction === "in" ? names : []}
-              write={(source) => write(mappings.with(index, { ...row, source: source.trim() }))}
-            />
+            <ValueField form={form} {...source(row, index)}>
+              <ComboField
+                {...source(row, index)}
+                mono
+                suggestions={direction === "in" ? names : []}
+              />
+            </ValueField>
             <TextField
               id={`m2-${direction}-target-${index}`}
               label={words.target}

@@ -18,13 +18,16 @@ export interface ExpressionFieldProps {
   write(value: string): void;
   /** That the file gives the expression. */
   language?: string;
-  hint?: string;
+  hint?: string | undefined;
   rows?: number;
+  required?: boolean | undefined;
+  /** What is wrong with it besides the findings. */
+  error?: string | undefined;
   /** What the check says of the element. */
   findings?: readonly Finding[];
 }
 
-export function ExpressionField({ form, rows, language, findings = [], ...field }: ExpressionFieldProps) {
+export function ExpressionField({ form, rows, language, findings = [], error, ...field }: ExpressionFieldProps) {
   const { checks, catalogue } = form.editor;
   const names = checks.outline.value?.names ?? [];
   const dialectIn = (typed: string) => catalogue.dialects[dialectOf(typed, language)];
@@ -44,7 +47,7 @@ export function ExpressionField({ form, rows, language, findings = [], ...field 
       {...field}
       rows={rows ?? 2}
       offered={words.offered}
-      error={findings.map(said).join("\n") || undefined}
+      error={findings.map(said).join("\n") || error}
       wrongAt={findings.flatMap(({ message }) => stoppedAt(message, field.value) ?? [])}
       tokens={(typed) => tokensOf(typed, dialectIn(typed))}
       explain={explain}

@@ -9,6 +9,8 @@ import { defaultOf, examine, unitsOf, written, type Wrong } from "../../session/
 import { ComboField } from "../fields/ComboField";
 import type { Suggestion } from "../fields/Listbox";
 import { TextField } from "../fields/TextField";
+import type { FormProps } from "../form";
+import { ValueField } from "./ValueField";
 
 const words = strings.editor.parameter;
 const GEOMETRIES = ["route", "area", "point"] as const;
@@ -22,9 +24,12 @@ export interface ParameterFieldProps {
   value: string;
   write(value: string): void;
   error?: string | undefined;
+  /** Of a mission, where a value may be an expression. */
+  form?: FormProps;
 }
 
-export function ParameterField({ editor, parameter, value, write, error }: ParameterFieldProps) {
+export function ParameterField(props: ParameterFieldProps) {
+  const { editor, form, parameter, value, write, error } = props;
   const wrong = examine(parameter, value);
   const suggestions = suggestionsOf(editor.catalogue, parameter);
   const common = {
@@ -38,12 +43,19 @@ export function ParameterField({ editor, parameter, value, write, error }: Param
     hint: hintOf(parameter),
     error: error ?? (wrong && describe(wrong)),
   };
-  const field =
+  const plain =
     suggestions.length > 0 ? (
       <ComboField {...common} suggestions={suggestions} />
     ) : (
       <TextField {...common} />
     );
+  const field = form ? (
+    <ValueField form={form} {...common}>
+      {plain}
+    </ValueField>
+  ) : (
+    plain
+  );
   const { kind } = parameter;
   if (kind !== "position" && !isKind(kind)) return field;
   const { plan } = editor;

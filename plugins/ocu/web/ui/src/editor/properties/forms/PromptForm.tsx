@@ -13,6 +13,7 @@ import { DurationField } from "../fields/DurationField";
 import { TextField } from "../fields/TextField";
 import { apply, factoryOf, objectOf, type FormProps } from "../form";
 import { Rows } from "./Rows";
+import { ValueField } from "./ValueField";
 
 const words = strings.editor.prompt;
 const ROLES = ["viewer", "operator", "commander"];
@@ -23,6 +24,13 @@ export function PromptForm(form: FormProps) {
   const write = (next: Partial<PromptUse>) =>
     apply(form, setPrompt(factoryOf(form), carrier, { ...prompt, ...next }));
   const names = form.editor.checks.outline.value?.names ?? [];
+  const timeout = {
+    id: "m2-prompt-timeout",
+    label: words.timeout,
+    value: prompt.timeout,
+    hint: words.timeoutHint,
+    write: (said: string) => write({ timeout: said }),
+  };
   return (
     <>
       {carrier !== task && (
@@ -75,13 +83,9 @@ export function PromptForm(form: FormProps) {
         suggestions={ROLES.slice(1).map((value) => ({ value }))}
         write={(role) => write({ role: role.trim() })}
       />
-      <DurationField
-        id="m2-prompt-timeout"
-        label={words.timeout}
-        value={prompt.timeout}
-        hint={words.timeoutHint}
-        write={(timeout) => write({ timeout })}
-      />
+      <ValueField form={form} {...timeout}>
+        <DurationField {...timeout} />
+      </ValueField>
     </>
   );
 }

@@ -5,8 +5,10 @@ import { ComboField } from "../fields/ComboField";
 import { TextField } from "../fields/TextField";
 import { apply, factoryOf, objectOf, type FormProps } from "../form";
 import { Rows } from "./Rows";
+import { ValueField } from "./ValueField";
 
 const words = strings.editor.service;
+type Row = ServiceUse["parameters"][number];
 const NOTHING: ServiceUse = { name: "", parameters: [], roles: [] };
 
 export function ServiceForm(form: FormProps) {
@@ -15,6 +17,13 @@ export function ServiceForm(form: FormProps) {
   const { services } = form.editor.catalogue;
   const known = services.find(({ name }) => name === use.name);
   const write = (next: ServiceUse) => apply(form, setService(factoryOf(form), task, next));
+  const valueOf = (row: Row, index: number) => ({
+    id: `m2-service-value-${index}`,
+    label: words.propertyValue,
+    value: row.value,
+    write: (value: string) =>
+      write({ ...use, parameters: use.parameters.with(index, { ...row, value }) }),
+  });
   return (
     <>
       <ComboField
@@ -49,14 +58,9 @@ export function ServiceForm(form: FormProps) {
                 write({ ...use, parameters: use.parameters.with(index, { ...row, name }) })
               }
             />
-            <TextField
-              id={`m2-service-value-${index}`}
-              label={words.propertyValue}
-              value={row.value}
-              write={(value) =>
-                write({ ...use, parameters: use.parameters.with(index, { ...row, value }) })
-              }
-            />
+            <ValueField form={form} {...valueOf(row, index)}>
+              <TextField {...valueOf(row, index)} />
+            </ValueField>
           </>
         )}
       />

@@ -1,12 +1,13 @@
 // When a timer fires.
 import { strings } from "../../../strings";
 import { isA, list, type ModdleElement } from "../../moddle/moddle";
-import { expressionProperties, expressionText } from "../expressions";
+import { expressionLanguage, expressionProperties, expressionText } from "../expressions";
 import { isoCycleOf, shownCycle } from "../../session/durations";
 import { DurationField } from "../fields/DurationField";
 import { SelectField } from "../fields/SelectField";
 import { TextField } from "../fields/TextField";
 import { factoryOf, objectOf, set, type FormProps } from "../form";
+import { ValueField } from "./ValueField";
 
 const words = strings.editor.timer;
 const KINDS = ["timeDuration", "timeDate", "timeCycle"] as const;
@@ -46,7 +47,9 @@ export function TimerForm(form: FormProps) {
         options={KINDS.map((value) => ({ value, label: words.kinds[value] }))}
         write={(next) => write(next as Kind, words.examples[next as Kind])}
       />
-      {kind === "timeDuration" ? <DurationField {...field} /> : <TextField {...field} mono />}
+      <ValueField key={kind} form={form} language={expressionLanguage(timer, kind)} {...field}>
+        {kind === "timeDuration" ? <DurationField {...field} /> : <TextField {...field} mono />}
+      </ValueField>
     </>
   );
 }
