@@ -15,7 +15,7 @@ import math
 import selectors
 import time
 from collections.abc import Awaitable, Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import suppress
 from contextvars import Context, copy_context
 from typing import Any, Protocol, TypeVar, TypeVarTuple, Unpack
@@ -142,6 +142,9 @@ class VirtualClock:
         self._loop.pass_rest(time_us - self.now_us())
 
 
+_LOOK_S = 0.5
+
+
 def run_virtual(main: Callable[[VirtualClock], Awaitable[T]], start_us: int) -> T:
     """Run `main` to its end in virtual time that begins at `start_us`, as `asyncio.run` would.
 
@@ -155,14 +158,17 @@ def run_virtual(main: Callable[[VirtualClock], Awaitable[T]], start_us: int) -> 
     if asyncio._get_running_loop() is None:
         return _run_virtual(loop, main, start_us)
     with ThreadPoolExecutor(1) as threads:
-        ending = threads.submit(copy_context().run, _run_virtual, loop, main, start_us)
         try:
-            return ending.result()
-        except KeyboardInterrupt:
+            ending = threads.submit(copy_context().run, _run_virtual, loop, main, start_us)
+            # Again and again: a signal just before a wait is handled when that is over.
+            while not wait((ending,), _LOOK_S).done:
+                pass
+        except BaseException:
             # In the main thread asyncio does that itself. The thread is waited for afterwards.
             with suppress(RuntimeError):  # it has ended meanwhile
                 loop.call_soon_threadsafe(loop.cancel_main)
             raise
+        return ending.result()
 
 
 def _run_virtual(

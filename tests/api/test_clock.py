@@ -6,6 +6,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from concurrent.futures import wait
 from types import FrameType
 
 import pytest
@@ -315,6 +316,6 @@ async def test_an_interrupt_cancels_what_runs_in_virtual_time_beside_an_event_lo
 def main_thread_waits() -> bool:
     """Whether the main thread waits for the result of another one."""
     frame: FrameType | None = sys._current_frames()[threading.main_thread().ident or 0]
-    while frame is not None and frame.f_code.co_name != "result":
+    while frame is not None and frame.f_code is not wait.__code__:
         frame = frame.f_back
     return frame is not None
