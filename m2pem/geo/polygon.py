@@ -178,6 +178,8 @@ def ring_problem(rings: Sequence[Sequence[Coordinate]]) -> str:
     """
     if problem := _limit_problem(rings):
         return problem
+    if len(rings) == 1 and _is_convex(rings[0]):
+        return ""  # most areas are, and Shapely loads slowly
     edges = _edges_of(rings)
     lines = shapely.linestrings(edges)
     one, other = shapely.STRtree(lines).query(lines, predicate="intersects")
@@ -190,6 +192,15 @@ def ring_problem(rings: Sequence[Sequence[Coordinate]]) -> str:
             return f"its edge {_text(a)} {does} its edge {_text(b)}; a ring may not cross itself"
     level = [[corner[:2] for corner in ring] for ring in rings]
     return next(filter(None, map(_eight_problem, level)), "") or _hole_problem(level)
+
+
+def _is_convex(ring: Sequence[Coordinate]) -> bool:
+    """Whether a closed ring turns to one side at each corner, and once around as a whole."""
+    steps = [(b[0] - a[0], b[1] - a[1]) for a, b in pairwise(ring)]
+    around = [*pairwise(steps), (steps[-1], steps[0])]
+    turns = [a[0] * b[1] - a[1] * b[0] for a, b in around]
+    backs = sum((a[0] >= 0) != (b[0] >= 0) for a, b in around)
+    return backs <= 2 and (min(turns) > 0 or max(turns) < 0)
 
 
 def _eight_problem(ring: Sequence[LatLon]) -> str:

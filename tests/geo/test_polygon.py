@@ -234,3 +234,20 @@ def test_a_fleet_file_warns_of_what_was_mended(tmp_path: Path) -> None:
     (warning,) = load_fleet(path).warnings
     assert (warning.line, warning.element) == (3, "areas.field")
     assert "mended" in warning.message
+
+
+def test_rings_that_turn_to_one_side_once_around_are_as_valid_as_shapely_says() -> None:
+    convex = 0
+    for seed in range(2_000):
+        draw = Random(seed)
+        corners, rounds = draw.randint(3, 7), draw.choice([1, 1, 2, 3])
+        turn = rounds * math.tau / corners
+        ring = [
+            (math.sin(turn * at) + draw.gauss(0, 0.1), math.cos(turn * at) + draw.gauss(0, 0.1))
+            for at in range(corners)
+        ]
+        shape = shapely.Polygon(ring)
+        problem = ring_problem([[(*corner, None) for corner in [*ring, ring[0]]]])
+        assert bool(problem) is not shape.is_valid, ring
+        convex += shape.is_valid and shape.area == pytest.approx(shape.convex_hull.area)
+    assert convex > 200
