@@ -112,5 +112,5 @@ def test_loading_it_loads_nothing_of_m2pem_but_its_package() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == str(
-        ["m2pem", "m2pem.hookspecs", "m2pem.testing", "m2pem.testing.plugin"]
+        ["m2pem", "m2pem.hookspecs", "m2pem.lazy_exports", "m2pem.testing", "m2pem.testing.plugin"]
     )

@@ -50,6 +50,10 @@ class CheckerReport:
     unreached_skips: frozenset[int]
 
 
+NOTHING_SAID = CheckerReport(
+    0, 0, 0, None, "", CutReason.UNFINISHED, unreached=frozenset(), unreached_skips=frozenset()
+)
+
 _COUNT = r"^\s*([\d.e+]+) "
 _ERRORS = re.compile(r"^State-vector \d+ byte, depth reached \d+(?:, \S+)*?,? ?errors: (\d+)", re.M)
 _STORED = re.compile(_COUNT + r"states, stored(?: \(([\d.e+]+) visited\))?", re.M)
@@ -191,7 +195,8 @@ class SpinQueries:
             arguments += ["-a"] if cycles else []
             arguments += ["-e"] if errors != 1 else []
             output = self.shop.search(defines, arguments, self._watch(seconds))
-            report = read(output.text)
+            unfinished = output.ended and not output.text  # before it said anything
+            report = NOTHING_SAID if unfinished else read(output.text)
             too_deep = report.found is None and report.cut is CutReason.DEPTH and not output.ended
             if too_deep and depth < MOST_DEPTH:
                 depth *= 10
