@@ -8,7 +8,7 @@ Rings of areas are in degrees: GeoJSON draws straight edges in the plane of long
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from itertools import pairwise
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -234,13 +234,9 @@ def mended(rings: Sequence[Sequence[Coordinate]]) -> tuple[tuple[Coordinate, ...
     if not isinstance(mend, shapely.Polygon) or mend.is_empty or not same:
         return None
     return tuple(
-        tuple((*at, heights[_nearest_corner(heights, at)]) for at in ring.coords)
+        tuple((*at, heights[min(heights, key=partial(math.dist, at))]) for at in ring.coords)
         for ring in (mend.exterior, *mend.interiors)
     )
-
-
-def _nearest_corner(corners: Iterable[LatLon], place: LatLon) -> LatLon:
-    return min(corners, key=lambda corner: math.dist(corner, place))
 
 
 def _limit_problem(rings: Sequence[Sequence[Coordinate]]) -> str:
