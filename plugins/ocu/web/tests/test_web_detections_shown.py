@@ -24,9 +24,9 @@ NEAR = scenarios.in_sequence("reverse", "ugv1", *PAST)
 BUTTON = "Detections (2)"
 UNCOVERED = """() => {
   const [mark, card] = [".map-detection-chosen > i", ".detection-card"].map((each) =>
-    document.querySelector(each).getBoundingClientRect());
-  return mark.left > card.right || mark.right < card.left
-    || mark.top > card.bottom || mark.bottom < card.top;
+    document.querySelector(each)?.getBoundingClientRect());
+  return mark && card && (mark.left > card.right || mark.right < card.left
+    || mark.top > card.bottom || mark.bottom < card.top);
 }"""
 
 
