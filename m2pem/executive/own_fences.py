@@ -1,5 +1,5 @@
-"""The fences of single vehicles, which ground stations upload: no behavior may leave them, whoever
-commands it. The fleet's fence is checked by the arbiters, and holds besides."""
+"""The fences of single vehicles, which ground stations upload: no behavior may leave them, of a
+mission, an operator or a station. The fleet's fence holds, too: the arbiters check it."""
 
 import math
 from collections.abc import Callable, Mapping

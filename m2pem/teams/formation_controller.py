@@ -29,7 +29,7 @@ PERIOD_S = 0.25
 _SLACK_S = 1.5
 _SILENT_S = 1.0
 """A member of which nothing new is received for so long is not waited for, as it may go on; those
-behind it may come to where it stands."""
+behind it may come to its place."""
 
 
 _LOOK_AHEAD_M = 50.0

@@ -34,8 +34,8 @@ pytestmark = [pytest.mark.timeout(600), pytest.mark.sitl("M2PEM_ARDUROVER")]
 
 SPEED = 5.0
 NEARER_M = 4.5
-"""The program that is killed stands at once; the one behind it needs 4 m to stop, and as it turns
-back forwards, 2 m."""
+"""The rover whose program is killed is at rest at once; the one behind it needs 4 m to stop, and
+2 m as it turns back forwards."""
 
 
 class Rovers:

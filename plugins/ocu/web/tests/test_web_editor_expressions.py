@@ -120,7 +120,7 @@ async def test_a_parameter_that_is_an_expression_is_written_with_completion(desk
     (behavior,) = (each for task, each in mission.commands() if task.id == "Reverse")
     (value,) = (each.value for each in behavior.parameters if each.name == "distance")
     assert str(value) == "= user.decision"
-    # While somebody writes in it, the field stays the same one.
+    # The field stays the same one while it has the focus.
     await distance.fill("5 m")
     await expect(distance).to_be_focused()
     await expect(distance).to_have_class(re.compile("cm-content"))

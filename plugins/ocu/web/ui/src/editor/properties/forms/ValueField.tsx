@@ -14,7 +14,7 @@ export function ValueField({ children, ...field }: ValueFieldProps) {
   const [isCode, setIsCode] = useState(isExpression(field.value));
   const look = () => setIsCode(isExpression(field.value));
   useEffect(() => {
-    // The field stays the same one while somebody writes in it.
+    // The field stays the same one while it has the focus.
     if (!host.current!.contains(document.activeElement)) look();
   }, [field.value]);
   return (
