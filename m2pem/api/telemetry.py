@@ -44,6 +44,9 @@ class VehicleState:
 
     `failsafe_problems`: how its own failsafes differ from what the fleet file says, in words;
     empty: they do not; None: they were not compared.
+    `landed`: an aircraft is on the ground, as its autopilot says, which some say of one that was
+    disarmed in the air; None also for vehicles that do not fly. `home`: where the vehicle returns
+    to, and where heights above home are measured from, as its autopilot reports it.
     """
 
     resource: ResourceId
@@ -62,6 +65,8 @@ class VehicleState:
     link: LinkState = LinkState.CONNECTED
     behavior: str = ""
     failsafe_problems: tuple[str, ...] | None = None
+    landed: bool | None = None
+    home: GeoPosition | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -119,6 +119,7 @@ def test_its_state_is_what_it_says(virtual: Run) -> None:
             assert state.altitude_above_home_m == 10.0
             assert (state.mode, state.armed, state.ready) == ("GUIDED", True, True)
             assert (state.battery_fraction, state.link) == (0.9, LinkState.CONNECTED)
+            assert (state.landed, state.home) == (False, GeoPosition(47.397742, 8.545594, 488.0))
             assert vehicle.state.mode is FlightMode.GUIDED
 
     virtual(main)

@@ -249,6 +249,8 @@ class Vehicle:
             readiness.ready if readiness else None,
             readiness.reasons if readiness else (),
             link,
+            landed=state.landed if self.domain == "air" else None,
+            home=state.home,
         )
 
     def recent_texts(self, within_s: float = 5.0) -> tuple[str, ...]:

@@ -382,6 +382,9 @@ export interface VehicleState {
   behavior: string;
   /** How its failsafes differ from what the fleet file says; null: they were not compared. */
   failsafe_problems?: string[] | null;
+  /** An aircraft is on the ground, as its autopilot says. */
+  landed?: boolean | null;
+  home?: GeoPosition | null;
 }
 
 export interface PayloadState {

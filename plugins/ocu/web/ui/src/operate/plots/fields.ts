@@ -26,8 +26,8 @@ function known(found: Map<string, number>, name: string, value: unknown): void {
     put(found, "heading_deg", heading_deg(value));
   } else if (name === "battery_fraction" && typeof value === "number") {
     put(found, "battery_percent", value * 100);
-  } else if (name === "footprint" || name === "detections") {
-    // Corners and objects are on the map.
+  } else if (["footprint", "detections", "home"].includes(name)) {
+    // Corners and objects are on the map; home stays where it is.
   } else if (typeof value === "number") {
     put(found, ...inDegrees(name, value));
   } else if (typeof value === "object" && value !== null && !Array.isArray(value)) {
