@@ -51,6 +51,8 @@ if TYPE_CHECKING:
     from m2pem.api.capabilities import OcuCapabilities as OcuCapabilities
     from m2pem.api.clock import Clock as Clock
     from m2pem.api.clock import SystemClock as SystemClock
+    from m2pem.api.commanded import Commanded as Commanded
+    from m2pem.api.commanded import ExpectedEnd as ExpectedEnd
     from m2pem.api.commands import LazyCommand as LazyCommand
     from m2pem.api.commands import command_group as command_group
     from m2pem.api.commands import simulator_group as simulator_group

@@ -45,6 +45,8 @@ RUN_FAILED = "RUN_FAILED"
 """The code of the alert of a run that has failed."""
 REQUIREMENT_VIOLATED = "REQUIREMENT_VIOLATED"
 """The code of the alert of a run that has violated a requirement."""
+DEVIATION = "DEVIATION"
+"""The code of the alert of a vehicle that does not do what it is commanded."""
 SPACE_VIOLATED = "SPACE_VIOLATED"
 """The code of the alert of a shared space with more vehicles than it has places."""
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol, Self, TypeAlias, TypeGuard
 from uuid import UUID, uuid4
 
 from m2pem.api.capabilities import ArbiterCapabilities, arbiter_capabilities
+from m2pem.api.commanded import Commanded
 from m2pem.api.telemetry import Telemetry, VehicleState
 from m2pem.fleet import parameters
 from m2pem.fleet.fence import fence_of
@@ -147,6 +148,9 @@ class BehaviorReport:
     `query`): the resource shows that it has not begun the behavior, at most prepared for it, so
     that it can be started now. `remaining`: the parameters by which another vehicle would do what
     is left, such as the rest of a route; None: nothing is known beyond what was reported before.
+    `commanded` (the first report RUNNING, answers to `query`): what the vehicle is commanded, where
+    it is not what the request of a shared behavior says, or the behavior is not shared.
+    `evidence`: what telemetry showed of a behavior that has ended; the executive sets it.
     """
 
     id: BehaviorId
@@ -160,6 +164,8 @@ class BehaviorReport:
     not_begun: bool = False
     remaining: Mapping[str, Value] | None = None
     epoch: int = 0
+    commanded: Commanded | None = None
+    evidence: Mapping[str, Value] = field(default_factory=dict)
 
 
 class Arbiter(Protocol):

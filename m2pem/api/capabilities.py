@@ -31,7 +31,9 @@ class ArbiterCapabilities:
     `one_vehicle`: no request may be for several vehicles; where a mission has several do the same,
     each of them is asked for its own. `adjusts`, `sights`, `addresses`, `reclaims`, `detects`,
     `fences`: it has what `AdjustingArbiter`, `SightedArbiter`, `AddressedArbiter`,
-    `ReclaimingArbiter`, `DetectingArbiter` or `FencingArbiter` describes.
+    `ReclaimingArbiter`, `DetectingArbiter` or `FencingArbiter` describes. `straight`: ground
+    vehicles move along straight lines between waypoints, and plan no way around what is there;
+    other vehicles are taken to do so anyway.
     """
 
     one_vehicle: bool = False
@@ -41,6 +43,7 @@ class ArbiterCapabilities:
     reclaims: bool = False
     detects: bool = False
     fences: bool = False
+    straight: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -148,7 +148,7 @@ class GiveUp(_Input, frozen=True):
 class BehaviorReported(_Input, frozen=True):
     """An arbiter's report. `number` rises with each report of one behavior. `outputs`: what is
     written for its task when it has ended. `remaining`: parameters of what is left to do; None: as
-    reported before."""
+    reported before. `evidence`: as in record `BehaviorEnded`."""
 
     behavior: str
     number: int
@@ -158,6 +158,7 @@ class BehaviorReported(_Input, frozen=True):
     native_ref: str | None = None
     outputs: dict[str, Value] = msgspec.field(default_factory=dict)
     remaining: dict[str, Value] | None = None
+    evidence: dict[str, Value] = msgspec.field(default_factory=dict)
 
 
 class BehaviorMissing(_Input, frozen=True):

@@ -35,6 +35,7 @@ def reported(
         report.native_ref,
         _outputs(report, behavior, arbiters) if report.outputs and behavior is not None else {},
         _remaining(report),
+        dict(report.evidence),
     )
 
 

@@ -12,8 +12,10 @@ from functools import partial
 from typing import Protocol
 
 from m2pem.api.arbiter import Arbiter, BehaviorReport, BehaviorRequest, adjusts, fences
+from m2pem.api.capabilities import arbiter_capabilities
 from m2pem.api.clock import Clock
 from m2pem.api.epoch_fence import run_of
+from m2pem.conformance.monitor import ConformanceMonitor
 from m2pem.engine.commands import AdjustBehavior, CancelBehavior, StartBehavior
 from m2pem.errors import StaleCommandError
 from m2pem.executive.behavior_lifecycle import DispatcherView
@@ -93,7 +95,7 @@ class Dispatcher:
     """`post` takes every report, those of arbiters and those made here. `replaced` takes the
     refusal of a command whose run another executive drives. `claims` is asked before a vehicle is
     moved. `clearance`: reserves space for vehicles; None: the fleet does not say that they share
-    it.
+    it. `conformance`: watches what is under way.
     """
 
     _arbiters: FleetArbiters
@@ -104,6 +106,7 @@ class Dispatcher:
     _replaced: Callable[[StaleCommandError], None]
     _claims: Claims
     _fences: OwnFences
+    _conformance: ConformanceMonitor
     _clearance: VehicleSeparation | None = None
     _active: dict[str, _Active] = field(default_factory=dict)
     _tails: dict[str, asyncio.Task[None]] = field(default_factory=dict)
@@ -151,6 +154,19 @@ class Dispatcher:
             start = self._starts.get(command.behavior)
             after = set() if start is None else {start}
         self._enqueue(command.resources, lambda: self._cancel(command), after)
+
+    def end(self, behavior: str, epoch: int) -> None:
+        """End a behavior whose vehicle deviates from it, as `cancel` does."""
+        active = self._active.get(behavior)
+        if active is None:
+            return
+
+        async def end() -> None:
+            await self._claims.confirmed()
+            if self._active.get(behavior) is active and run_of(behavior) not in self._disowned:
+                await self._cancel_active(behavior, active, active.resources, epoch)
+
+        self._enqueue(active.resources, end, set())
 
     def hold(self, resource: str) -> None:
         """Bring a resource to its safe state."""
@@ -347,6 +363,7 @@ class Dispatcher:
         active = self._active.pop(behavior, None)
         if active is not None:
             active.forget()
+        self._conformance.ended(behavior)
         self._availability.release(behavior)
         if self._clearance is not None:
             self._clearance.reservations.release(behavior)
@@ -358,13 +375,16 @@ class Dispatcher:
         self._availability.adopt(ids, behavior)
 
     def occupy(self, command: StartBehavior) -> None:
-        """After a restart: the room that a behavior takes up which an arbiter has already."""
-        if self._clearance is None:
-            return
+        """After a restart: the room that a behavior takes up which an arbiter has already; it is
+        watched from now on."""
         ids, kind = _ids(command.resources), BehaviorType(command.type)
         spec = self.spec(ids, command.name, kind)
-        if spec is not None:
-            self._clearance.reservations.adopt(self.request(command, spec), kind)
+        if spec is None:
+            return
+        request = self.request(command, spec)
+        if self._clearance is not None:
+            self._clearance.reservations.adopt(request, kind)
+        self._watch(request, adopted=True)
 
     def resources_of(self, behavior: str) -> Sequence[ResourceId]:
         """Return the resources of a behavior that has not ended."""
@@ -478,9 +498,15 @@ class Dispatcher:
         if self._is_barred(command):
             self._active.pop(command.behavior, None)
             return
+        self._watch(request)
         wrong = await self._call(f"start {command.behavior}", arbiter.start(request))
         if wrong and self._active.get(command.behavior) is active:
             self._refuse(command.behavior, "REJECTED", wrong)
+
+    def _watch(self, request: BehaviorRequest, *, adopted: bool = False) -> None:
+        active = self._active.get(request.id)
+        straight = active is not None and arbiter_capabilities(active.arbiter).straight
+        self._conformance.begins(request, straight=straight, adopted=adopted)
 
     async def _adjust(self, command: AdjustBehavior, failed: Callable[[str], None]) -> str:
         goes_on = command.goes_on
@@ -593,6 +619,7 @@ class Dispatcher:
         self, behavior: str, active: _Active, resources: tuple[ResourceId, ...], epoch: int
     ) -> str:
         """Ask its arbiter to end it, within the arbiter's limit. Returns "", or what went wrong."""
+        self._conformance.cancelled(behavior)
         wrong = await self._call(f"cancel {behavior}", active.arbiter.cancel(behavior, epoch))
         if self._active.get(behavior) is active and active.deadline is None:
             limits = [active.arbiter.limits(resource) for resource in resources]

@@ -32,17 +32,20 @@ class OwnFences:
 
     def refusal(self, request: BehaviorRequest) -> str:
         """Return where a behavior would leave the own fence of one of its vehicles; "": nowhere."""
-        starts = tuple(f"{resource}." for resource in request.resources)
-        geometries = {
-            name: parse_geojson(each.geometry)
-            for name, each in self._handed_over().items()
-            if name.startswith(starts)
-        }
         for resource in request.resources:
-            for fence in own_fences(resource, geometries):
+            for fence in self.of(resource):
                 if breach := self._breach(fence, resource, request):
                     return breach.replace("the fleet's fence", f"the own fence of {resource}")
         return ""
+
+    def of(self, resource: ResourceId) -> list[Fence]:
+        """Return the own fences of a vehicle."""
+        geometries = {
+            name: parse_geojson(each.geometry)
+            for name, each in self._handed_over().items()
+            if name.startswith(f"{resource}.")
+        }
+        return own_fences(resource, geometries) if geometries else []
 
     def _breach(self, fence: Fence, resource: ResourceId, request: BehaviorRequest) -> str:
         parameters = BehaviorParameters(request.parameters)

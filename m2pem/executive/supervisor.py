@@ -21,6 +21,7 @@ from m2pem.api.runs import LEFT_ARMED, Alert, RunId
 from m2pem.api.service import ServiceContext
 from m2pem.api.telemetry import TeamState, Telemetry, VehicleState
 from m2pem.bpmn.one_task import is_one_task
+from m2pem.conformance.monitor import ConformanceMonitor
 from m2pem.engine.inputs import GeometrySet, Input, MonitoredRequirement, ResourceFault
 from m2pem.engine.records import (
     Record,
@@ -75,6 +76,7 @@ from m2pem.executive.space_allocation import SpaceAllocation
 from m2pem.executive.waiting_tasks import waiting_tasks
 from m2pem.fleet.allocation import Availability, resources_of_mission
 from m2pem.fleet.approval import is_named
+from m2pem.fleet.fence import fence_of
 from m2pem.fleet.fleet import Fleet
 from m2pem.fleet.space import waits_for_space
 from m2pem.geo.fence import Fence
@@ -168,6 +170,17 @@ class Supervisor:
         self.ownership = Ownership(
             journal, self.stalls, self.runners, self.replaced, self._claim_unknown
         )
+        self._own_fences = OwnFences(lambda: self.drawings.handed_over, bus)
+        self.conformance = ConformanceMonitor(
+            self.fleet,
+            clock,
+            bus.latest,
+            self._fences_of,
+            end=self._end,
+            say=events.publish,
+            deliver=self._deliver,
+            speed=settings.speed,
+        )
         self.dispatcher = Dispatcher(
             arbiters,
             self.availability,
@@ -176,7 +189,8 @@ class Supervisor:
             self._post_report,
             self._refused,
             self.ownership,
-            OwnFences(lambda: self.drawings.handed_over, bus),
+            self._own_fences,
+            self.conformance,
             self._separation,
         )
         self.allocator = Allocator(
@@ -313,6 +327,7 @@ class Supervisor:
         """Let go of lost resources, services and calls of arbiters, once every run has ended."""
         self.control_requests.close()
         self.allocator.close()
+        self.conformance.close()
         await self._lost_resources.close()
         await self._services.close()
         await self.dispatcher.close()
@@ -467,6 +482,7 @@ class Supervisor:
             # After a restart an arbiter may report before its run is taken up, which then asks it.
             log.info("a report for %s, which no run here asked for", report.id)
             return
+        report = self.conformance.concluded(report)
         runner.post(reported(report, runner.run.state.behaviors.get(report.id), self.arbiters))
 
     def on_report(self, report: BehaviorReport) -> None:
@@ -474,8 +490,15 @@ class Supervisor:
         runner = self.runners.get(run_of(report.id))
         if runner is not None and report.epoch > runner.epoch:
             self.replaced(runner.id, replaced_by(runner, report.epoch))
-        else:
-            self.dispatcher.reported(report)
+        elif (passed := self.conformance.reported(report)) is not None:
+            self.dispatcher.reported(passed)
+
+    def _deliver(self, report: BehaviorReport) -> None:
+        self.dispatcher.reported(report)
+
+    def _end(self, behavior: BehaviorId) -> None:
+        """End a behavior whose vehicle deviates from it."""
+        self.dispatcher.end(behavior, self.epoch_of(behavior))
 
     def _refused(self, error: StaleCommandError) -> None:
         if (runner := self.runners.get(error.run)) is not None and error.newest > runner.epoch:
@@ -504,6 +527,7 @@ class Supervisor:
             self._forecast.on_telemetry(state, self.clock.now_us())
             state = self._lost_resources.annotated(state)
         self._bus.publish(state)
+        self.conformance.on_telemetry(state)
         if isinstance(state, VehicleState):
             self._measure(state.resource)
         self.allocator.on_telemetry()
@@ -527,6 +551,11 @@ class Supervisor:
                 runner.post(fault)
                 if not fault.reachable:
                     self._returns.faulted(fault.resource, runner.id)
+
+    def _fences_of(self, vehicle: ResourceId) -> list[Fence]:
+        """Where a vehicle may be: the fleet's fence, and its own."""
+        fence = fence_of(self.fleet, self.fleet.vehicles[vehicle].domain)
+        return [*([] if fence is None else [fence]), *self._own_fences.of(vehicle)]
 
     async def _why_not_served(self) -> str:
         await self.ownership.confirmed()

@@ -88,11 +88,22 @@ class Payload:
 
 
 @dataclass(frozen=True, slots=True)
+class Conformance:
+    """How vehicles are compared with what they are commanded. `bounds`: those of
+    `m2pem.conformance.bounds.Bounds` that differ from the default, by their names. `watched`:
+    whether it is done."""
+
+    bounds: Mapping[str, float] = field(default_factory=dict)
+    watched: bool = True
+
+
+@dataclass(frozen=True, slots=True)
 class Vehicle:
     """A vehicle. `payloads`: the ids of what is mounted on it. `cruise_speed_m_s`: how fast it goes
     if no behavior says; `endurance_s`: how long it can, with a full battery. None: not said.
     `host`: the computer that its arbiters run on, and those of its payloads; "": the executive's
-    own. `when_cut_off`: what that computer does without contact to the executive."""
+    own. `when_cut_off`: what that computer does without contact to the executive. `conformance`:
+    its own bounds; None: those of the fleet."""
 
     id: ResourceId
     domain: Domain
@@ -109,6 +120,7 @@ class Vehicle:
     tags: tuple[str, ...] = ()
     host: str = ""
     when_cut_off: CutOffPolicy = field(default_factory=CutOffPolicy)
+    conformance: Conformance | None = None
     line: int = 0
 
 
@@ -218,6 +230,7 @@ class Fleet:
     terrain_folder: str = ""
     clearance_m: float | None = None
     debugging: bool = False
+    conformance: Conformance = field(default_factory=Conformance)
     warnings: tuple[Finding, ...] = ()
 
     def __deepcopy__(self, memo: object) -> Self:

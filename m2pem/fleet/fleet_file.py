@@ -13,6 +13,7 @@ from m2pem.errors import FleetError
 from m2pem.findings import Finding, Severity
 from m2pem.fleet.approval import person_of
 from m2pem.fleet.fleet import (
+    Conformance,
     Domain,
     Fleet,
     LostMemberPolicy,
@@ -26,7 +27,9 @@ from m2pem.fleet.fleet import (
     VideoKind,
 )
 from m2pem.fleet.fleet_schema import (
+    BOUNDS,
     AllocationModel,
+    ConformanceModel,
     DeconflictionModel,
     FleetModel,
     HandOverModel,
@@ -320,6 +323,7 @@ def _build(source: YamlSource, model: FleetModel, geometries: dict[str, Geometry
             tags=tuple(vehicle.tags),
             host=vehicle.host or "",
             when_cut_off=_cut_off(vehicle),
+            conformance=vehicle.conformance and _conformance(vehicle.conformance),
             line=source.line(("vehicles", name)),
         )
     teams = {
@@ -361,6 +365,7 @@ def _build(source: YamlSource, model: FleetModel, geometries: dict[str, Geometry
         switching_cost_s=costs.switching,
         on_error=ErrorPolicy(model.on_error),
         debugging=model.debugging,
+        conformance=_conformance(model.conformance or ConformanceModel()),
         unattended=later.unattended,
         start_warning_s=later.warning,
         preemption=costs.preemption,
@@ -388,6 +393,13 @@ def _build(source: YamlSource, model: FleetModel, geometries: dict[str, Geometry
 def _video(model: VideoModel) -> Video:
     kind = VideoKind(model.kind)
     return Video(model.url, kind) if model.every is None else Video(model.url, kind, model.every)
+
+
+def _conformance(model: ConformanceModel) -> Conformance:
+    said = model.model_dump(exclude_none=True)
+    return Conformance(
+        {bound: said[key] for key, bound in BOUNDS.items() if key in said}, model.watch
+    )
 
 
 def _cut_off(vehicle: VehicleModel) -> CutOffPolicy:

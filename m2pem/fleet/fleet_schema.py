@@ -176,6 +176,59 @@ class HostModel(_Model):
     ] = None
 
 
+class ConformanceModel(_Model):
+    """How far a vehicle may be from what it is commanded before its behavior is ended for it."""
+
+    watch: Annotated[bool, Field(description="Whether it is compared at all.")] = True
+    cross_track: Annotated[
+        Distance | None, Field(description="From its way, beside what turns need; 10 m.")
+    ] = None
+    cross_track_time: Annotated[
+        DurationOrZero | None, Field(description="For how long it may be farther; 5 s.")
+    ] = None
+    height: Annotated[Distance | None, Field(description="From its height; 15 m.")] = None
+    height_time: Annotated[
+        DurationOrZero | None, Field(description="For how long it may be farther; 5 s.")
+    ] = None
+    fence: Annotated[Distance | None, Field(description="Outside of a fence; 5 m.")] = None
+    fall: Annotated[Speed | None, Field(description="How fast it may sink; 8 m/s.")] = None
+    disarmed_above: Annotated[
+        Distance | None, Field(description="Height above home at which it may be disarmed; 5 m.")
+    ] = None
+    jump: Annotated[Distance | None, Field(description="By which its position may jump; 25 m.")] = (
+        None
+    )
+    waypoint: Annotated[
+        Distance | None, Field(description="How near waypoints are passed; 10 m.")
+    ] = None
+    covered: Annotated[
+        float | None, Field(ge=0, le=1, description="Least share of a survey's lines; 0.9.")
+    ] = None
+    rest: Annotated[Speed | None, Field(description="Of what is at rest; 1 m/s.")] = None
+    drift: Annotated[Distance | None, Field(description="Of what is to stay; 30 m.")] = None
+    stuck: Annotated[
+        Duration | None, Field(description="Without progress, until operators are alerted; 2 min.")
+    ] = None
+
+
+BOUNDS = {
+    "cross_track": "cross_track_m",
+    "cross_track_time": "cross_track_s",
+    "height": "height_m",
+    "height_time": "height_s",
+    "fence": "fence_m",
+    "fall": "fall_m_s",
+    "disarmed_above": "disarmed_above_m",
+    "jump": "jump_m",
+    "waypoint": "waypoint_m",
+    "covered": "covered",
+    "rest": "rest_m_s",
+    "drift": "drift_m",
+    "stuck": "stuck_s",
+}
+"""The bound of `m2pem.conformance.bounds.Bounds` that each key sets."""
+
+
 class VehicleModel(_Model):
     """A vehicle."""
 
@@ -214,6 +267,10 @@ class VehicleModel(_Model):
         CutOffModel | None,
         BeforeValidator(_cut_off, json_schema_input_type=CutOffModel | _Action),
         Field(description="What its host does without contact to the executive."),
+    ] = None
+    conformance: Annotated[
+        ConformanceModel | None,
+        Field(description="Its bounds of what it does otherwise than commanded; the fleet's."),
     ] = None
     tags: Annotated[list[Text], Field(description="Words by which roles ask for it.")] = []
 
@@ -480,6 +537,10 @@ class FleetModel(_Model):
         ],
         Field(description="Areas and corridors that few vehicles may be in at a time."),
     ] = {}
+    conformance: Annotated[
+        ConformanceModel | None,
+        Field(description="Bounds of what vehicles do otherwise than commanded."),
+    ] = None
     allocation: AllocationModel | None = None
     schedule: ScheduleModel | None = None
 

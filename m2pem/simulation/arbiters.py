@@ -119,7 +119,9 @@ class SimArbiter:
     and `broadcast`, and use `script`, `scale_time`, `inject`, `lose_link` and `restore_link`.
     """
 
-    capabilities = ArbiterCapabilities(adjusts=True, sights=True, addresses=True, fences=True)
+    capabilities = ArbiterCapabilities(
+        adjusts=True, sights=True, addresses=True, fences=True, straight=True
+    )
 
     def __init__(
         self,

@@ -8,6 +8,7 @@ from typing import TypeAlias, Union
 import msgspec
 
 from m2pem.api.arbiter import BehaviorId, BehaviorReport
+from m2pem.api.commanded import Commanded
 from m2pem.api.remaining import RemainingWork
 from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.mission.values import Value
@@ -155,6 +156,8 @@ class Execution:
             native_ref=self.id,
             outputs=outcome.outputs,
             remaining=None if done else outcome.remaining or before,
+            # Where a test says how it ends, the vehicle need not have moved.
+            commanded=Commanded() if self.strike is not None and self.strike.sole else None,
         )
         return self.last
 

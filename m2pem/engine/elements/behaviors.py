@@ -194,7 +194,7 @@ def behavior_reported(x: Execution, item: i.BehaviorReported) -> None:
         return
     if item.remaining is not None:
         behavior = replace(behavior, remaining=item.remaining)
-    _ended(x, behavior, item.state, item.code, item.reason, item.outputs)
+    _ended(x, behavior, item.state, item.code, item.reason, item.outputs, item.evidence)
 
 
 def _ended(
@@ -204,6 +204,7 @@ def _ended(
     code: str = "",
     reason: str = "",
     outputs: dict[str, Value] | None = None,
+    evidence: dict[str, Value] | None = None,
 ) -> None:
     if state is BehaviorState.SUCCEEDED:
         code = ""
@@ -224,6 +225,7 @@ def _ended(
             state,
             code,
             reason,
+            evidence or {},
         )
     )
     if token is None:

@@ -1,5 +1,7 @@
 """Records about the work of tasks: allocations, behaviors, prompts and services."""
 
+import msgspec
+
 from m2pem.engine.records.base import BaseRecord
 from m2pem.mission.catalogue import BehaviorState
 from m2pem.mission.values import Value
@@ -133,7 +135,8 @@ class BehaviorRestarted(BaseRecord, frozen=True):
 
 
 class BehaviorEnded(BaseRecord, frozen=True):
-    """A behavior has ended and released its resources. `code`: its error, "" if it succeeded."""
+    """A behavior has ended and released its resources. `code`: its error, "" if it succeeded.
+    `evidence`: what telemetry showed of it (docs/evidence.md); empty: nothing was watched."""
 
     token: int
     process: str
@@ -143,6 +146,7 @@ class BehaviorEnded(BaseRecord, frozen=True):
     state: BehaviorState
     code: str
     reason: str = ""
+    evidence: dict[str, Value] = msgspec.field(default_factory=dict)
 
 
 class WorkReassigned(BaseRecord, frozen=True):

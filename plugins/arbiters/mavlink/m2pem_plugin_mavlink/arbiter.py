@@ -96,7 +96,7 @@ class MavlinkArbiter(UnitArbiter["VehicleController"]):
     """
 
     capabilities = ArbiterCapabilities(
-        one_vehicle=True, adjusts=True, addresses=True, reclaims=True, fences=True
+        one_vehicle=True, adjusts=True, addresses=True, reclaims=True, fences=True, straight=True
     )
 
     def __init__(
