@@ -101,7 +101,7 @@ class Watch:
         self._fence_us = self._began_us = 0
         self._stays_at: EastNorth | None = None
         self._last: dict[str, _Lasting] = {}
-        self._progress: tuple[float, int] = (-1.0, 0)
+        self._progress: tuple[float, int] | None = None
         self.states = 0
         if start is not None:
             self.observe(start)
@@ -288,8 +288,8 @@ class Watch:
     def _stuck(self, state: VehicleState, done: float | None) -> Deviation | None:
         if done is None or self.commanded.end in (ExpectedEnd.NONE, ExpectedEnd.REST):
             return None
-        reached, since_us = self._progress
-        if done > reached or self._speed_m_s > self._bounds.rest_m_s:
+        reached, since_us = self._progress or (done, state.time_us)
+        if self._progress is None or done > reached or self._speed_m_s > self._bounds.rest_m_s:
             self._progress = max(done, reached), state.time_us
             return None
         still_s = (state.time_us - since_us) / US_PER_S

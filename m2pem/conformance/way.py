@@ -119,7 +119,7 @@ class Way:
 
     def _near_legs(self, start: EastNorth) -> list[Segment]:
         legs = [self._leg(self._next, start)]
-        if self._next > 1:
+        if self._next > 0:
             legs.append(self._leg(self._next - 1, start))
         if self._next + 1 < len(self._points):
             legs.append(self._leg(self._next + 1, start))

@@ -16,6 +16,7 @@ from m2pem.api.arbiter import (
     Limits,
 )
 from m2pem.api.capabilities import ArbiterCapabilities
+from m2pem.api.commanded import Commanded
 from m2pem.api.telemetry import Telemetry
 from m2pem.fleet.behaviors import SHARED
 from m2pem.mission.catalogue import BehaviorSpec, BehaviorState, ResourceId
@@ -69,6 +70,7 @@ class FakeArbiter:
         outputs: Mapping[str, Value] | None = None,
         remaining: Mapping[str, Value] | None = None,
         epoch: int = 0,
+        commanded: Commanded | None = None,
     ) -> None:
         """Make the arbiter report the state of a behavior, after what `known` says of it."""
         known = self.known.get(behavior)
@@ -84,6 +86,7 @@ class FakeArbiter:
                 outputs=outputs or {},
                 remaining=remaining,
                 epoch=epoch,
+                commanded=commanded,
             )
         )
 
