@@ -253,7 +253,7 @@ class ConformanceMonitor:
         seen = {vehicle: watch.evidence() for vehicle, watch in watched.watches.items()}
         if len(seen) == 1:
             return next(iter(seen.values()))
-        return dict(seen)
+        return {str(vehicle): evidence for vehicle, evidence in seen.items()}
 
 
 def bounds_of(fleet: Fleet, vehicle: ResourceId) -> Bounds | None:

@@ -323,7 +323,7 @@ def _build(source: YamlSource, model: FleetModel, geometries: dict[str, Geometry
             tags=tuple(vehicle.tags),
             host=vehicle.host or "",
             when_cut_off=_cut_off(vehicle),
-            conformance=vehicle.conformance and _conformance(vehicle.conformance),
+            conformance=None if vehicle.conformance is None else _conformance(vehicle.conformance),
             line=source.line(("vehicles", name)),
         )
     teams = {

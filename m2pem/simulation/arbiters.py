@@ -26,7 +26,7 @@ from m2pem.simulation.broadcast import DEFAULT_HZ, Broadcast
 from m2pem.simulation.detectors import Detectors
 from m2pem.simulation.event_queue import EventQueue
 from m2pem.simulation.executions import Body, Effect, Execution, Strike
-from m2pem.simulation.faults import Fault, FaultList
+from m2pem.simulation.faults import DEVIATING, Fault, FaultList, altered
 from m2pem.simulation.frame import FlatFrame
 from m2pem.simulation.links import Links
 from m2pem.simulation.payloads import SimPayload
@@ -106,6 +106,19 @@ def bodies_at_home(
         else:
             bodies[resource] = SimVehicle(connection, settings, frame, next(places), now_us)
     return bodies
+
+
+_ENDS = {
+    "fail": "failed",
+    "stall": "stalled",
+    "lose_link": "lose_link",
+    "disarm": "disarmed",
+    "fall": "falling",
+    "end_early": "succeeded",
+    "go_on": "goes_on",
+    "jump": "jumped",
+}
+"""The end of a `Strike` by the kind of a fault."""
 
 
 class SimArbiter:
@@ -402,9 +415,23 @@ class SimArbiter:
             self._simulation.reject(execution, fault.error or "REJECTED", SCRIPTED)
             return
         if fault is not None:
-            end = {"fail": "failed", "stall": "stalled", "lose_link": "lose_link"}[fault.kind]
-            strike = Strike(fault.after_s, end, fault.error)
+            if fault.kind in ("skip", "drift"):
+                request = altered(request, fault)
+            else:
+                strike = Strike(fault.after_s, _ENDS[fault.kind], fault.error, by_m=fault.by_m)
         self._simulation.start(execution, request, strike, now_us)
+        if fault is not None and fault.kind in DEVIATING:
+            self._show(execution, now_us)
+
+    def _show(self, execution: Execution, now_us: int) -> None:
+        """Publish what a vehicle does that deviates, also where only changes are published."""
+        bodies = [part.body for part in execution.parts]
+        for body in bodies:
+            self.broadcast.send(body, now_us)
+        moves = any(isinstance(each, SimVehicle) and each.pose(now_us).speed for each in bodies)
+        if not execution.ended or moves:
+            again_us = now_us + US_PER_S
+            self._event_queue.at(again_us, partial(self._show, execution), background=True)
 
     def _take_fault(self, request: BehaviorRequest) -> Fault | None:
         for resource in request.resources:

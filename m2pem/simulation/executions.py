@@ -71,14 +71,16 @@ class Outcome(msgspec.Struct, frozen=True):
 class Strike(msgspec.Struct, frozen=True):
     """What cuts a behavior short, `after_s` into it; holding it stops that time too.
 
-    `end` is "failed", "succeeded", "stalled", "lost" or "lose_link". `sole`: the behavior lasts
-    until then, even if its motion is over.
+    `end` is "failed", "succeeded", "stalled", "lost", "lose_link", "disarmed", "falling", "jumped"
+    (by `by_m`) or "goes_on", after a cancel. `sole`: the behavior lasts until then, even if its
+    motion is over.
     """
 
     after_s: float
     end: str
     error: str = ""
     sole: bool = False
+    by_m: float = 0.0
 
 
 @dataclass(slots=True)

@@ -5,10 +5,15 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from m2pem.api.faults import Effect, FaultGrammar, FaultKind
+from m2pem.api.arbiter import BehaviorRequest
+from m2pem.api.faults import NUMBER, Effect, FaultGrammar, FaultKind
+from m2pem.geo.local_frame import offset
+from m2pem.mission.geometry import Coordinate, Point, Route
 from m2pem.units import Dimension, quantity
 
-FAULT_KINDS = ("reject", "fail", "stall", "lose_link")
+FAULT_KINDS = ("reject", "fail", "stall", "lose_link", "disarm", "fall", "end_early", "go_on")
+DEVIATING = ("disarm", "fall", "end_early", "go_on", "skip", "drift", "jump")
+"""Faults that telemetry alone shows (docs/evidence.md)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,6 +26,12 @@ class Fault:
     * fail: the vehicle stops, and the behavior fails with `error` ("" is FAILED).
     * stall: the vehicle stops and nothing more is received of the behavior.
     * lose_link: nothing more is received of the vehicle, and it receives nothing.
+    * disarm, fall: an aircraft falls, in the first case disarmed, and reports nothing.
+    * end_early: the vehicle stops, and reports that it has succeeded.
+    * go_on: after a cancel, it reports that it is cancelled, and goes on.
+    * skip: the waypoints `first` to `last` of its route, from 1, are left out.
+    * drift: its way lies `by_m` east of the commanded one, from the start.
+    * jump: the reported position moves east by `by_m`.
     """
 
     kind: str
@@ -28,6 +39,9 @@ class Fault:
     after_s: float = 0.0
     error: str = ""
     times: int = 1
+    by_m: float = 0.0
+    first: int = 0
+    last: int = 0
 
 
 class FaultList:
@@ -61,6 +75,18 @@ def _strikes(kind: str) -> Callable[[re.Match[str]], Effect[list[Fault]]]:
     return effect
 
 
+def _skips(match: re.Match[str]) -> Effect[list[Fault]]:
+    first, last = int(match[1]), int(match[2] or match[1])
+    if not 1 <= first <= last:
+        raise ValueError("waypoints count from 1: say the first and the last that are skipped")
+    return Effect(lambda noted: noted.append(Fault("skip", first=first, last=last)))
+
+
+def _by(kind: str) -> Callable[[re.Match[str]], Effect[list[Fault]]]:
+    """Return the effect of a fault with a distance in metres."""
+    return lambda match: Effect(lambda noted: noted.append(Fault(kind, by_m=float(match[1]))))
+
+
 _CODE = r"(?:\s+([A-Za-z_]\w*))?"
 GRAMMAR: FaultGrammar[list[Fault]] = FaultGrammar(
     {
@@ -68,6 +94,15 @@ GRAMMAR: FaultGrammar[list[Fault]] = FaultGrammar(
         "fail, fail CODE": FaultKind(f"fail{_CODE}", _strikes("fail")),
         "stall": FaultKind("stall", _strikes("stall")),
         "cut link": FaultKind("cut link", _strikes("lose_link")),
+        "disarm": FaultKind("disarm", _strikes("disarm")),
+        "fall": FaultKind("fall", _strikes("fall")),
+        "end early": FaultKind("end early", _strikes("end_early")),
+        "go on after cancel": FaultKind("go on after cancel", _strikes("go_on")),
+        "skip waypoint 4, skip waypoints 4 to 7": FaultKind(
+            r"skip waypoints? (\d+)(?: to (\d+))?", _skips
+        ),
+        "drift 30 m": FaultKind(rf"drift {NUMBER} ?m", _by("drift")),
+        "jump 50 m": FaultKind(rf"jump {NUMBER} ?m", _by("jump")),
     },
     "goto: fail ROUTE_BLOCKED at 5 s",
     times="of the behavior; without: as it begins",
@@ -102,3 +137,28 @@ def read_faults(said: str | Mapping[str, Any]) -> Sequence[Fault]:
     behavior, error = str(said.get("behavior", "")), str(said.get("error", ""))
     after_s = quantity(said.get("after", 0.0), Dimension.DURATION)
     return [Fault(kind, behavior, after_s, error, times)]
+
+
+def altered(request: BehaviorRequest, fault: Fault) -> BehaviorRequest:
+    """Return what a vehicle with a fault does instead of a request, without knowing it."""
+    changed: dict[str, Any] = {}
+    for name, value in request.parameters.items():
+        if isinstance(value, Route) and fault.kind == "skip":
+            kept = [
+                at for at in range(len(value.waypoints)) if not fault.first <= at + 1 <= fault.last
+            ]
+            if not kept:
+                continue
+            changed[name] = Route.of(
+                [value.waypoints[at] for at in kept], [value.frames[at] for at in kept]
+            )
+        elif isinstance(value, Route) and fault.kind == "drift":
+            aside = tuple(_aside(each, fault.by_m) for each in value.waypoints)
+            changed[name] = replace(value, waypoints=aside)
+        elif isinstance(value, Point) and fault.kind == "drift":
+            changed[name] = replace(value, position=_aside(value.position, fault.by_m))
+    return replace(request, parameters={**request.parameters, **changed})
+
+
+def _aside(place: Coordinate, by_m: float) -> Coordinate:
+    return (*offset(place[:2], by_m, 0.0), place[2])

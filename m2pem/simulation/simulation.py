@@ -205,6 +205,10 @@ class Simulation:
             execution.next_report(Outcome(BehaviorState.CANCELLED))
             self._finish(execution, Outcome(BehaviorState.CANCELLED), now_us)
             return
+        if execution.strike is not None and execution.strike.end == "goes_on":
+            everything = {part.body.id for part in execution.parts}
+            self._finish(execution, Outcome(BehaviorState.CANCELLED), now_us, keep=everything)
+            return
         for part in execution.parts:
             body = part.body
             if part.done or part.idle or not isinstance(body, SimVehicle):
@@ -389,6 +393,20 @@ class Simulation:
                     part.body.stop(now_us)
                     self._settle(part.body, now_us)
                 self.memory.save(execution)
+            case "disarmed" | "falling":
+                execution.forget_timers()
+                for part in execution.parts:
+                    part.done = True
+                    if isinstance(part.body, SimVehicle):
+                        part.body.fall(now_us, disarmed=strike.end == "disarmed")
+                        self._changed(part.body, now_us)
+            case "jumped":
+                execution.strike = None
+                self._watch(execution)
+                for part in execution.parts:
+                    if isinstance(part.body, SimVehicle):
+                        part.body.jumped_m += strike.by_m
+                        self._changed(part.body, now_us)
             case "lose_link":
                 execution.strike = None
                 self._watch(execution)
@@ -520,7 +538,7 @@ class Simulation:
             strike and (strike.sole or strike.after_s < execution.limit_s)
         ):
             strike = Strike(execution.limit_s, "succeeded")
-        if strike is None:
+        if strike is None or strike.end == "goes_on":
             return
         due = execution.watch.when(strike.after_s)
         if due is not None:

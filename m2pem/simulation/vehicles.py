@@ -9,11 +9,13 @@ from m2pem.simulation.course import ALOFT_M, Course, Craft
 from m2pem.simulation.frame import FlatFrame
 from m2pem.simulation.kinematics import STANDING_LOAD
 from m2pem.simulation.manoeuvres import yaw_of
-from m2pem.simulation.segments import Pose, Stand, Vector
+from m2pem.simulation.segments import Pose, Profile, Stand, Travel, Vector
 from m2pem.simulation.settings import Settings
 from m2pem.simulation.trajectory import Plan, Track, retimed
 
 _PARKING_GAP_M = 10.0
+FALL_M_S = 12.0
+"""Of an aircraft whose motors have stopped, on average from 20 m."""
 
 
 class SimVehicle:
@@ -37,6 +39,8 @@ class SimVehicle:
             settings.kinematics.cruise_speed_m_s, settings.kinematics.max_speed_m_s
         )
         self.home = self._home(frame, place)
+        self.falls = self.disarmed = False
+        self.jumped_m = 0.0
         self.battery = settings.battery
         self.spare = 0.0
         yaw = yaw_of(settings.heading_rad)
@@ -67,6 +71,7 @@ class SimVehicle:
 
     def take(self, plan: Plan[Pose], now_us: int) -> None:
         """Follow another plan, which must begin where it is."""
+        self.falls = self.disarmed = False
         self.battery = self.battery_at(now_us)
         self._driven_m = self.driven_m(now_us)
         self.track = Track(plan, now_us)
@@ -77,7 +82,9 @@ class SimVehicle:
         return self._driven_m + self.track.driven_m(now_us)
 
     def stop(self, now_us: int) -> None:
-        """Brake straight on."""
+        """Brake straight on, unless it falls."""
+        if self.falls:
+            return
         self.take(Course(self.craft(now_us)).plan(), now_us)
 
     def come_down(self, now_us: int) -> None:
@@ -87,8 +94,20 @@ class SimVehicle:
             course.climb_to(self.home[2])
         self.take(course.plan(), now_us)
 
+    def fall(self, now_us: int, *, disarmed: bool) -> None:
+        """Fall to the ground, if it is in the air: nothing stops it then."""
+        pose = self.pose(now_us)
+        high_m = pose.place[2] - self.home[2]
+        if self.domain == "air" and high_m > 0:
+            profile = Profile(high_m, FALL_M_S, FALL_M_S, FALL_M_S, 1.0, 1.0)
+            self.take(Plan([Travel(pose.place, (0.0, 0.0, -1.0), pose.yaw, profile)]), now_us)
+            self.falls = True
+        self.disarmed = disarmed
+
     def hold(self, now_us: int) -> None:
-        """Brake on its path."""
+        """Brake on its path, unless it falls."""
+        if self.falls:
+            return
         self._count(now_us)
         braking_s = self.pose(now_us).speed / self.kinematics.deceleration_m_s2
         self.track.hold(now_us, braking_s)
@@ -166,13 +185,13 @@ class SimVehicle:
         return VehicleState(
             resource=self.id,
             time_us=now_us,
-            position=frame.to_position(pose.place),
+            position=frame.to_position((pose.place[0] + self.jumped_m, *pose.place[1:])),
             altitude_above_home_m=pose.place[2] - self.home[2],
             velocity_enu_m_s=pose.velocity,
             yaw_rad=math.remainder(pose.yaw, math.tau),
             battery_fraction=battery,
             mode=self._mode(aloft),
-            armed=aloft or bool(self.behavior),
+            armed=(aloft or bool(self.behavior)) and not self.disarmed,
             ready=battery > 0,
             not_ready_reasons=() if battery > 0 else ("the battery is empty",),
             link=LinkState.CONNECTED,
