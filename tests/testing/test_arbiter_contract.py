@@ -25,6 +25,7 @@ from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.mission.geometry import Point, Route
 from m2pem.mission.values import Value
 from m2pem.simulation.arbiters import SimArbiter
+from m2pem.simulation.faults import Fault
 from m2pem.testing.contracts.arbiter import ArbiterCase, ArbiterContract
 
 UGV1, UGV2 = ResourceId("ugv1"), ResourceId("ugv2")
@@ -50,6 +51,18 @@ class TwiceReported(SimArbiter):
             yield report
             if report.state.terminal:
                 yield dataclasses.replace(report, number=report.number + 1)
+
+
+class EndsEarly(SimArbiter):
+    async def connect(self) -> None:
+        await super().connect()
+        self.inject(UGV1, Fault("end_early", after_s=1.0))
+
+
+class GoesOn(SimArbiter):
+    async def connect(self) -> None:
+        await super().connect()
+        self.inject(UGV1, Fault("go_on"))
 
 
 class NeverLess(SimArbiter):
@@ -297,6 +310,8 @@ FINDS = [
     (Boastful, "the_arbiter_declares_what_it_can_do_beyond_its_protocol"),
     (TwiceReported, "accepted_comes_before_running_and_one_terminal_report_last"),
     (NeverAccepted, "accepted_comes_before_running_and_one_terminal_report_last"),
+    (EndsEarly, "accepted_comes_before_running_and_one_terminal_report_last"),
+    (GoesOn, "cancel_ends_a_behavior_within_the_declared_bound"),
     (NeverLess, "less_and_less_is_left_of_a_route"),
     (Unnumbered, "report_numbers_rise_from_one"),
     (StartsAnew, "a_second_start_of_the_same_behavior_has_no_effect"),

@@ -19,6 +19,9 @@ from m2pem.testing.contracts.arbiter_harness import (
     Effects,
     MakeArbiter,
     connected,
+    has_evidence,
+    is_at_rest,
+    speed,
     start,
     terminal,
 )
@@ -62,10 +65,12 @@ class ArbiterContract(ArbiterLinks):
     async def test_accepted_comes_before_running_and_one_terminal_report_last(
         self, harness: ArbiterHarness, case: ArbiterCase
     ) -> None:
-        """ACCEPTED, RUNNING, then exactly one terminal report, and none after it."""
+        """ACCEPTED, RUNNING, then exactly one terminal report, and none after it; telemetry shows
+        what a success promises."""
         await start(harness, "r1.b1", case.short, case.vehicle)
         end = await harness.ended("r1.b1", case.short_s)
         assert end.state is BehaviorState.SUCCEEDED, end
+        await has_evidence(harness, case, case.short)
         await harness.clock.sleep(case.watch_s)
         assert harness.states_of("r1.b1") == [
             BehaviorState.ACCEPTED,
@@ -188,7 +193,9 @@ class ArbiterContract(ArbiterLinks):
         specs = {each.name: each for each in harness.arbiter.catalogue(case.vehicle)}
         spec = specs[name]
         await start(harness, "r1.b1", (name, parameters), case.vehicle)
-        await harness.ended("r1.b1", case.route_s)
+        end = await harness.ended("r1.b1", case.route_s)
+        if end.state is BehaviorState.SUCCEEDED:
+            await has_evidence(harness, case, case.route)
         said = [report.remaining for report in harness.of("r1.b1") if report.remaining]
         assert len(said) > 1, harness.of("r1.b1")
         assert len(said) <= MOST_REPORTS, f"each is a record of the journal: {len(said)}"
@@ -203,13 +210,16 @@ class ArbiterContract(ArbiterLinks):
     async def test_cancel_ends_a_behavior_within_the_declared_bound(
         self, harness: ArbiterHarness, case: ArbiterCase
     ) -> None:
-        """A cancel ends a behavior within `limits().cancel_timeout_s`."""
+        """A cancel ends a behavior within `limits().cancel_timeout_s`, and the vehicle, if it says
+        how fast it is, comes to rest within as much."""
         await start(harness, "r1.b1", case.long, case.vehicle)
         await harness.running("r1.b1")
         await harness.clock.sleep(case.watch_s / 2)
         await harness.arbiter.cancel("r1.b1", 1)
         bound_s = harness.arbiter.limits(case.vehicle).cancel_timeout_s
         assert (await harness.ended("r1.b1", bound_s)).state is BehaviorState.CANCELLED
+        at_rest = await harness.until(lambda: is_at_rest(harness, case), bound_s)
+        assert at_rest, f"cancelled, and moves at {speed(harness, case.vehicle):.1f} m/s"
 
     @connected
     async def test_a_second_cancel_changes_nothing(

@@ -25,6 +25,9 @@ from m2pem.api.arbiter import (
 )
 from m2pem.api.clock import Clock, SystemClock, run_virtual
 from m2pem.api.telemetry import LinkState, PayloadState, TeamState, VehicleState
+from m2pem.conformance.bounds import Bounds
+from m2pem.conformance.derivation import commanded_by
+from m2pem.conformance.watch import Watch
 from m2pem.errors import StaleCommandError
 from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.telemetry.bus import Bus
@@ -288,6 +291,28 @@ async def start(
     """Start a behavior of the case."""
     name, parameters = behavior
     await harness.start(id_, name, *resources, **options, **dict[str, Any](parameters))
+
+
+async def has_evidence(
+    harness: ArbiterHarness, case: ArbiterCase, behavior: tuple[str, Mapping[str, ResolvedValue]]
+) -> None:
+    """Check that telemetry shows what the success of a behavior of the case promises: at once, or
+    soon, as a report may overtake it."""
+    name, parameters = behavior
+    request = BehaviorRequest("r1.b1", 1, name, parameters, (case.vehicle,))
+    said = next((each.commanded for each in harness.of("r1.b1") if each.commanded), None)
+    watch, taken = Watch(said or commanded_by(request), Bounds()), 0
+
+    def missing() -> str:
+        nonlocal taken
+        for state in harness.states[taken:]:
+            if isinstance(state, VehicleState) and state.resource == case.vehicle:
+                watch.observe(state)
+        taken = len(harness.states)
+        return watch.missing()
+
+    seen = await harness.until(lambda: not missing(), case.watch_s)
+    assert seen, f"SUCCEEDED, and telemetry shows: {missing()}"
 
 
 async def refusal(call: Awaitable[object]) -> str:
