@@ -47,6 +47,8 @@ REQUIREMENT_VIOLATED = "REQUIREMENT_VIOLATED"
 """The code of the alert of a run that has violated a requirement."""
 DEVIATION = "DEVIATION"
 """The code of the alert of a vehicle that does not do what it is commanded."""
+NOT_STOPPED = "NOT_STOPPED"
+"""The code of the alert of a vehicle that goes on although its behavior was cancelled."""
 SPACE_VIOLATED = "SPACE_VIOLATED"
 """The code of the alert of a shared space with more vehicles than it has places."""
 

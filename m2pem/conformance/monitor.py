@@ -9,7 +9,7 @@ import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
-from m2pem.api.alerts import DEVIATION, AlertSeverity
+from m2pem.api.alerts import DEVIATION, NOT_STOPPED, AlertSeverity
 from m2pem.api.arbiter import BehaviorReport, BehaviorRequest
 from m2pem.api.clock import Clock
 from m2pem.api.commanded import Commanded
@@ -21,6 +21,7 @@ from m2pem.conformance.derivation import commanded_by
 from m2pem.conformance.watch import Deviation, Watch
 from m2pem.fleet.fleet import Domain, Fleet
 from m2pem.geo.fence import Fence
+from m2pem.geo.local_frame import EastNorth
 from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.mission.losses import FAILED, INCOMPLETE
 from m2pem.mission.values import Value
@@ -58,10 +59,21 @@ class _Watched:
     timer: asyncio.Task[None] | None = None
 
 
+@dataclass(slots=True)
+class _Stopping:
+    """A vehicle whose behavior `request` was cancelled has until `due_us` to stop near `place`."""
+
+    request: BehaviorRequest
+    watch: Watch
+    place: EastNorth | None
+    due_us: int
+
+
 class ConformanceMonitor:
     """`latest`: the last state of a vehicle, if there is one. `fences_of`: where a vehicle may be.
     `end`: cancels a behavior at its arbiter. `say`: takes alerts for operators. `deliver`: takes
-    the reports of successes that had to wait. `speed`: of the clock."""
+    the reports of successes that had to wait. `stops_within_s`: the bound of a vehicle's arbiter
+    for a cancel; None: an operator has the vehicle. `speed`: of the clock."""
 
     def __init__(
         self,
@@ -73,6 +85,7 @@ class ConformanceMonitor:
         end: Callable[[str], None],
         say: Callable[[Alert], None],
         deliver: Callable[[BehaviorReport], None],
+        stops_within_s: Callable[[ResourceId], float | None],
         speed: float = 1.0,
     ) -> None:
         self._fleet = fleet
@@ -82,9 +95,11 @@ class ConformanceMonitor:
         self._end = end
         self._say = say
         self._deliver = deliver
+        self._stops_within_s = stops_within_s
         self._settles_s = max(SETTLES_WITHIN_S, SETTLES_WITHIN_REAL_S * speed)
         self._watched: dict[str, _Watched] = {}
         self._by_vehicle: dict[ResourceId, _Watched] = {}
+        self._stopping: dict[ResourceId, _Stopping] = {}
 
     # --- behaviors --------------------------------------------------------------------------------
 
@@ -100,6 +115,7 @@ class ConformanceMonitor:
         self._watched[request.id] = watched
         for vehicle in vehicles:
             self._by_vehicle[vehicle] = watched
+            self._stopping.pop(vehicle, None)
         if adopted:
             self._watch(watched, None)
 
@@ -155,6 +171,8 @@ class ConformanceMonitor:
             return
         watched = self._by_vehicle.get(state.resource)
         if watched is None:
+            if self._stopping:
+                self._stops(state)
             return
         watch = watched.watches.get(state.resource)
         if watch is None:
@@ -171,6 +189,25 @@ class ConformanceMonitor:
                 self._settle(watched)
         elif deviation is not None and not watched.ending and not watched.deviation:
             self._deviates(watched, state.resource, watch, deviation)
+
+    def _stops(self, state: VehicleState) -> None:
+        """Look whether a vehicle has stopped after a cancel; say once that it has not."""
+        stopping = self._stopping.get(state.resource)
+        if stopping is None:
+            return
+        watch, request = stopping.watch, stopping.request
+        watch.observe(state)
+        if watch.at_rest is False and self._clock.now_us() < stopping.due_us:
+            return
+        del self._stopping[state.resource]
+        goes_on = watch.goes_on_from(stopping.place)
+        if goes_on and self._stops_within_s(state.resource) is not None:
+            text = (
+                f"{state.resource} does NOT obey the cancel of {request.behavior} "
+                f"({request.id}): {goes_on}. Use its own stop"
+            )
+            severity = AlertSeverity.CRITICAL
+            self._say(Alert(_run(request.id), NOT_STOPPED, text, severity, (state.resource,)))
 
     def _deviates(
         self, watched: _Watched, vehicle: ResourceId, watch: Watch, deviation: Deviation
@@ -216,6 +253,8 @@ class ConformanceMonitor:
         watched = self._watched.get(report.id)
         if watched is None or not report.state.terminal:
             return report
+        if report.state is BehaviorState.CANCELLED:
+            self._expect_stop(watched)
         report = replace(report, evidence=self._evidence(watched))
         if watched.deviation:
             if report.state in (BehaviorState.SUCCEEDED, BehaviorState.CANCELLED):
@@ -230,6 +269,14 @@ class ConformanceMonitor:
             if missing:
                 return replace(report, state=BehaviorState.FAILED, code=INCOMPLETE, reason=missing)
         return report
+
+    def _expect_stop(self, watched: _Watched) -> None:
+        for vehicle, watch in watched.watches.items():
+            bound_s = self._stops_within_s(vehicle)
+            if bound_s is None or self._by_vehicle.get(vehicle) is not watched:
+                continue  # an operator, or another behavior, moves it now
+            due_us = self._clock.now_us() + round(bound_s * US_PER_S)
+            self._stopping[vehicle] = _Stopping(watched.request, watch, watch.here, due_us)
 
     async def _settle_later(self, watched: _Watched) -> None:
         await self._clock.sleep(self._settles_s)

@@ -355,6 +355,21 @@ class Watch:
             return None
         return math.hypot(*velocity) <= self._bounds.rest_m_s
 
+    def goes_on_from(self, place: EastNorth | None) -> str:
+        """Return how the vehicle goes on although it was to stop, at a place of its frame; "": it
+        does not. Aircraft with wings circle, within twice the diameter of their turn."""
+        if place is None or self._here is None or self.at_rest is not False:
+            return ""
+        away_m, bound_m = math.dist(place, self._here), self._bounds.drift_m
+        if away_m <= bound_m + 2 * turn_m(self._speed_m_s):
+            return ""
+        return f"it moves at {self._speed_m_s:.1f} m/s, {away_m:.0f} m from where it was to stop"
+
+    @property
+    def here(self) -> EastNorth | None:
+        """Where the vehicle was last, in metres of a frame of the watch; None: not known."""
+        return self._here
+
     def missing(self) -> str:
         """Return what a success promises that was not seen; "": nothing, or telemetry says nothing
         of it."""

@@ -179,6 +179,7 @@ class Supervisor:
             end=self._end,
             say=events.publish,
             deliver=self._deliver,
+            stops_within_s=self._stops_within_s,
             speed=settings.speed,
         )
         self.dispatcher = Dispatcher(
@@ -492,6 +493,11 @@ class Supervisor:
             self.replaced(runner.id, replaced_by(runner, report.epoch))
         elif (passed := self.conformance.reported(report)) is not None:
             self.dispatcher.reported(passed)
+
+    def _stops_within_s(self, vehicle: ResourceId) -> float | None:
+        if vehicle in self.handover.taken:
+            return None
+        return self.arbiters.of(vehicle).limits(vehicle).cancel_timeout_s
 
     def _deliver(self, report: BehaviorReport) -> None:
         self.dispatcher.reported(report)

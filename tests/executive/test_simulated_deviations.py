@@ -134,3 +134,27 @@ def test_bounds_are_those_of_the_vehicle(play: Any) -> None:
     wide = Conformance({"cross_track_m": 60.0, "waypoint_m": 60.0})
     play(story, fleet=aircraft("drift 40 m", conformance=wide))
     play(story, fleet=aircraft("drift 40 m", conformance=Conformance(watched=False)))
+
+
+@pytest.mark.parametrize("fault", ["go on after cancel", ""])
+def test_a_vehicle_that_goes_on_after_a_stop_does_not_obey(play: Any, fault: str) -> None:
+    async def story(world: World) -> None:
+        said: list[str] = []
+        world.executive.events.on_alert = lambda each: (
+            said.append(each.text) if each.code == "NOT_STOPPED" else None
+        )
+        run = await world.executive.control.start(flies("goto", target=FAR))
+        await world.clock.sleep(6.0)
+        await world.executive.control.stop(run, by="anna")
+        await world.clock.sleep(20.0)
+        if not fault:
+            assert said == []
+            return
+        (text,) = said
+        assert re.fullmatch(
+            r"uav1 does NOT obey the cancel of goto \(r1\.b1\): it moves at 10\.0 m/s, "
+            r"1\d\d m from where it was to stop\. Use its own stop",
+            text,
+        ), text
+
+    play(story, fleet=aircraft(*([fault] if fault else [])))
