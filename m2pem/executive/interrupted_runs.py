@@ -6,7 +6,7 @@ An operator's STOP counts for them as for any other run.
 
 import asyncio
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from m2pem.api.runs import RunId
 from m2pem.errors import NotDrivenError, OperatorError
@@ -22,6 +22,7 @@ class InterruptedRuns:
         self._stopped: StopMark | None = None
         self._are_taken_up = False
         self._stops: defaultdict[RunId, asyncio.Event] = defaultdict(asyncio.Event)
+        self._on_stop: dict[RunId, Callable[[], None]] = {}
 
     def expect(self, runs: Iterable[RunId]) -> None:
         """Say which are to be taken up, as far as is known. What was stopped by a STOP of all that
@@ -33,6 +34,7 @@ class InterruptedRuns:
     def taken_up(self) -> None:
         """Say that all are driven, or cannot be taken up."""
         self._runs, self._stopped, self._are_taken_up = (), None, True
+        self._on_stop.clear()
 
     def refuse_start(self) -> None:
         """Check that a run may begin.
@@ -63,11 +65,20 @@ class InterruptedRuns:
         if run in self._runs:
             self._marks.put(run, StopMark(by, reason))
             self._stops[run].set()
+            if (call := self._on_stop.pop(run, None)) is not None:
+                call()
         return run in self._runs
 
     def stop_of(self, run: RunId) -> asyncio.Event:
         """Return what is set when a run is stopped before it is driven."""
         return self._stops[run]
+
+    def on_stop(self, run: RunId, call: Callable[[], None]) -> None:
+        """Call once when a run is stopped before all are taken up: at once, if it is already."""
+        if self._stops[run].is_set():
+            call()
+        else:
+            self._on_stop[run] = call
 
     def stop_all(self, by: str, reason: str) -> list[RunId]:
         """Stop all as soon as they are driven, also those that are found later; returns them."""

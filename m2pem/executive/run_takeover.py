@@ -5,12 +5,14 @@ import logging
 import math
 import time
 from collections.abc import Sequence
+from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import partial
 
 from m2pem.allocation.assignment import load_solver
 from m2pem.api.clock import SystemClock
 from m2pem.api.runs import RunId
-from m2pem.engine.commands import Command
+from m2pem.engine.commands import CancelBehavior, Command, HoldResource
 from m2pem.engine.inputs import StopRun
 from m2pem.engine.run import MissionRun
 from m2pem.errors import JournalError, M2pemError, OperatorError
@@ -20,6 +22,7 @@ from m2pem.executive.runner import Runner
 from m2pem.executive.supervisor import Supervisor
 from m2pem.findings import Severity
 from m2pem.fleet.space import waits_for_space
+from m2pem.journal.base import Loss
 from m2pem.journal.mission import mission_of
 from m2pem.monitors.run_monitors import RunMonitors
 from m2pem.units import US_PER_S
@@ -28,6 +31,17 @@ log = logging.getLogger("m2pem.executive")
 
 CLOCK_BACK_US = 2 * US_PER_S
 """A wall clock that is behind the journal by more has gone back: no leap second, and no slew."""
+
+
+@dataclass(slots=True)
+class _Claimed:
+    """A run that is claimed and replayed, and does not know yet what its vehicles do. `commands`:
+    what it still has to command, once they are known; None: they are not, or it is driven."""
+
+    runner: Runner
+    outage_s: float
+    loss: Loss | None
+    commands: list[Command] | None = None
 
 
 class RunTakeover:
@@ -39,7 +53,8 @@ class RunTakeover:
     async def resume(self, runs: Sequence[RunId]) -> dict[RunId, M2pemError]:
         """Take up runs that their executive left without ending them.
 
-        Each is given what it commanded before any of them commands anything new.
+        Each is given what it commanded before any of them commands anything new. A run that an
+        operator stops meanwhile ends what it commanded, and waits for no other one.
 
         Returns why some are not taken up: a JournalError if there is no such run, or an executive
         that is alive drives it; an OperatorError if it has ended.
@@ -51,25 +66,28 @@ class RunTakeover:
         supervisor.refuse_unconnected()
         supervisor.interrupted.expect(runs)
         refused: dict[RunId, M2pemError] = {}
-        taken_over: list[tuple[Runner, list[Command]]] = []
+        claimed: dict[RunId, _Claimed] = {}
         try:
             for run in runs:
                 try:
-                    taken_over.append(await self._take_over(run))
+                    claimed[run] = await self._claim(run)
                 except M2pemError as error:
                     refused[run] = error
+            looked = [self._look(each) for each in claimed.values()]
+            found = await asyncio.gather(*looked, return_exceptions=True)
+            for run, error in zip(claimed, found, strict=True):
+                if isinstance(error, M2pemError):
+                    refused[run] = error
+                elif error is not None:
+                    raise error
         finally:
             supervisor.interrupted.taken_up()
-            for runner, commands in taken_over:
-                # Only now is known what operators have: any of the runs may say so.
-                for resource in supervisor.handover.lent_to(runner.run.state):
-                    supervisor.availability.lend(resource, runner.id)
-                runner.take_up(commands)
-                supervisor.drive(runner)
+            for each in claimed.values():
+                self._drive(each)
         return refused
 
-    async def _take_over(self, number: RunId) -> tuple[Runner, list[Command]]:
-        """Give an interrupted run what it commanded; returns what it still has to command."""
+    async def _claim(self, number: RunId) -> _Claimed:
+        """Claim an interrupted run, and rebuild its state."""
         supervisor = self._supervisor
         lines = {line.run: line for line in await supervisor.journal.runs()}
         line = lines.get(number)
@@ -114,19 +132,41 @@ class RunTakeover:
         if mark is not None:
             log.warning("%s was stopped before its executive ended; it stays stopped", number)
             runner.submit_stop(StopRun(mark.by, mark.reason), frozenset())
+            supervisor.interrupted.stop_of(number).set()
+        return _Claimed(runner, outage_s, line.loss)
+
+    async def _look(self, claimed: _Claimed) -> None:
+        """Give a claimed run what it commanded; one that is stopped is driven at once."""
+        supervisor, runner = self._supervisor, claimed.runner
+        stopped = supervisor.interrupted.stop_of(runner.id)
         commands = await take_over(
             runner,
             supervisor.arbiters,
             supervisor.dispatcher,
-            outage_s,
+            claimed.outage_s,
             supervisor.lost,
-            line.loss,
-            supervisor.interrupted.stop_of(number),
+            claimed.loss,
+            stopped,
         )
         supervisor.take_up(runner)
-        if line.loss is not None:
-            await supervisor.losses.ask(runner, line.loss)
-        return runner, commands
+        if claimed.loss is not None:
+            await supervisor.losses.ask(runner, claimed.loss)
+        claimed.commands = commands
+        supervisor.interrupted.on_stop(runner.id, partial(self._drive, claimed, only_ends=True))
+
+    def _drive(self, claimed: _Claimed, *, only_ends: bool = False) -> None:
+        """Have a run go on, if it was looked at and does not yet. `only_ends`: it commands nothing
+        new, as others may not have their vehicles yet."""
+        supervisor, runner = self._supervisor, claimed.runner
+        commands, claimed.commands = claimed.commands, None
+        if commands is None:
+            return
+        # Only now is known what operators have: any of the runs may say so.
+        for resource in supervisor.handover.lent_to(runner.run.state):
+            supervisor.availability.lend(resource, runner.id)
+        ends = (CancelBehavior, HoldResource)
+        runner.take_up([each for each in commands if not only_ends or isinstance(each, ends)])
+        supervisor.drive(runner)
 
     def _outage_s(self, number: RunId, last_us: int) -> float:
         """Return for how long no executive drove a run whose last input was decided at `last_us`.

@@ -77,6 +77,13 @@ def after_a_crash(play: Any, story: Any, *left: tuple[bytes, ...]) -> Any:
     return play(all_of_it, fleet=VEHICLES, journal=journal, start_us=START_US + OUTAGE_US)
 
 
+async def until_ended(world: World, run: str) -> Any:
+    """Wait for the end of a run that may not be claimed yet."""
+    while run not in world.executive.supervisor.runners:
+        await world.clock.sleep(0.1)
+    return await world.executive.control.wait(run)
+
+
 def test_a_request_to_a_run_that_is_just_taken_up_says_so(play):
     async def story(world: World, runs):
         with pytest.raises(NotDrivenError, match="r1 was interrupted, and is just taken up"):
@@ -258,25 +265,68 @@ def test_a_run_knows_the_geometries_that_were_handed_over_before_it_was_taken_up
     after_a_crash(play, story, (DRIVE, accepted, running))
 
 
-def test_a_stop_of_all_waits_no_ten_seconds_for_a_vehicle_that_does_not_answer(play):
+@pytest.mark.parametrize("unanswered", ["r1.b1", "r2.b1", "r1.b1 r2.b1"])
+@pytest.mark.parametrize("of_all", [True, False])
+@pytest.mark.parametrize("after_s", [0.0, 0.5])
+def test_a_stop_waits_no_ten_seconds_for_a_vehicle_that_does_not_answer(
+    play, unanswered, of_all, after_s
+):
+    """Of all runs, or of the second one, which is taken up after the first one."""
+
     async def story(world: World, runs):
-        query = world.fake.query
+        query, control = world.fake.query, world.executive.control
 
         async def asked(behavior: str, native_ref: str | None) -> BehaviorReport:
-            if behavior == "r1.b1":
+            if behavior in unanswered:
                 await asyncio.Event().wait()  # it never answers
             return await query(behavior, native_ref)
 
         world.fake.query = asked
         taking_up = asyncio.create_task(world.executive.resume_all(runs))
-        await world.clock.sleep(0.5)
+        await world.clock.sleep(after_s)
         stopped_us = world.clock.now_us()
-        assert await world.executive.control.stop_all(by="anna") == runs
-        await world.fake.until_called("cancel", "r2.b1")
+        if of_all:
+            assert await control.stop_all(by="anna") == runs
+        else:
+            await control.stop("r2", by="anna")
+        if "r2.b1" not in unanswered:
+            await world.fake.until_called("cancel", "r2.b1")
+            world.fake.report("r2.b1", BehaviorState.CANCELLED)
+        ended = await until_ended(world, "r2")
+        assert ended.status is RunStatus.STOPPED
         assert world.clock.now_us() - stopped_us < 2_000_000
+        assert world.fake.count("start") == 0
         await taking_up
+        is_soon = world.clock.now_us() - stopped_us < 2_000_000
+        assert is_soon is (of_all or unanswered == "r2.b1")
+        assert of_all or world.fake.count("cancel", "r1.b1") == 0
 
     after_a_crash(play, story, (DRIVE, accepted, running), (ELSEWHERE, accepted, running))
+
+
+def test_a_run_that_is_stopped_while_others_are_taken_up_commands_nothing_new(play):
+    """Its task waits for a vehicle, which it would get before the run that has it is known."""
+
+    async def story(world: World, runs):
+        query, control = world.fake.query, world.executive.control
+
+        async def asked(behavior: str, native_ref: str | None) -> BehaviorReport:
+            await world.clock.sleep(5.0)
+            return await query(behavior, native_ref)
+
+        world.fake.query = asked
+        taking_up = asyncio.create_task(world.executive.resume_all(runs))
+        await world.clock.sleep(0.5)
+        await control.stop("r1", by="anna")
+        assert (await until_ended(world, "r1")).status is RunStatus.STOPPED
+        assert world.executive.supervisor.availability.holder(ResourceId("ugv1")) is None
+        with pytest.raises(OperatorError, match="just taken up"):
+            await control.start(OTHER)
+        await taking_up
+        assert world.fake.count("start") == 0
+        assert world.executive.supervisor.availability.holder(ResourceId("ugv1")) == "r2.b1"
+
+    after_a_crash(play, story, (BY_NEED,), (DRIVE, accepted, running))
 
 
 def test_what_is_not_there_is_said_in_a_whole_sentence(play):
