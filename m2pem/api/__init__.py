@@ -190,6 +190,7 @@ if TYPE_CHECKING:
     from m2pem.fleet.approval import file_digest as file_digest
     from m2pem.fleet.approval import person_of as person_of
     from m2pem.fleet.behaviors import FLOWN as FLOWN
+    from m2pem.fleet.behaviors import ORBIT_RADIUS_M as ORBIT_RADIUS_M
     from m2pem.fleet.behaviors import SHARED as SHARED
     from m2pem.fleet.behaviors import takeoff_first as takeoff_first
     from m2pem.fleet.endurance import lasts_s as lasts_s

@@ -12,12 +12,10 @@ from itertools import pairwise
 
 from m2pem.deconfliction.operational_volume import NOTHING_M, Piece, Volume
 from m2pem.deconfliction.participant import ANY_HEIGHT, FlightParameters, Span, SurfaceParameters
+from m2pem.fleet.behaviors import ORBIT_RADIUS_M
 from m2pem.geo.local_frame import EastNorth
 from m2pem.geo.polygon import Hull, buffered_hull, convex_hull, middle_of
 from m2pem.geo.survey_tracks import SURVEY_SPACING_M
-
-RADIUS_M = 30.0
-"""Of circles that give no radius."""
 
 RETURN_HEIGHT_M = 30.0
 """Above home: as high as an autopilot rises, if it is lower, before it returns by itself."""
@@ -145,7 +143,7 @@ def _to_target(parameters: FlightParameters) -> Volume:
 
 def _around(parameters: FlightParameters) -> Volume:
     place, span = parameters.target_place()
-    radius_m = parameters.radius_m or RADIUS_M
+    radius_m = parameters.radius_m or ORBIT_RADIUS_M
     return way_to(parameters, None if place is None else buffered_hull([place], radius_m), span)
 
 
@@ -230,7 +228,7 @@ def observed(parameters: FlightParameters, reach_m: float) -> tuple[Hull | None,
 
 
 def _observe(parameters: FlightParameters) -> Volume:
-    return way_to(parameters, *observed(parameters, RADIUS_M))
+    return way_to(parameters, *observed(parameters, ORBIT_RADIUS_M))
 
 
 PLANS: Mapping[str, Callable[[FlightParameters], Volume]] = {

@@ -4,7 +4,6 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 
 from m2pem.deconfliction.behavior_volumes import (
-    RADIUS_M,
     along,
     observed,
     survey_area,
@@ -13,6 +12,7 @@ from m2pem.deconfliction.behavior_volumes import (
 )
 from m2pem.deconfliction.operational_volume import Piece, Volume
 from m2pem.deconfliction.participant import FlightParameters, Participant
+from m2pem.fleet.behaviors import ORBIT_RADIUS_M
 from m2pem.fleet.parameters import read_offsets
 from m2pem.geo.local_frame import EastNorth
 from m2pem.geo.polygon import buffered_hull, convex_hull
@@ -98,7 +98,7 @@ def _survey(parameters: FlightParameters) -> Volume:
 
 
 def _observe(parameters: FlightParameters) -> Volume:
-    area, span = observed(parameters, RADIUS_M)
+    area, span = observed(parameters, ORBIT_RADIUS_M)
     return way_to(
         parameters, area, span if parameters.area is not None else span.to(parameters.span())
     )

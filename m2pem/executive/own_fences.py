@@ -1,7 +1,6 @@
 """The fences of single vehicles, which ground stations upload: no behavior may leave them, of a
 mission, an operator or a station. The fleet's fence holds, too: the arbiters check it."""
 
-import math
 from collections.abc import Callable, Mapping
 
 from m2pem.api.arbiter import BehaviorRequest
@@ -10,16 +9,14 @@ from m2pem.api.bus import FleetBus
 from m2pem.api.fence_check import find_breach, known_yaw_rad, stance_on
 from m2pem.api.runs import HandedOver
 from m2pem.api.telemetry import VehicleState
+from m2pem.fleet.behaviors import ORBIT_RADIUS_M
 from m2pem.fleet.fence import own_fences
 from m2pem.geo.fence import Fence
 from m2pem.geo.geojson import parse_geojson
-from m2pem.geo.local_frame import LatLon, offset
+from m2pem.geo.local_frame import LatLon
+from m2pem.geo.polygon import circle_ring
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.geometry import Point
-
-ORBIT_RADIUS_M = 30.0
-"""Of an `orbit` that does not say it, as far as m2pem's own arbiters choose it."""
-_PLACES = 16
 
 
 class OwnFences:
@@ -67,9 +64,6 @@ def _around(behavior: str, parameters: BehaviorParameters) -> list[LatLon]:
     target = parameters.target
     if behavior in ("orbit", "area_observe") and isinstance(target, Point):
         radius_m = parameters.number("radius") or ORBIT_RADIUS_M
-        turns = [math.tau * place / _PLACES for place in range(_PLACES + 1)]
-        return [
-            offset(target.position[:2], radius_m * math.cos(turn), radius_m * math.sin(turn))
-            for turn in turns
-        ]
+        corners = circle_ring(target.position[:2], radius_m, is_around=True)
+        return [*corners, corners[0]]
     return []

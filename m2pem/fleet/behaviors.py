@@ -34,6 +34,9 @@ FLOWN = frozenset(
 ) | {"area_observe"}
 """Behaviors of a vehicle that real aircraft on the ground refuse: only `takeoff` takes them off."""
 
+ORBIT_RADIUS_M = 30.0
+"""Of circles around a target that have no `radius`."""
+
 _SLOWEST_M_S = 0.01
 _SHORTEST_M = 0.1
 _RIGHT_ANGLE = math.pi / 2

@@ -169,6 +169,18 @@ def region_of(geometry: Geometry, width_m: float | None, frame: LocalFrame) -> R
 
 # --- rings of areas, in degrees -------------------------------------------------------------------
 
+CIRCLE_CORNERS = 64
+
+
+def circle_ring(center: LatLon, radius_m: float, *, is_around: bool) -> list[LatLon]:
+    """Return the corners of a polygon around a circle, or within it; not closed."""
+    frame, step = LocalFrame(center), math.tau / CIRCLE_CORNERS
+    reach_m = radius_m / math.cos(step / 2) if is_around else radius_m
+    return [
+        frame.to_latlon((reach_m * math.sin(step * index), reach_m * math.cos(step * index)))
+        for index in range(CIRCLE_CORNERS)
+    ]
+
 
 def ring_problem(rings: Sequence[Sequence[Coordinate]]) -> str:
     """What keeps closed rings from bounding an area, with its edges; "" if nothing does.

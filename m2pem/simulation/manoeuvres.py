@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from m2pem.api.remaining import RemainingRoute, RemainingSurvey, RemainingWork, raw_parameters
-from m2pem.fleet.behaviors import takeoff_first
+from m2pem.fleet.behaviors import ORBIT_RADIUS_M, takeoff_first
 from m2pem.geo.polygon import middle_of
 from m2pem.geo.polyline import Polyline
 from m2pem.geo.survey_tracks import SurveyTracks
@@ -15,7 +15,6 @@ from m2pem.simulation.pursuit import Pursuit
 from m2pem.simulation.segments import Pose, Vector
 from m2pem.simulation.trajectory import Plan
 
-ORBIT_RADIUS_M = 30.0
 STANDOFF_M = 20.0
 FOLLOW_OFFSET_M = 15.0
 ACTUATOR_S = 2.0

@@ -14,7 +14,8 @@ from m2pem.fleet.fleet_file import load_fleet
 from m2pem.geo.files import read_geometry
 from m2pem.geo.geojson import GeometryError, as_geojson, parse_geojson
 from m2pem.geo.geometry_files import FileProblem
-from m2pem.geo.polygon import MAX_CORNERS, ring_problem
+from m2pem.geo.local_frame import LocalFrame
+from m2pem.geo.polygon import MAX_CORNERS, circle_ring, ring_problem
 from m2pem.mission.geometry import Area
 
 from ..fleet.fleets import write_fleet, write_json
@@ -29,6 +30,19 @@ def polygon(*rings: Any) -> dict[str, Any]:
 
 def moved(ring: list[list[int]], by: int) -> list[list[int]]:
     return [[longitude + by, latitude] for longitude, latitude in ring]
+
+
+@pytest.mark.parametrize("radius_m", [0.1, 30.0, 90_000.0])
+@pytest.mark.parametrize("is_around", [True, False])
+def test_a_ring_of_a_circle_lies_around_it_or_within_it(radius_m: float, is_around: bool) -> None:
+    center = 47.3, 8.5
+    frame = LocalFrame(center)
+    corners = circle_ring(center, radius_m, is_around=is_around)
+    ring = shapely.Polygon([frame.to_local(corner) for corner in corners])
+    circle = shapely.Point(0.0, 0.0).buffer(radius_m, quad_segs=1024)
+    assert ring.buffer(1e-5 * radius_m).contains(circle) is is_around
+    assert circle.buffer(1e-5 * radius_m).contains(ring) is not is_around
+    assert abs(math.sqrt(ring.area / circle.area) - 1) < 0.002
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,8 @@ from m2pem.geo.geometry_files.mission_commands import (
     Treatment,
     command_of,
 )
-from m2pem.geo.local_frame import LatLon, LocalFrame
+from m2pem.geo.local_frame import LatLon
+from m2pem.geo.polygon import circle_ring
 from m2pem.mission.geometry import Area, Coordinate, Point, Route
 
 _FRAMES = {0: "amsl", 5: "amsl", 3: "relative", 6: "relative", 10: "terrain", 11: "terrain"}
@@ -31,7 +32,6 @@ _FRAMES = {0: "amsl", 5: "amsl", 3: "relative", 6: "relative", 10: "terrain", 11
 _NAMED = 8
 """Items that a problem names; of more, only their number is said."""
 
-_CIRCLE_CORNERS = 64
 LARGEST_M = 100_000.0
 
 _BETWEEN = "between one route up to there and one from there on"
@@ -308,11 +308,4 @@ def circle(center: LatLon, radius_m: float | None, is_inside: bool) -> Area:
     """
     if radius_m is None or not 0 < radius_m < LARGEST_M:
         raise GeometryError(f"a radius of {radius_m} m is not between 0 and {LARGEST_M:g} m")
-    frame, step = LocalFrame(center), math.tau / _CIRCLE_CORNERS
-    reach = radius_m if is_inside else radius_m / math.cos(step / 2)
-    return polygon(
-        [
-            frame.to_latlon((reach * math.sin(step * index), reach * math.cos(step * index)))
-            for index in range(_CIRCLE_CORNERS)
-        ]
-    )
+    return polygon(circle_ring(center, radius_m, is_around=not is_inside))

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 
-from m2pem.api import BehaviorState, LocalFrame
+from m2pem.api import ORBIT_RADIUS_M, BehaviorState, LocalFrame
 from m2pem_plugin_mavlink.behaviors.arrival import (
     arrival_radius_m,
     circle_tolerance_m,
@@ -20,7 +20,6 @@ from m2pem_plugin_mavlink.behaviors.mission import MissionFlight
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode, TargetPosition
 
-RADIUS_M = 30.0
 MOST_ITEMS = 400
 """Most waypoints of a mission with all laps; longer ones repeat a mission of one lap."""
 
@@ -39,7 +38,7 @@ class Orbit(MissionFlight):
     def __init__(self, context: BehaviorContext) -> None:
         super().__init__(context)
         self._center: TargetPosition | None = None
-        self._radius_m = self.parameters.radius_m or RADIUS_M
+        self._radius_m = self.parameters.radius_m or ORBIT_RADIUS_M
         self._seconds = self.parameters.duration_s
         self._turns = self.parameters.turns
         if self._turns is None and self._seconds is None and self.ends:
