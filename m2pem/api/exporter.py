@@ -25,7 +25,8 @@ class ExportedRecord(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class ExportedRun:
-    """A run with all its records. `mission`, `fleet` None: they cannot be read any more.
+    """A run with all its records. `mission`, `fleet` None: they cannot be read any more. The faces
+    of `fleet` are those of its file now, if that can be read.
 
     `journal`: its file, beside which other files about the run are; None: it is in memory.
     """
@@ -46,7 +47,8 @@ class ExportedRun:
 class ExportOptions:
     """What an operator asked for. `table`: `records` or `telemetry`, for formats that hold one.
 
-    `recordings`: the folder with recordings of telemetry; None: beside the journal.
+    `recordings`: the folder with recordings of telemetry; None: the one that the fleet file names,
+    or else the one beside the journal.
     """
 
     table: str = "records"

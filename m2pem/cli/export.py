@@ -4,6 +4,7 @@ import asyncio
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -52,7 +53,8 @@ if TYPE_CHECKING:
     "--recordings",
     type=click.Path(path_type=Path, file_okay=False, exists=True),
     metavar="FOLDER",
-    help="Where recordings are, which have the telemetry  [default: beside the journal]",
+    help="Where recordings are, which have the telemetry  [default: as the fleet file says, or "
+    "beside the journal]",
 )
 @journal_option
 def export(
@@ -176,6 +178,7 @@ async def _add(journal: "Journal", line: "RunInfo", exporter: "Exporter") -> Non
     from m2pem.api.exporter import ExportedRecord, ExportedRun
     from m2pem.errors import M2pemError
     from m2pem.executive.run_summary import summary
+    from m2pem.fleet.fleet_file import load_fleet
     from m2pem.journal.mission import fleet_of, present_mission_of
 
     records = []
@@ -187,4 +190,7 @@ async def _add(journal: "Journal", line: "RunInfo", exporter: "Exporter") -> Non
         mission = await present_mission_of(journal, line)
     with suppress(M2pemError):
         fleet = fleet_of(line.header) if line.header.fleet else None
+    with suppress(M2pemError, OSError):  # the journal does not keep its faces
+        if fleet is not None and fleet.file:
+            fleet = replace(fleet, faces=load_fleet(fleet.file).faces)
     exporter.add(ExportedRun(summary(line), records, mission, fleet, journal.file))

@@ -43,6 +43,11 @@ def folder_beside(journal: Path) -> Path:
     return journal.with_name(f"{journal.name}-{FOLDER}")
 
 
+def folder_named(fleet: Fleet, name: object) -> Path | None:
+    """Return the folder of the setting `folder` of a fleet file; None: it has none."""
+    return Path(fleet.file).parent / Path(name).expanduser() if isinstance(name, str) else None
+
+
 def recorder_settings(
     settings: FaceSettings, fleet: Fleet, journal: Path | None
 ) -> RecorderSettings:
@@ -53,11 +58,9 @@ def recorder_settings(
     """
     known = ("folder", "rate_hz", "ros", "file_mb", "total_mb", "min_free_mb")
     settings.refuse_others(known)
-    if "folder" in settings.values:
-        folder = Path(fleet.file).parent / Path(settings.text("folder", "")).expanduser()
-    elif journal is not None:
-        folder = folder_beside(journal)
-    else:
+    named = settings.text("folder", "") if "folder" in settings.values else None
+    folder = folder_named(fleet, named) or (folder_beside(journal) if journal is not None else None)
+    if folder is None:
         raise settings.error("folder", "it is missing: the journal is in memory, beside no file")
     total_mb = settings.whole("total_mb", 0, 1, 10**9) if "total_mb" in settings.values else None
     return RecorderSettings(

@@ -70,6 +70,26 @@ def journal(folder: Path, run_id: str) -> list[dict[str, Any]]:
     return [json.loads(line) for line in lines]
 
 
+def test_a_recording_is_found_in_the_folder_of_the_fleet_file(tmp_path: Path) -> None:
+    write_fleet(tmp_path)
+    fleet = tmp_path / "fleet.yaml"
+    named = "recorder: {folder: elsewhere, min_free_mb: 0}"
+    fleet.write_text(FLEET.replace("recorder: {min_free_mb: 0}", named))
+    finished(tmp_path, *run("drive"), "--face", "recorder")
+    assert list((tmp_path / "elsewhere").glob("r1-*.mcap"))
+    assert "no recording" not in export(tmp_path, "r1", "--to", "mcap", "-o", "r1.mcap")
+    with (tmp_path / "r1.mcap").open("rb") as file:
+        topics = {channel.topic for _, channel, _ in make_reader(file).iter_messages()}
+    assert topics >= {"/m2pem/telemetry", "/m2pem/records"}
+    # One of which the file does not say it any more is looked for beside the journal.
+    (tmp_path / "elsewhere").rename(tmp_path / "journal.db-recordings")
+    assert "no recording" not in export(tmp_path, "r1", "--to", "kml", "-o", "r1.kml")
+    (tmp_path / "journal.db-recordings").rename(tmp_path / "away")
+    printed = export(tmp_path, "r1", "--to", "kml", "-o", "r1.kml")
+    beside = tmp_path / "journal.db-recordings"
+    assert f"there is no recording in elsewhere or {beside} (--recordings names" in printed
+
+
 # --- XES --------------------------------------------------------------------------------------
 
 

@@ -10,7 +10,7 @@ import msgspec
 from m2pem.api import US_PER_S, ExportedRun, PayloadState, Telemetry, VehicleState
 from m2pem_plugin_recorder.reading import telemetry_of
 from m2pem_plugin_recorder.recording import RecordedRun, recording_files
-from m2pem_plugin_recorder.settings import folder_beside
+from m2pem_plugin_recorder.settings import folder_beside, folder_named
 
 
 class _Sample(msgspec.Struct):
@@ -35,22 +35,28 @@ _payload = msgspec.json.Decoder(PayloadState)
 
 
 def files_of(run: ExportedRun, folder: Path | None) -> list[Path]:
-    """Return the files of a run's recording. `folder` None: beside the journal."""
-    if folder is None:
-        if run.journal is None:
-            return []
-        folder = folder_beside(run.journal)
+    """Return the files of a run's recording, which are in one folder. `folder` None: the one that
+    the fleet file names, or else the one beside the journal."""
     stem = RecordedRun(run.summary.run, run.summary.mission, run.summary.started_us).stem
-    return [each.path for each in recording_files(folder, stem)]
+    found = ([each.path for each in recording_files(one, stem)] for one in _folders(run, folder))
+    return next(filter(None, found), [])
 
 
 def no_recording(run: ExportedRun, folder: Path | None) -> str:
     """Say that a run has no recording, and where it was looked for."""
-    if folder is None and run.journal is not None:
-        where = f" in {folder_beside(run.journal)} (--recordings names another folder)"
-    else:
-        where = "" if folder is None else f" in {folder}"
-    return f"{run.summary.run}: there is no recording{where}"
+    where = " or ".join(map(str, _folders(run, folder)))
+    other = " (--recordings names another folder)" if where and folder is None else ""
+    return f"{run.summary.run}: there is no recording{' in ' if where else ''}{where}{other}"
+
+
+def _folders(run: ExportedRun, folder: Path | None) -> list[Path]:
+    """Return where the recording of a run may be."""
+    fleet, journal = run.fleet, run.journal
+    if folder is not None:
+        return [folder]
+    of_file = fleet and folder_named(fleet, fleet.faces.get("recorder", {}).get("folder"))
+    beside = journal and folder_beside(journal)
+    return [each for each in (of_file, beside) if each is not None]
 
 
 class States:
