@@ -4,6 +4,7 @@ A file is written whole or not at all, and never replaces another.
 """
 
 import errno
+import io
 import json
 import math
 import os
@@ -19,6 +20,18 @@ from m2pem_plugin_ptz.camera_model.model import CameraModel, iso
 from m2pem_plugin_ptz.gimbal import CapturedImage, PanTiltZoom
 
 _NO_LINKS = (errno.EPERM, errno.EOPNOTSUPP, errno.ENOSYS, errno.EMLINK, errno.EACCES)
+
+
+def decode(content: bytes) -> None:
+    """Decode a JPEG or PNG, as a check. Blocking.
+
+    Raises:
+        Exception: it cannot be decoded, or not to its end; each format of Pillow raises its own.
+    """
+    from PIL import Image  # noqa: PLC0415  # comes with the extras of drivers that fetch pictures
+
+    with Image.open(io.BytesIO(content), formats=("JPEG", "PNG")) as picture:
+        picture.load()
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,12 +1,19 @@
 """Pictures and videos over ROS."""
 
-from io import FileIO
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from io import BytesIO, FileIO
 from pathlib import Path
 
 import pytest
 from m2pem_plugin_ptz.drivers.driver import CameraError
 from m2pem_plugin_ptz.drivers.ros import images
-from ptz_ros_world import until, world
+from m2pem_plugin_ros.runtime import qos
+from PIL import Image
+from ptz_ros_world import World, until, world
+from sensor_msgs.msg import CompressedImage
+from sensor_msgs.msg import Image as RawImage
 
 
 async def test_a_picture_shows_where_the_camera_looked(ros_domain, tmp_path) -> None:
@@ -52,6 +59,87 @@ async def test_what_is_no_picture_is_an_error(ros_domain, tmp_path) -> None:
         await it.ready()
         await it.fault("garbled")
         with pytest.raises(CameraError, match="neither a JPEG nor a PNG"):
+            await it.driver.take_picture()
+
+
+TOPIC = "/evsg2/camera/image_raw/compressed"
+
+
+def encoded(format_: str) -> bytes:
+    """A picture with detail, by Pillow."""
+    file = BytesIO()
+    Image.effect_noise((160, 120), 60).save(file, format_)
+    return file.getvalue()
+
+
+@asynccontextmanager
+async def published(it: World, *messages: object) -> AsyncIterator[None]:
+    """Publish messages on the topic of images, one after the other, again and again."""
+    publisher = it.ros.node.create_publisher(type(messages[0]), TOPIC, qos.TELEMETRY)
+
+    async def publish() -> None:
+        while True:
+            for message in messages:
+                publisher.publish(message)
+                await asyncio.sleep(0.05)
+
+    task = asyncio.create_task(publish())
+    yield
+    task.cancel()
+
+
+@pytest.mark.parametrize("format_", ["JPEG", "PNG"])
+async def test_half_a_picture_is_an_error(ros_domain, tmp_path, format_) -> None:
+    whole = encoded(format_)
+    half = CompressedImage(format=format_.lower(), data=whole[: len(whole) // 2])
+    async with world(ros_domain, tmp_path, camera=False) as it:
+        async with published(it, half):
+            with pytest.raises(
+                CameraError,
+                match=rf"^the image of {len(half.data)} bytes on {TOPIC} cannot be decoded: .",
+            ):
+                await it.driver.take_picture()
+        async with published(it, CompressedImage(format=format_.lower(), data=whole)):
+            async with asyncio.timeout(20):
+                while True:
+                    try:
+                        picture = await it.driver.take_picture()
+                        break
+                    except CameraError:  # the last half picture was on the way
+                        continue
+            assert picture.content == whole
+
+
+async def test_half_pictures_are_left_out_of_a_video_which_says_so(ros_domain, tmp_path) -> None:
+    whole = encoded("JPEG")
+    filled = whole + bytes(7)
+    contents = (whole, whole[: len(whole) // 2], filled)
+    async with world(ros_domain, tmp_path, camera=False) as it:
+        async with published(it, *(CompressedImage(format="jpeg", data=c) for c in contents)):
+            while True:
+                try:
+                    await it.driver.start_recording()
+                    break
+                except CameraError as error:
+                    assert "cannot be decoded" in error.reason  # the first one was a half
+            (path,) = tmp_path.iterdir()
+            await until(lambda: path.read_bytes().count(whole) > 4)
+            with pytest.raises(CameraError, match=r"is not complete: \d+ images were cut off"):
+                await it.driver.stop_recording()
+        left = path.read_bytes().replace(whole, b"").replace(bytes(7), b"")
+        assert left == b""
+
+
+async def test_a_raw_image_is_an_error_that_names_the_type(
+    ros_domain, tmp_path, monkeypatch
+) -> None:
+    monkeypatch.setattr(images, "WITHIN_S", 2.0)
+    raw = RawImage(height=2, width=2, encoding="mono8", step=2, data=[1, 2, 3, 4])
+    async with world(ros_domain, tmp_path, camera=False) as it, published(it, raw):
+        with pytest.raises(
+            CameraError,
+            match=r"a publisher of sensor_msgs/msg/Image, and .*CompressedImage is expected$",
+        ):
             await it.driver.take_picture()
 
 

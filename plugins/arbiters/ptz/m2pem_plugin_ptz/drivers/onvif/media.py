@@ -2,7 +2,6 @@
 
 import asyncio
 import base64
-import io
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +12,7 @@ from m2pem_plugin_ptz.drivers.onvif.session import (
     translate_error,
     unauthorized_error,
 )
+from m2pem_plugin_ptz.image_files import decode
 
 PROFILE = "http://www.onvif.org/ver10/schema/Profile"
 TIME = "%Y-%m-%dT%H:%M:%SZ"
@@ -123,20 +123,13 @@ async def fetch_snapshot(session: Session, url: str) -> tuple[bytes, str]:
     if suffix is None:
         raise RefusedError(f"{camera(settings)} sent {len(content)} bytes that are not a picture")
     try:
-        await asyncio.to_thread(_decode, content)
+        await asyncio.to_thread(decode, content)
     except Exception as error:  # each format of Pillow raises its own
         raise RefusedError(
             f"{camera(settings)} sent a picture of {len(content)} bytes that cannot be decoded: "
             f"{error}"
         ) from error
     return content, suffix
-
-
-def _decode(content: bytes) -> None:
-    from PIL import Image  # noqa: PLC0415  # comes with the extra
-
-    with Image.open(io.BytesIO(content), formats=("JPEG", "PNG")) as picture:
-        picture.load()
 
 
 async def _ask(client: Any, session: Session, url: str) -> bytes:

@@ -13,6 +13,7 @@ from sensor_msgs.msg import CompressedImage
 
 from m2pem.api import Clock, ResourceId
 from m2pem_plugin_ptz.drivers.driver import CameraError
+from m2pem_plugin_ptz.image_files import decode
 
 if TYPE_CHECKING:
     from m2pem_plugin_ros import RosRuntime
@@ -26,6 +27,8 @@ LINGER_S = 10.0
 discovery."""
 
 SUFFIXES = {b"\xff\xd8\xff": ".jpg", b"\x89PNG": ".png"}
+END_OF_JPEG = b"\xff\xd9"
+TYPE = "sensor_msgs/msg/CompressedImage"
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +81,7 @@ class ImageTopic:
         """Return the next image.
 
         Raises:
-            CameraError: no image was received, or its format is not known.
+            CameraError: no image was received, or it cannot be decoded.
         """
         came: asyncio.Future[ImageFrame] = asyncio.get_running_loop().create_future()
 
@@ -91,15 +94,29 @@ class ImageTopic:
             async with asyncio.timeout(WITHIN_S):
                 frame = await came
         except TimeoutError:
-            cause = "its publisher sends none" if self.has_publisher else "it has no publisher"
             raise CameraError(
-                f"no image was received on {self.topic} within {WITHIN_S:g} s: {cause}"
+                f"no image was received on {self.topic} within {WITHIN_S:g} s: {self._absence}"
             ) from None
         finally:
             end()
         if not frame.suffix:
             raise CameraError(f"the image on {self.topic} is neither a JPEG nor a PNG")
+        try:
+            await asyncio.to_thread(decode, frame.content)
+        except Exception as error:  # each format of Pillow raises its own
+            raise CameraError(
+                f"the image of {len(frame.content)} bytes on {self.topic} cannot be decoded: "
+                f"{error}"
+            ) from error
         return frame
+
+    @property
+    def _absence(self) -> str:
+        found = self._ros.node.get_publishers_info_by_topic(self.topic)
+        types = sorted({each.topic_type for each in found} - {TYPE})
+        if types:
+            return f"it has a publisher of {', '.join(types)}, and {TYPE} is expected"
+        return "its publisher sends none" if found else "it has no publisher"
 
     def close(self) -> None:
         """Unsubscribe."""
@@ -141,6 +158,7 @@ class Recorder:
         self._writing: asyncio.Task[None] | None = None
         self._end_reading = _nothing
         self._failure = ""
+        self._cut = 0
 
     async def start(self) -> None:
         """Start a video. An active one is kept.
@@ -158,7 +176,7 @@ class Recorder:
             self._file = await asyncio.to_thread(self._create, f"{began:%Y%m%dT%H%M%SZ}")
         except OSError as error:
             raise CameraError(f"no video can be stored in {self._folder}: {error}") from error
-        self._failure = ""
+        self._failure, self._cut = "", 0
         self._take(first)
         self._end_reading = self._images.read(self._take)
         self._writing = asyncio.get_running_loop().create_task(self._write(self._file))
@@ -180,6 +198,8 @@ class Recorder:
             await asyncio.to_thread(file.close)
         except OSError as error:
             self._failure = self._failure or str(error)
+        if self._cut and not self._failure:
+            self._failure = f"{self._cut} images were cut off, and left out"
         if self._failure:
             raise CameraError(f"the video {self._path} is not complete: {self._failure}")
         return str(self._path)
@@ -206,9 +226,13 @@ class Recorder:
         raise FileExistsError(f"there are too many videos of {began}")
 
     def _take(self, frame: ImageFrame) -> None:
-        if frame.suffix == ".jpg":
-            self._waiting.append(frame.content)
-            self._news.set()
+        if frame.suffix != ".jpg":
+            return
+        if not frame.content.rstrip(b"\0").endswith(END_OF_JPEG):  # some cameras fill up with zeros
+            self._cut += 1
+            return
+        self._waiting.append(frame.content)
+        self._news.set()
 
     async def _write(self, file: IO[bytes]) -> None:
         while self._file is not None or self._waiting:
