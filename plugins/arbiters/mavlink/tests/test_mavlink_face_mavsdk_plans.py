@@ -111,6 +111,12 @@ def test_mavsdk_circles_a_place_within_a_fence(tmp_path: Path) -> None:
             (each.latitude_deg, each.longitude_deg), (latitude, longitude)
         )
         await first(telemetry.subscribe_position(), lambda each: abs(away(each) - 10.0) < 2.0)
+        # MAVSDK 4.1 sends the altitude above sea level in a frame that is above home.
+        on_circle = lambda each: each.relative_altitude_m > 9.5  # noqa: E731
+        await first(telemetry.subscribe_position(), on_circle)
+        await first(telemetry.subscribe_velocity_ned(), lambda each: abs(each.down_m_s) < 0.1)
+        position = await first(telemetry.subscribe_position(), lambda _: True)
+        assert position.relative_altitude_m == pytest.approx(10.0, abs=0.5)
         await action.return_to_launch()
         await first(telemetry.subscribe_position(), lambda each: away(each) < 2.0)
 

@@ -208,7 +208,8 @@ def _orbit(command: Command, vehicle: ShownVehicle) -> Order:
         raise RefusedCommandError("DO_ORBIT needs a place in a global frame")
     if radius_m < 0:
         raise RefusedCommandError("it circles clockwise only: the radius is above 0")
-    parameters = _target(vehicle, place, command.z, command.altitude_frame)
+    frame = "amsl" if _is_amsl(command, vehicle) else command.altitude_frame
+    parameters = _target(vehicle, place, command.z, frame)
     if math.isfinite(radius_m) and radius_m > 0:
         parameters["radius"] = f"{radius_m} m"
     if math.isfinite(speed) and speed > 0:
@@ -219,6 +220,18 @@ def _orbit(command: Command, vehicle: ShownVehicle) -> Order:
         raise RefusedCommandError("DO_ORBIT needs a number of turns above 0")
     parameters["turns"] = turns
     return Order(vehicle.resource, "orbit", parameters)
+
+
+def _is_amsl(command: Command, vehicle: ShownVehicle) -> bool:
+    """Return whether the altitude of DO_ORBIT is above sea level, whatever its frame says.
+
+    PX4 takes it so in all frames, and MAVSDK (`do_orbit` of 3.15 and 4.1) sends one above sea level
+    with the relative frame. Of both heights, the one nearer to the vehicle's is meant."""
+    home, state = vehicle.home, vehicle.state
+    if command.altitude_frame != "relative" or home is None or state is None:
+        return False
+    now_m, above_home_m = state.altitude_above_home_m or 0.0, command.z - home.altitude_m
+    return above_home_m > 0 and abs(above_home_m - now_m) < abs(command.z - now_m)
 
 
 def _loiter(command: Command, vehicle: ShownVehicle) -> Order:
