@@ -9,13 +9,27 @@ import pytest
 from mavlink_mavsdk_client import PLACES, ROVER1, UAV1, Client, at, first, fleet_on
 from mavsdk.asyncio.plugins.action import ActionAsync
 from mavsdk.asyncio.plugins.camera import CameraAsync
+from mavsdk.asyncio.plugins.failure import FailureAsync
+from mavsdk.asyncio.plugins.follow_me import FollowMeAsync
 from mavsdk.asyncio.plugins.gimbal import GimbalAsync
 from mavsdk.asyncio.plugins.mission_raw import MissionRawAsync
 from mavsdk.asyncio.plugins.offboard import OffboardAsync
+from mavsdk.asyncio.plugins.param import ParamAsync
 from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
 from mavsdk.plugins.action import ActionError, ActionResult
+from mavsdk.plugins.camera import CameraError, Mode
+from mavsdk.plugins.failure import FailureError, FailureType, FailureUnit
+from mavsdk.plugins.follow_me import Config, FollowMeError
+from mavsdk.plugins.gimbal import ControlMode, GimbalError, GimbalMode, SendMode
 from mavsdk.plugins.mission_raw import MissionRawError
-from mavsdk.plugins.offboard import OffboardError, VelocityNedYaw
+from mavsdk.plugins.offboard import (
+    Attitude,
+    OffboardError,
+    PositionGlobalYaw,
+    PositionNedYaw,
+    VelocityNedYaw,
+)
+from mavsdk.plugins.param import ParamError
 from mavsdk.plugins.telemetry import FlightMode
 
 from m2pem.testing import scenarios
@@ -88,15 +102,110 @@ def test_mavsdk_flies_a_copter_of_another_arbiter(tmp_path: Path) -> None:
     fleet_on(tmp_path, main, commands="all")
 
 
-def test_mavsdks_offboard_is_refused_and_does_not_send_a_copter_home(tmp_path: Path) -> None:
+async def says(telemetry: Any, part: str) -> None:
+    """Wait for a text of the vehicle."""
+    await first(telemetry.subscribe_status_text(), lambda each: part in each.text)
+
+
+@pytest.mark.parametrize("kind", ["position_ned", "velocity_ned", "attitude"])
+def test_mavsdks_offboard_is_refused_with_its_cause_and_does_not_send_a_copter_home(
+    tmp_path: Path, kind: str
+) -> None:
     """MAVSDK 4.1 sets PX4's main mode 6, which is the number of RTL for ArduPilot's copters."""
+    setpoints = {
+        "position_ned": PositionNedYaw(5.0, 0.0, -5.0, 90.0),
+        "velocity_ned": VelocityNedYaw(1.0, 0.0, 0.0, 0.0),
+        "attitude": Attitude(0.0, 0.0, 0.0, 0.6),
+    }
 
     async def main(control: Any, sdk: Client) -> None:
-        offboard = sdk.plugin(OffboardAsync, UAV1)
-        await offboard.set_velocity_ned(VelocityNedYaw(1.0, 0.0, 0.0, 0.0))
+        offboard, telemetry = sdk.plugin(OffboardAsync, UAV1), sdk.plugin(TelemetryAsync, UAV1)
+        told = asyncio.create_task(says(telemetry, "Offboard needs a target"))
+        instead = asyncio.create_task(says(telemetry, "send SET_POSITION_TARGET_GLOBAL_INT"))
+        await asyncio.sleep(0)
+        await getattr(offboard, f"set_{kind}")(setpoints[kind])
         with pytest.raises(OffboardError, match="COMMAND_DENIED"):
             await offboard.start()
+        await asyncio.gather(told, instead)
         assert not await control.runs()
+
+    fleet_on(tmp_path, main, commands="all")
+
+
+def test_mavsdks_offboard_flies_to_global_positions_until_it_stops(tmp_path: Path) -> None:
+    async def main(control: Any, sdk: Client) -> None:
+        action, telemetry = sdk.plugin(ActionAsync, UAV1), sdk.plugin(TelemetryAsync, UAV1)
+        offboard = sdk.plugin(OffboardAsync, UAV1)
+        await action.arm()
+        await action.takeoff()
+        await first(telemetry.subscribe_in_air(), bool)
+        rel_home = PositionGlobalYaw.AltitudeType.REL_HOME
+        outside = PositionGlobalYaw(38.2, -77.3190, 8.0, 0.0, rel_home)
+        await offboard.set_position_global(outside)
+        with pytest.raises(OffboardError, match="COMMAND_DENIED"):
+            await offboard.start()
+        target = PositionGlobalYaw(38.1081, -77.3190, 8.0, 0.0, rel_home)
+        await offboard.set_position_global(target)
+        await first(telemetry.subscribe_position(), at((38.1081, -77.3190), 2.0))
+        await offboard.start()
+        await offboard.set_position_global(PositionGlobalYaw(38.1081, -77.3185, 8.0, 0.0, rel_home))
+        await first(telemetry.subscribe_position(), at((38.1081, -77.3185), 2.0))
+        await offboard.stop()
+        await first(telemetry.subscribe_flight_mode(), lambda each: each is FlightMode.HOLD)
+
+    fleet_on(tmp_path, main, commands="all")
+
+
+def test_mavsdks_follow_me_and_failures_are_refused_with_their_cause(tmp_path: Path) -> None:
+    async def main(control: Any, sdk: Client) -> None:
+        follow, telemetry = sdk.plugin(FollowMeAsync, UAV1), sdk.plugin(TelemetryAsync, UAV1)
+        failure = sdk.plugin(FailureAsync, UAV1)
+        parameters = sdk.plugin(ParamAsync, UAV1)
+        parts = ("Follow Me is not carried out", "FLW_TGT_", "INJECT_FAILURE is not carried out")
+        told = [asyncio.create_task(says(telemetry, each)) for each in parts]
+        await asyncio.sleep(0)
+        with pytest.raises(FollowMeError, match="SET_CONFIG_FAILED"):
+            await follow.set_config(Config(8.0, 2.0, 0.02, 2, 10.0, 0.0))
+        with pytest.raises(FollowMeError, match="COMMAND_DENIED"):
+            await follow.start()
+        with pytest.raises(FailureError, match="UNSUPPORTED"):
+            await failure.inject(FailureUnit.SENSOR_GPS, FailureType.OFF, 0)
+        with pytest.raises(ParamError, match="DOES_NOT_EXIST"):
+            await parameters.set_param_int("SYS_FAILURE_EN", 1)
+        await asyncio.gather(*told)
+        assert not await control.runs()
+
+    fleet_on(tmp_path, main, commands="all")
+
+
+def test_mavsdk_takes_a_picture_and_points_the_gimbal(tmp_path: Path) -> None:
+    async def main(control: Any, sdk: Client) -> None:
+        camera, gimbal = sdk.plugin(CameraAsync, UAV1), sdk.plugin(GimbalAsync, UAV1)
+        telemetry = sdk.plugin(TelemetryAsync, UAV1)
+        eye = (await first(camera.subscribe_camera_list(), lambda each: each.cameras)).cameras[0]
+        await camera.set_mode(eye.component_id, Mode.PHOTO)
+        with pytest.raises(CameraError, match="DENIED"):
+            await camera.set_mode(eye.component_id, Mode.VIDEO)
+        await camera.take_photo(eye.component_id)
+        listed = await first(gimbal.subscribe_gimbal_list(), lambda each: each.gimbals)
+        own = listed.gimbals[0].gimbal_id
+        await gimbal.take_control(own, ControlMode.PRIMARY)
+        follows = GimbalMode.YAW_FOLLOW
+        await gimbal.set_angles(own, 0.0, -60.0, 30.0, follows, SendMode.ONCE)
+        looks = lambda each: (  # noqa: E731
+            abs(each.euler_angle_forward.pitch_deg + 60.0) < 1.0
+            and abs(each.euler_angle_forward.yaw_deg - 30.0) < 1.0
+        )
+        await first(gimbal.subscribe_attitude(), looks)
+        instead = asyncio.create_task(says(telemetry, "send DO_GIMBAL_MANAGER_PITCHYAW"))
+        await asyncio.sleep(0)
+        with pytest.raises(GimbalError):
+            await gimbal.set_angular_rates(own, 0.0, 5.0, 0.0, follows, SendMode.ONCE)
+        await gimbal.set_angular_rates(own, 0.0, 5.0, 0.0, follows, SendMode.STREAM)
+        await instead
+        await gimbal.release_control(own)
+        began = [each.mission for each in await control.runs()]
+        assert sorted(began) == ["ptz_point_at of uav1/eye", "take_picture of uav1/eye"]
 
     fleet_on(tmp_path, main, commands="all")
 

@@ -230,7 +230,9 @@ def test_pymavlink_sets_modes_by_the_names_that_it_gives_them(
             ground.link.set_mode(ground.link.mode_mapping()[name])
             done = lambda each: each.get_srcSystem() == system and each.result != 5  # noqa: E731
             assert ground.wait("COMMAND_ACK", that=done).result == 0
-        for name in ("GUIDED", "AUTO", "MANUAL", "STABILIZE", "SMART_RTL"):
+        ground.link.set_mode(ground.link.mode_mapping()["GUIDED"])
+        assert ground.wait("COMMAND_ACK", that=done).result == 0
+        for name in ("AUTO", "MANUAL", "STABILIZE", "SMART_RTL"):
             if (number := ground.link.mode_mapping().get(name)) is not None:
                 ground.link.set_mode(number)
                 assert ground.wait("COMMAND_ACK", that=of(system)).result == 2
@@ -242,7 +244,7 @@ def test_pymavlink_sets_modes_by_the_names_that_it_gives_them(
         async with gateway(tmp_path, fleet=FLEET + BOAT, commands="all") as (control, port):
             await asyncio.to_thread(scene, port)
             began = [each.mission.split(" of ")[0] for each in await control.runs()]
-            assert sorted(began) == sorted(names.values())
+            assert set(began) == set(names.values())
 
     asyncio.run(main())
 
@@ -309,7 +311,7 @@ def test_offboard_of_px4_is_not_taken_for_the_return_of_ardupilot(
             else:
                 answer = await station.command(UAV1, mode, base, 6, 0, *rest)
                 assert answer == dialect.MAV_RESULT_DENIED
-            await station.told("Guided cannot be commanded")
+            await station.told("Offboard needs a target")
             assert not await control.runs()
             assert await station.command(UAV1, mode, base, 4, 5, *rest) == 0
             assert await station.command(UAV1, mode, base, 4, 3) == 0

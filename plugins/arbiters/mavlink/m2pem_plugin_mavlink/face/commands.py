@@ -11,7 +11,7 @@ from m2pem_plugin_mavlink.face import modes
 from m2pem_plugin_mavlink.face.vehicle import Camera, ShownVehicle
 from m2pem_plugin_mavlink.protocol.messages import Message
 from m2pem_plugin_mavlink.protocol.raw_frames import RawFrame
-from m2pem_plugin_mavlink.vehicle.modes import px4_mode
+from m2pem_plugin_mavlink.vehicle.modes import PX4_AUTO, PX4_OFFBOARD, px4_mode
 
 REQUEST_OPERATOR_CONTROL = 32100
 """MAV_CMD_REQUEST_OPERATOR_CONTROL, which pymavlink 2.4.50 does not have. Parameter 1: 1 asks for
@@ -31,6 +31,16 @@ _FRAMES: Mapping[int, str] = {
 
 POSITION_IGNORED = 1 | 2 | 4
 """POSITION_TARGET_TYPEMASK of the three coordinates."""
+
+OFFBOARD: int = modes.GUIDED.number
+FOLLOW_ME = px4_mode(PX4_AUTO, 8)
+_REFUSED_MODES: Mapping[int, str] = {
+    OFFBOARD: "Offboard needs a target that is carried out, a SET_POSITION_TARGET_GLOBAL_INT, "
+    "before it; velocities, attitudes and local positions are not",
+    FOLLOW_ME: "Follow Me is not carried out: the way of its target cannot be checked before. Send "
+    "DO_REPOSITION, or follow a vehicle of the fleet by a mission",
+}
+"""Why modes of PX4 that programs ask for are refused."""
 
 ENDLESS_TURNS = 1_000.0
 """Of DO_ORBIT without a number of turns, which autopilots circle until another command."""
@@ -132,7 +142,7 @@ def order_of(command: Command, vehicle: ShownVehicle, camera: Camera | None) -> 
         )
     order = read(command, vehicle)
     is_own = order is not None and order.resource == vehicle.resource
-    is_own = is_own and order is not None and order.behavior != modes.RUN_PLAN
+    is_own = is_own and order is not None and order.behavior not in (modes.RUN_PLAN, modes.GUIDE)
     if order is not None and is_own and order.behavior not in vehicle.behaviors:
         raise RefusedCommandError(
             f"{vehicle.resource} has no behavior {order.behavior}",
@@ -254,6 +264,8 @@ def _set_mode(command: Command, vehicle: ShownVehicle) -> Order:
     is_of_px4 = any(math.isnan(each) for each in (*command.params[2:], command.z))
     if is_of_px4 or main >= 256 or sub or base & ~_OF_BOTH:
         number = main if main >= 256 else px4_mode(main, sub)
+        if number in _REFUSED_MODES:
+            raise RefusedCommandError(_REFUSED_MODES[number])
         name, mode = f"mode {number:#x}", modes.BY_NUMBER.get(number)
     else:
         name, mode = modes.by_ardupilot_number(main, vehicle.type)
@@ -264,7 +276,21 @@ def _set_mode(command: Command, vehicle: ShownVehicle) -> Order:
             )
     if mode is None:
         raise RefusedCommandError(f"{name} cannot be commanded")
+    if mode is modes.GUIDED:
+        return Order(vehicle.resource, modes.GUIDE)
     return _of_mode(mode, vehicle)
+
+
+def asks_for_offboard(command: Command) -> bool:
+    """Return whether a command sets PX4's mode Offboard."""
+    base, main, sub = command.params[:3]
+    # Such as MAVSDK sends it. Without the NaN, the number may be that of a mode of ArduPilot.
+    is_of_px4 = math.isnan(command.z) or command.may_be_px4s
+    return (
+        command.id == dialect.MAV_CMD_DO_SET_MODE
+        and is_of_px4
+        and (int(base) & 1, main, sub) == (1, PX4_OFFBOARD, 0)
+    )
 
 
 def _set_standard_mode(command: Command, vehicle: ShownVehicle) -> Order:
@@ -329,7 +355,11 @@ def _roi(command: Command, vehicle: ShownVehicle) -> Order:
     return Order(camera.resource, "ptz_point_at", parameters)
 
 
-def _camera_order(command: Command, camera: Camera) -> Order:
+def _camera_order(command: Command, camera: Camera) -> Order | None:
+    if command.id == dialect.MAV_CMD_SET_CAMERA_MODE and camera.takes_pictures:
+        if command.params[1] != dialect.CAMERA_MODE_IMAGE:
+            raise RefusedCommandError("it takes pictures alone: CAMERA_MODE_IMAGE")
+        return None
     if command.id == dialect.MAV_CMD_IMAGE_START_CAPTURE and camera.takes_pictures:
         interval, count = command.params[1:3]
         if not math.isfinite(count) or not 1 <= count <= 10_000:

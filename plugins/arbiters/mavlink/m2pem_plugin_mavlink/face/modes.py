@@ -44,6 +44,8 @@ class Mode:
 
 
 RUN_PLAN = "run_plan"
+GUIDE = "guide"
+"""Commanding ArduPilot's GUIDED: what the vehicle does ends, and it waits for targets."""
 
 HOLD = Mode(px4_mode(PX4_AUTO, 3), "Hold", 0, FlightMode.HOLD, "hold")
 MISSION = Mode(px4_mode(PX4_AUTO, 4), "Mission", 6, FlightMode.MISSION, RUN_PLAN)
@@ -90,7 +92,8 @@ def by_ardupilot_number(number: int, type_: int) -> tuple[str, Mode | None]:
         return f"mode {number}", None
     modes = modes_of(known)
     name, purpose = modes.name(number), modes.purpose(number)
-    means = next((each for each in MODES if each.purpose is purpose and each.behavior), None)
+    means = next((each for each in MODES if each.purpose is purpose), None)
+    means = means if means is None or means.behavior or means is GUIDED else None
     is_other = name in OTHER_WAYS or (name == "QLAND" and known.kind is Kind.PLANE)
     return name, None if is_other else means
 

@@ -22,9 +22,10 @@ from m2pem_plugin_mavlink.face.commands import (
     Command,
     Order,
     RefusedCommandError,
+    asks_for_offboard,
     order_of,
 )
-from m2pem_plugin_mavlink.face.modes import RUN_PLAN
+from m2pem_plugin_mavlink.face.modes import GUIDE, RUN_PLAN
 from m2pem_plugin_mavlink.face.plan_runs import PlanRuns
 from m2pem_plugin_mavlink.face.requests import (
     ACCEPTED,
@@ -51,8 +52,14 @@ ARMED_S = 10.0
 ArduCopter: DISARM_DELAY)."""
 
 SETTING_OUT = frozenset({"goto", "takeoff", "single_vehicle_routing"})
+IN_GUIDED = frozenset({"goto", "takeoff", "orbit", "set_speed", "change_altitude"})
+"""Orders after which a vehicle is in GUIDED still, as those of ArduPilot are."""
 
-PROGRESS_EVERY_S = 0.5
+DEPARTURE_EVERY_S = 0.5
+PROGRESS_EVERY_S = 2.0
+"""MAVROS and simple programs take the first acknowledgement for the last one; QGroundControl waits
+3 s for it. A station that repeats its command is answered at once."""
+
 REPEATED_S = 3.0
 """Seconds after its end for which a command that comes again is a repetition of the same one."""
 
@@ -121,7 +128,9 @@ class Orders:
         self._budgets: dict[tuple[Peer, ResourceId, bool], tuple[float, float]] = {}
         self._began: OrderedDict[RunId, asyncio.Future[tuple[int, str]]] = OrderedDict()
         self._targets: dict[tuple[Peer, Address, int], Order] = {}
-        self._followed: set[tuple[Peer, Address, int]] = set()
+        self._followed: dict[
+            tuple[Peer, Address, int], asyncio.Future[RefusedCommandError | None]
+        ] = {}
         self._tasks: set[asyncio.Task[None]] = set()
         self._uploads = Uploads(plans.store, self._begin, say)
 
@@ -217,6 +226,9 @@ class Orders:
             return None
         if command.id == ARM and request.camera is None:
             return self._arm(pending)
+        target = self._followed.get((request.station.peer, request.source, vehicle.system))
+        if target is not None and asks_for_offboard(command):
+            return self._offboard(pending, target)
         order = order_of(command, vehicle, request.camera)
         if order is None:
             return None
@@ -256,6 +268,16 @@ class Orders:
             self._budgets = {
                 each: budget for each, budget in self._budgets.items() if budget[1] > refilled_s
             }
+
+    async def _offboard(
+        self, pending: _Pending, target: asyncio.Future[RefusedCommandError | None]
+    ) -> None:
+        """Answer the mode Offboard as its first target is answered, which is on the way already."""
+        refusal = await asyncio.shield(target)
+        if refusal is None:
+            self._end(pending, ACCEPTED)
+        else:
+            self._refuse(pending, refusal)
 
     async def _hand_over(self, pending: _Pending) -> None:
         resource, by = pending.request.vehicle.resource, pending.by
@@ -302,7 +324,7 @@ class Orders:
         departed = False
         end_s = self._now_s() + ARMED_S
         while vehicle.arm_requested and not departed and (left_s := end_s - self._now_s()) > 0:
-            await asyncio.sleep(min(left_s, PROGRESS_EVERY_S))
+            await asyncio.sleep(min(left_s, DEPARTURE_EVERY_S))
             departed = bool(vehicle.behavior)
         if vehicle.arm_requested and not departed:
             tell(f"disarmed: nothing followed within {ARMED_S:g} s")
@@ -324,7 +346,6 @@ class Orders:
     async def _carry_out(self, pending: _Pending, order: Order) -> None:
         executing = asyncio.ensure_future(self._execute(order, pending.by, pending.request.vehicle))
         try:
-            # Simple programs take the first acknowledgement for the last one.
             while not (await asyncio.wait([executing], timeout=PROGRESS_EVERY_S))[0]:
                 pending.acknowledge(IN_PROGRESS)
             result, reason = executing.result()
@@ -338,6 +359,9 @@ class Orders:
 
     async def _execute(self, order: Order, by: str, vehicle: ShownVehicle) -> tuple[int, str]:
         """Carry an order out, and note it as the last one unless it is refused."""
+        if order.behavior == GUIDE:
+            return await self._guide(order.resource, by, vehicle)
+        vehicle.guided &= order.behavior in IN_GUIDED or order.resource != vehicle.resource
         if order.resource == vehicle.resource:
             done = await self._about_plan(order, by, vehicle)
             if done is not None:
@@ -350,6 +374,15 @@ class Orders:
             if before is not None:
                 self._last[order.resource] = before
         return result, reason
+
+    async def _guide(self, resource: ResourceId, by: str, vehicle: ShownVehicle) -> tuple[int, str]:
+        """End what a vehicle does, unless a station has guided it there, and let it wait."""
+        if vehicle.behavior and not vehicle.guided:
+            result, reason = await self._execute(Order(resource, "hold"), by, vehicle)
+            if result != ACCEPTED:
+                return result, reason
+        vehicle.guided = True
+        return ACCEPTED, ""
 
     async def _about_plan(
         self, order: Order, by: str, vehicle: ShownVehicle
@@ -455,7 +488,7 @@ class Orders:
             return
         self._targets[key] = order
         if key not in self._followed:
-            self._followed.add(key)
+            self._followed[key] = asyncio.get_running_loop().create_future()
             self._begin(self._follow(key, request))
 
     async def _follow(self, key: tuple[Peer, Address, int], request: Request) -> None:
@@ -464,19 +497,25 @@ class Orders:
         try:
             while (order := self._targets.pop(key, None)) is not None:
                 if done is None or not _same(order, done):
+                    refusal = None
                     try:
                         self._count(order, station)
                     except RefusedCommandError as error:
-                        self._say(station, vehicle, error.reason)
+                        refusal = error
                     else:
                         done = order
                         by = name_of(request.source, station)
                         result, reason = await self._execute(order, by, vehicle)
                         if result != ACCEPTED:
-                            self._say(station, vehicle, reason)
+                            refusal = RefusedCommandError(reason, result)
+                    if refusal is not None:
+                        self._say(station, vehicle, refusal.reason)
+                    if (answer := self._followed[key]).done():
+                        answer = self._followed[key] = asyncio.get_running_loop().create_future()
+                    answer.set_result(refusal)
                 await asyncio.sleep(TARGET_EVERY_S)
         finally:
-            self._followed.discard(key)
+            self._followed.pop(key).cancel()
 
     # --- acknowledgements -------------------------------------------------------------------------
 

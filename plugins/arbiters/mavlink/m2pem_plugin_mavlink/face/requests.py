@@ -236,7 +236,8 @@ class Requests:
         else:
             error = dialect.MAV_PARAM_ERROR_DOES_NOT_EXIST
         request.answer(_parameter_error(name, -1, request.source, error))
-        self._say(request.station, request.vehicle, "parameters are read-only here")
+        text = f"{name.decode('ascii', 'replace')}: parameters are read-only here"
+        self._say(request.station, request.vehicle, text)
 
     # --- the plan ---------------------------------------------------------------------------------
 

@@ -78,6 +78,18 @@ _TARGETS = (
     dialect.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED,
     dialect.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET,
 )
+_INSTEAD = {
+    **dict.fromkeys(
+        ("SET_POSITION_TARGET_LOCAL_NED", "SET_ATTITUDE_TARGET"),
+        ": send SET_POSITION_TARGET_GLOBAL_INT or DO_REPOSITION",
+    ),
+    **dict.fromkeys(
+        ("GIMBAL_MANAGER_SET_ATTITUDE", "GIMBAL_MANAGER_SET_PITCHYAW"),
+        ": send DO_GIMBAL_MANAGER_PITCHYAW with angles",
+    ),
+}
+"""What does the same as a message that is not carried out."""
+
 _CLOCK_REQUESTS = (dialect.MAVLINK_MSG_ID_PING, dialect.MAVLINK_MSG_ID_TIMESYNC)
 """They go to all vehicles."""
 
@@ -252,6 +264,9 @@ class FaceServer:
             message = type_.unpack(frame.payload)
             self._requests.clock(message, frame.source, station, self._vehicles.values())
             return
+        if type_ is not None and frame.id == COMMAND_LONG and not frame.target.system:
+            self._broadcast(type_.unpack(frame.payload), station, frame)
+            return
         vehicle = self._by_system.get(frame.target.system)
         if type_ is None or vehicle is None or frame.id in _NO_REQUEST:
             return
@@ -283,7 +298,21 @@ class FaceServer:
                 if order is not None:
                     self._orders.target(order, request)
         elif not (self._orders.upload(request) or self._requests.message(request)):
-            self._tell(station, vehicle, f"{type_.name} is not carried out")
+            advice = _INSTEAD.get(type_.name, "")
+            self._tell(station, vehicle, f"{type_.name} is not carried out{advice}")
+
+    def _broadcast(self, message: Message, station: Station, frame: RawFrame) -> None:
+        """Answer a command to all that only asks, for each vehicle; each answer counts as a frame
+        of the station."""
+        for vehicle in self._vehicles.values():
+            if not (vehicle.present and station.shows(vehicle.system)):
+                continue
+            if not station.may_send(self._stations.now_s()):
+                return
+            request = Request(message, frame.source, station, vehicle, None)
+            command = command_of(message, frame)
+            if (result := self._requests.command(command, request)) is not None:
+                request.answer(acknowledgement(command.id, result, request.source))
 
     def _command(self, command: Command, request: Request) -> None:
         result = self._requests.command(command, request)

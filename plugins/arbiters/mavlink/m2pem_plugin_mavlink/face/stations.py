@@ -27,6 +27,10 @@ MOST_ADDRESSES = 32
 FRAMES_PER_S = 400.0
 MOST_FRAMES_AT_ONCE = 800.0
 MAINTAIN_S = 1.0
+COMPANIONS = range(dialect.MAV_COMP_ID_ONBOARD_COMPUTER, dialect.MAV_COMP_ID_ONBOARD_COMPUTER4 + 1)
+"""Components that may share the system id of a vehicle: MAVROS, and MAVSDK as a companion computer,
+take the vehicle's."""
+
 HEARTBEAT: int = dialect.MAVLINK_MSG_ID_HEARTBEAT
 
 _logger = logging.getLogger(__name__)
@@ -101,8 +105,8 @@ Receive = Callable[[Station, RawFrame], None]
 
 class Stations:
     """The endpoints of the face. `receive` is called with each frame of a station; `own_systems`:
-    the system ids of the fleet, whose frames no station may send. `links`: those of the vehicles on
-    a URL, of those URLs on which not all are."""
+    the system ids of the fleet, whose frames no station may send but companion computers. `links`:
+    those of the vehicles on a URL, of those URLs on which not all are."""
 
     def __init__(
         self,
@@ -131,6 +135,7 @@ class Stations:
                 on_link = self._links.get(url)
                 greet, tap = partial(self._greet, on_link), partial(self._tap, on_link)
                 endpoint = endpoint_kind(url)(url, self._own_systems, self.now_s, greet, (tap,))
+                endpoint.companions = COMPANIONS
                 await endpoint.open()
                 self._endpoints.append(endpoint)
         except PluginError:
@@ -199,7 +204,8 @@ class Stations:
         for frame in frames:
             if not station.may_send(now_s):
                 continue
-            if frame.source.system in self._own_systems:
+            system, component = frame.source
+            if system in self._own_systems and component not in COMPANIONS:
                 self._refuse(station, frame)
                 continue
             station.meet(frame.source)
@@ -212,7 +218,8 @@ class Stations:
         if station.peer not in self._lied:
             self._lied.add(station.peer)
             _logger.warning(
-                "%s sends as system %d, which is a vehicle of the fleet: it is not listened to",
+                "%s sends as %d/%d, which is of a vehicle of the fleet: it is not listened to; "
+                "give it another system id, or component 191 of a companion computer",
                 station.name,
-                frame.source.system,
+                *frame.source,
             )

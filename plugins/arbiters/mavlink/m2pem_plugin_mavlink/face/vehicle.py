@@ -14,7 +14,16 @@ from m2pem.api import (
     RunStatus,
     VehicleState,
 )
-from m2pem_plugin_mavlink.face.modes import HOLD, LAND, MISSION, RETURN, TAKEOFF, Mode, mode_of
+from m2pem_plugin_mavlink.face.modes import (
+    GUIDED,
+    HOLD,
+    LAND,
+    MISSION,
+    RETURN,
+    TAKEOFF,
+    Mode,
+    mode_of,
+)
 from m2pem_plugin_mavlink.face.plan import Plan, PlanRun, UploadedPlan
 from m2pem_plugin_mavlink.protocol.messages import Address
 
@@ -49,7 +58,8 @@ class ShownVehicle:
     `fence`: the fleet's. `arms_itself`: it has motors that it arms, and says whether it did.
     `arm_requested`: a station has armed it, and what it is to do has not come yet. `task`: the run
     and the element of its behavior. `uploaded`: the plan of a station, and `plan_run` its latest
-    run. `own_fences`: those that stations have uploaded, and `uploaded_fence` their items."""
+    run. `own_fences`: those that stations have uploaded, and `uploaded_fence` their items.
+    `guided`: a station has set ArduPilot's mode GUIDED."""
 
     resource: ResourceId
     domain: str
@@ -71,6 +81,7 @@ class ShownVehicle:
     uploaded: UploadedPlan = field(default_factory=UploadedPlan)
     plan_run: PlanRun | None = None
     own_fences: Sequence[Fence] = ()
+    guided: bool = False
     uploaded_fence: UploadedPlan = field(default_factory=UploadedPlan)
     rally_points: UploadedPlan = field(default_factory=UploadedPlan)
 
@@ -99,6 +110,8 @@ class ShownVehicle:
         """The mode that it is shown in."""
         if self.runs_plan and self.plan_run is not None:
             return HOLD if self.plan_run.status is RunStatus.PAUSED else self._plan_mode
+        if self.guided and not self.behavior and not self.operator:
+            return GUIDED
         return mode_of(self.behavior, self.operator)
 
     @property

@@ -3,7 +3,7 @@
 import logging
 from abc import ABC, abstractmethod
 from collections import defaultdict
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence, Set
+from collections.abc import Callable, Collection, Hashable, Iterable, Mapping, Sequence, Set
 from typing import TypeAlias
 
 from m2pem_plugin_mavlink.link.route import Peer, Route
@@ -46,6 +46,8 @@ class Endpoint(ABC):
         self.peers: dict[Hashable, Peer] = {}
         self._routes: dict[int, Route] = {}
         self._own_systems = own_systems
+        self.companions: Collection[int] = ()
+        """Components whose frames may come from `own_systems`."""
 
     @abstractmethod
     async def open(self) -> None:
@@ -111,7 +113,8 @@ class Endpoint(ABC):
 
     def admit(self, peer: Peer, sender: Sender) -> bool:
         """See `link.route.AdmitSender`."""
-        if sender.address.system in self._own_systems:
+        system, component = sender.address
+        if system in self._own_systems and component not in self.companions:
             return False
         route = self._routes.get(sender.address.system)
         if route is not None:
