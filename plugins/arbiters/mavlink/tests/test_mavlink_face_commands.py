@@ -12,7 +12,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem.api import GeoPosition, ResourceId, VehicleState
 
-ROVER1 = 1
+ROVER1, UAV1 = 1, 2
 
 
 @pytest.mark.parametrize(
@@ -73,5 +73,24 @@ def test_guided_ends_what_a_vehicle_does_and_stays_until_another_mode(tmp_path: 
             assert await station.command(ROVER1, set_mode, 1, hold) == 0
             is_held = lambda each: is_it(each) and each.custom_mode == hold  # noqa: E731
             await station.hears("HEARTBEAT", is_held, len(station.received))
+
+    asyncio.run(main())
+
+
+def test_what_is_not_carried_out_is_refused_with_what_to_send(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with (
+            gateway(tmp_path, commands="all") as (control, port),
+            ground_station(port) as station,
+        ):
+            await station.hears("HEARTBEAT", lambda each: each.get_srcSystem() == UAV1)
+            level = 1.0, 0.0, 0.0, 0.0
+            station.mav.gimbal_manager_set_attitude_send(UAV1, 1, 0, 1, level, 0, 0.09, 0)
+            await station.told("SET_ATTITUDE is not carried out", "DO_GIMBAL_MANAGER_PITCHYAW")
+            station.mav.set_attitude_target_send(0, UAV1, 1, 0, level, 0, 0, 0, 0.6)
+            await station.told("SET_ATTITUDE_TARGET", "send SET_POSITION_TARGET_GLOBAL_INT")
+            station.mav.param_set_send(UAV1, 1, b"FLW_TGT_HT", 8.0, 9)
+            await station.told("FLW_TGT_HT: parameters are read-only here")
+            assert not await control.runs()
 
     asyncio.run(main())

@@ -35,11 +35,14 @@ CAPABILITIES: int = (
 )
 _SENSORS: int = (
     dialect.MAV_SYS_STATUS_SENSOR_3D_GYRO
+    | dialect.MAV_SYS_STATUS_SENSOR_3D_ACCEL
+    | dialect.MAV_SYS_STATUS_SENSOR_3D_MAG
     | dialect.MAV_SYS_STATUS_SENSOR_GPS
     | dialect.MAV_SYS_STATUS_AHRS
     | dialect.MAV_SYS_STATUS_SENSOR_BATTERY
     | dialect.MAV_SYS_STATUS_PREARM_CHECK
 )
+"""Programs of MAVSDK wait until the first three are healthy, too (`health_all_ok`)."""
 
 Maker: TypeAlias = Callable[[ShownVehicle], Message | None]
 
