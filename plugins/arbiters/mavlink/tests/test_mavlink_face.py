@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import pytest
 from m2pem_plugin_mavlink.face.face import MavlinkFace
 from mavlink_gcs import FLEET, HOME, gateway, ground_station, served, write_fleet
 from mavlink_mavsdk_world import free_port
@@ -184,6 +185,31 @@ def test_a_command_is_in_progress_only_while_its_result_is_not_known(tmp_path: P
                 assert await station.go_to(UAV1, NEAR, 10.0) == dialect.MAV_RESULT_FAILED
                 answers = [each for each in station.received[since:] if is_answer(each)]
                 assert len(answers) == 1
+
+    asyncio.run(main())
+
+
+def test_a_command_that_is_repeated_before_its_result_is_known_has_one_answer(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """`start_mission` of MAVSDK 4.1 fails with BUSY at IN_PROGRESS, and repeats after 0.5 s."""
+    monkeypatch.setattr("m2pem_plugin_mavlink.face.orders.PROGRESS_EVERY_S", 3600.0)
+
+    async def main() -> None:
+        port = free_port()
+        async with run_executive(load_fleet(str(write_fleet(tmp_path)))) as control:
+            slow = SlowControl(control)
+            settings = {"url": f"udpin://127.0.0.1:{port}", "commands": "all"}
+            async with served(slow, **settings), ground_station(port) as station:  # type: ignore[arg-type]
+                await station.hears("HEARTBEAT", lambda each: each.get_srcSystem() == ROVER1)
+                first = asyncio.create_task(station.go_to(ROVER1, NEAR))
+                again = asyncio.create_task(station.go_to(ROVER1, NEAR))
+                await asyncio.sleep(0)
+                station.mav.param_request_read_send(ROVER1, 1, b"MAV_SYS_ID", -1)
+                await station.hears("PARAM_VALUE")
+                slow.released.set()
+                assert await first == await again == dialect.MAV_RESULT_ACCEPTED
+                assert len([each for each in station.received if is_answer(each)]) == 1
 
     asyncio.run(main())
 

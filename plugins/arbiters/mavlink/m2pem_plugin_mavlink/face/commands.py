@@ -266,10 +266,10 @@ def _set_mode(command: Command, vehicle: ShownVehicle) -> Order:
         number = main if main >= 256 else px4_mode(main, sub)
         if number in _REFUSED_MODES:
             raise RefusedCommandError(_REFUSED_MODES[number])
-        name, mode = f"mode {number:#x}", modes.BY_NUMBER.get(number)
+        name, mode = modes.px4_name(number) or f"mode {number:#x}", modes.BY_NUMBER.get(number)
     else:
         name, mode = modes.by_ardupilot_number(main, vehicle.type)
-        px4s = modes.px4_main_mode(main) if command.may_be_px4s else ""
+        px4s = modes.px4_name(px4_mode(main)) if command.may_be_px4s else ""
         if mode is not None and px4s:
             raise RefusedCommandError(
                 f"mode {main} is {px4s} of PX4 and {name} of ArduPilot, which SET_MODE sets"

@@ -98,9 +98,9 @@ def by_ardupilot_number(number: int, type_: int) -> tuple[str, Mode | None]:
     return name, None if is_other else means
 
 
-def px4_main_mode(main: int) -> str:
-    """Return PX4's name of a main mode; "": it has none."""
-    return modes_of(Identity(Firmware.PX4, Kind.COPTER)).names.get(px4_mode(main), "")
+def px4_name(number: int) -> str:
+    """Return PX4's name of a mode; "": it has none."""
+    return modes_of(Identity(Firmware.PX4, Kind.COPTER)).names.get(number, "")
 
 
 @cache

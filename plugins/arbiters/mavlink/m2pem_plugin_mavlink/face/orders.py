@@ -56,9 +56,9 @@ IN_GUIDED = frozenset({"goto", "takeoff", "orbit", "set_speed", "change_altitude
 """Orders after which a vehicle is in GUIDED still, as those of ArduPilot are."""
 
 DEPARTURE_EVERY_S = 0.5
-PROGRESS_EVERY_S = 2.0
-"""MAVROS and simple programs take the first acknowledgement for the last one; QGroundControl waits
-3 s for it. A station that repeats its command is answered at once."""
+PROGRESS_EVERY_S = 1.5
+"""MAVROS, simple programs and missions of MAVSDK take the first acknowledgement for the last one;
+MAVSDK waits 2 s for it, QGroundControl 3 s."""
 
 REPEATED_S = 3.0
 """Seconds after its end for which a command that comes again is a repetition of the same one."""
@@ -176,7 +176,8 @@ class Orders:
         key = pending.key
         known = self._pending.get(key)
         if known is not None and self._repeats(known, pending):
-            pending.acknowledge(known.result)
+            if known.result != IN_PROGRESS:
+                pending.acknowledge(known.result)
             return
         self._pending[key] = pending
         self._pending.move_to_end(key)
