@@ -17,7 +17,7 @@ from m2pem.api.clock import Clock
 from m2pem.api.epoch_fence import run_of
 from m2pem.conformance.monitor import ConformanceMonitor
 from m2pem.engine.commands import AdjustBehavior, CancelBehavior, StartBehavior
-from m2pem.errors import StaleCommandError
+from m2pem.errors import OperatorError, StaleCommandError
 from m2pem.executive.behavior_lifecycle import DispatcherView
 from m2pem.executive.fleet_connections import FleetArbiters
 from m2pem.executive.own_fences import OwnFences
@@ -454,6 +454,9 @@ class Dispatcher:
         except TimeoutError:
             log.error("%s: the arbiter did not return within %s s", what, CALL_TIMEOUT_S)
             return f"the arbiter did not return within {CALL_TIMEOUT_S:g} s"
+        except OperatorError as error:  # the vehicle's fault, not the arbiter's
+            log.error("%s: %s", what, error)
+            return str(error)
         except Exception as error:  # an arbiter's fault must not end the executive
             log.exception("%s: the arbiter raised", what)
             return f"the arbiter raised {type(error).__name__}: {error}"

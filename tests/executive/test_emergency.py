@@ -209,6 +209,28 @@ def test_a_start_that_hangs_is_abandoned_and_the_vehicle_cancelled_and_held(play
     assert "abandoned" in said.text
 
 
+def test_what_an_arbiter_says_of_a_vehicle_that_does_not_obey_is_in_the_alert(
+    play, monkeypatch: pytest.MonkeyPatch
+):
+    async def cancel(behavior: str, epoch: int) -> None:
+        raise OperatorError("ugv1 does NOT obey: no state shows it")
+
+    async def story(world: World):
+        control = world.executive.control
+        alert = asyncio.ensure_future(alerts(world, "NOT_RECEIVED"))
+        run = await control.start(DRIVE)
+        await world.fake.until_called("start")
+        monkeypatch.setattr(world.fake, "cancel", cancel)
+        await control.stop(run)
+        said = await alert
+        world.fake.report(f"{run}.b1", BehaviorState.CANCELLED)
+        await control.wait(run)
+        return said.text
+
+    said = "ugv1 may not have received the STOP of r1: ugv1 does NOT obey: no state shows it. "
+    assert play(story, "ugv1") == f"{said}Use its own stop"
+
+
 def test_an_arbiter_that_does_not_take_a_stop_is_named_and_delays_no_other_vehicle(play):
     both = mission(
         '<process id="P" isExecutable="true"><startEvent id="S"/><parallelGateway id="F"/>'

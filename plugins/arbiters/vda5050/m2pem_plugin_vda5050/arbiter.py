@@ -21,6 +21,7 @@ from m2pem.api import (
 )
 from m2pem.api.latest_task import cancel_and_wait
 from m2pem.api.unit_arbiter import UnitArbiter
+from m2pem.errors import OperatorError
 from m2pem_plugin_vda5050.broker import Broker
 from m2pem_plugin_vda5050.catalogue import STOPS, USUAL
 from m2pem_plugin_vda5050.checkpoint import (
@@ -116,7 +117,7 @@ class Vda5050Arbiter(UnitArbiter[Vehicle]):
             made.open()
         with suppress(TimeoutError):
             async with asyncio.timeout(FIRST_CONTACT_WITHIN_S):
-                await asyncio.gather(*(v.first_contact.wait() for v in self._units.values()))
+                await asyncio.gather(*(v.first_answer.wait() for v in self._units.values()))
         for resource, vehicle in self._units.items():
             vehicle.listen_from_now()
             if not vehicle.first_contact.is_set():
@@ -143,6 +144,31 @@ class Vda5050Arbiter(UnitArbiter[Vehicle]):
 
         if self._tracker.admit(request, reference, self._refusal):
             self._units[request.resources[0]].take(request)
+
+    async def cancel(self, behavior: BehaviorId, epoch: int) -> None:
+        """Stop the vehicle that executes the behavior.
+
+        Raises:
+            OperatorError: no state shows soon that the vehicle obeys. It is sent again all the
+                same.
+        """
+        vehicles = self._executing(behavior)
+        await super().cancel(behavior, epoch)
+        await self._obeyed(vehicles)
+
+    async def hold(self, resource: ResourceId) -> None:
+        """Pause a vehicle at once; it keeps its order.
+
+        Raises:
+            OperatorError: as `cancel`.
+        """
+        await super().hold(resource)
+        await self._obeyed([self._units[resource]] if resource in self._units else [])
+
+    async def _obeyed(self, vehicles: Sequence[Vehicle]) -> None:
+        for problem in await asyncio.gather(*(vehicle.obeyed() for vehicle in vehicles)):
+            if problem:
+                raise OperatorError(problem)
 
     async def reclaim(self, resource: ResourceId) -> str:
         """Cancel what a vehicle still does that was lost and is received again."""

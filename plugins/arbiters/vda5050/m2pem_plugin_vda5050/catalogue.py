@@ -119,7 +119,7 @@ PREDEFINED: Mapping[str, Mapping[str, Any]] = {
         "doc": "Have the vehicle store a log report.",
     },
 }
-"""The actions of the standard (2.0 and 2.1, section 6.8.1), as `own_behaviors` would declare them.
+"""The actions of the standard (1.1 to 2.1, section 6.8.1), as `own_behaviors` would declare them.
 
 The row of `drop` calls `stationType` and `loadType` optional and refers to `pick`, which requires
 them; there are vehicles that refuse a `drop` without. In version 3.0 both are optional for both.
@@ -140,7 +140,7 @@ _KINDS = {
 
 def required_parameters(action: str, factsheet: Factsheet | None) -> tuple[str, ...]:
     """Return the keys of the parameters without which a vehicle refuses an action: by its
-    factsheet, or by versions 2.0 and 2.1."""
+    factsheet, or by versions 1.1 to 2.1."""
     body = PREDEFINED.get(action, {}).get("parameters", {})
     standard = tuple(
         key for key, each in body.items() if isinstance(each, Mapping) and each.get("required")
@@ -167,7 +167,7 @@ def why_unsupported(own: OwnBehavior, version: str, factsheet: Factsheet | None)
         return ""
     if action not in PREDEFINED:
         return ""
-    if action in _NEW_IN_2_1 and version.startswith("2.0."):
+    if action in _NEW_IN_2_1 and version < "2.1":
         return f"VDA 5050 {version} has no action {action}, which is new in 2.1"
     allowed = PREDEFINED[action].get("action", {}).get("scope", "node")
     if scope != allowed and action not in _ANY_SCOPE:

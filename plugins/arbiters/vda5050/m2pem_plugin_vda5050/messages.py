@@ -1,4 +1,4 @@
-"""The messages of VDA 5050, versions 2.0 and 2.1: their types, their topics, and reading them.
+"""The messages of VDA 5050, versions 1.1, 2.0 and 2.1: their types, their topics, and reading them.
 
 `msgspec` checks the types of fields when it reads a message. Fields that are not here are ignored:
 a later minor version may have more. Enumerations of what a vehicle sends are plain texts: one with
@@ -13,7 +13,7 @@ import msgspec
 from msgspec import UNSET, Meta, Struct, UnsetType
 
 VERSION = "2.1.0"
-SPOKEN = "m2pem speaks 2.0 and 2.1 alone"
+SPOKEN = "m2pem speaks 1.1, 2.0 and 2.1 alone"
 LARGEST_MESSAGE = 4 << 20
 """In bytes. Larger messages are not read."""
 
@@ -109,7 +109,11 @@ class Order(Message):
 
 
 class InstantActions(Message):
+    """`instant_actions`: the same list under its name in version 1.1. Some vehicles of 2.0 read it
+    in place of `actions` (vda-5050-lib 1.4.0); the schema of 2.0 allows other members."""
+
     actions: list[Action]
+    instant_actions: list[Action] | UnsetType = UNSET
 
 
 # --- from the vehicle ---------------------------------------------------------------------------
@@ -199,6 +203,8 @@ class Visualization(Part):
 
     agv_position: AgvPosition | UnsetType = UNSET
     velocity: Velocity | UnsetType = UNSET
+    header_id: int | UnsetType = UNSET
+    timestamp: str | UnsetType = UNSET
 
 
 class ConnectionMessage(Message):
@@ -315,13 +321,13 @@ class _AnyHeader(Struct):
 _ANY_HEADER = msgspec.json.Decoder(_AnyHeader)
 
 
-def other_version(payload: bytes) -> str:
-    """Return the version in the header of a message, if it is none that m2pem speaks; else ""."""
+def other_version(payload: bytes, major: str = "2.") -> str:
+    """Return the version in the header of a message, if it does not begin with `major`; else ""."""
     try:
         version = _ANY_HEADER.decode(payload[:LARGEST_MESSAGE]).version
     except (msgspec.DecodeError, RecursionError, UnicodeDecodeError):
         return ""
-    return "" if version.startswith("2.") else version
+    return "" if version.startswith(major) else version
 
 
 def seconds_of(timestamp_: str) -> float | None:
@@ -352,9 +358,10 @@ class Headers:
         self._next: dict[str, int] = {}
 
     @property
-    def is_2_0(self) -> bool:
-        """Whether the version is 2.0, whose schemas spell two fields otherwise than its text."""
-        return self._fixed["version"].startswith("2.0.")
+    def has_two_spellings(self) -> bool:
+        """Whether the version is 2.0, whose schemas spell two fields otherwise than its text, or
+        1.1, which has no schemas."""
+        return self._fixed["version"].startswith(("1.1.", "2.0."))
 
     def of(self, topic: str, time_us: int) -> dict[str, Any]:
         """Return the fields of the next header on a topic."""

@@ -49,7 +49,8 @@ class OrderPlan:
         edges = [self._edge(number, number < base_end) for number in range(first, end)]
         return nodes, edges
 
-    def _id(self, number: int) -> str:
+    def node_id(self, number: int) -> str:
+        """Return the id of a node by its number."""
         name = self.order_id[:8]
         return f"{name}.0" if number == 0 else f"{name}.{(number - 1) % len(self.points) + 1}"
 
@@ -73,7 +74,7 @@ class OrderPlan:
         )
         actions = list(self.actions) if is_last else []
         return Node(
-            node_id=self._id(number),
+            node_id=self.node_id(number),
             sequence_id=2 * number,
             released=released,
             actions=actions,
@@ -83,11 +84,11 @@ class OrderPlan:
     def _edge(self, number: int, released: bool) -> Edge:
         """Return the edge from a node to the next one."""
         return Edge(
-            edge_id=f"{self._id(number)}-{(number % len(self.points)) + 1}",
+            edge_id=f"{self.node_id(number)}-{(number % len(self.points)) + 1}",
             sequence_id=2 * number + 1,
             released=released,
-            start_node_id=self._id(number),
-            end_node_id=self._id(number + 1),
+            start_node_id=self.node_id(number),
+            end_node_id=self.node_id(number + 1),
             actions=[],
             max_speed=UNSET if self.speed_m_s is None else round(self.speed_m_s, 3),
             orientation=round(math.pi, 5) if self.backwards else UNSET,
@@ -122,6 +123,12 @@ class OrderProgress:
         """Note the last node that the vehicle says it has reached: none that is not released, or
         the next update would be as long as a wrong number is high."""
         self.traversed = max(self.traversed, min(number, self.base_end))
+
+    def is_at_base_end(self, update_id: int, reached: int) -> bool:
+        """Whether a vehicle that has this update has reached all nodes that it may drive to, and
+        more will follow."""
+        end = self.base_end if update_id >= self.update_id else self._first
+        return reached >= end and end != self.plan.last
 
     @property
     def is_update_due(self) -> bool:

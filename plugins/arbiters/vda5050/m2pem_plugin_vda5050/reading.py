@@ -97,7 +97,25 @@ def said_about(state: State, ids: Collection[str]) -> list[str]:
     ]
 
 
-def not_ready_reasons(state: State, map_id: str) -> tuple[str, ...]:
+def said_of_instant_actions(state: State) -> list[str]:
+    """Return the errors about the topic of instant actions, or those sent by m2pem, as text."""
+    return [
+        describe(error)
+        for error in state.errors
+        if error.error_references is not UNSET
+        and any(
+            each.reference_value == "instantActions" or each.reference_value.startswith(ID_PREFIX)
+            for each in error.error_references
+        )
+    ]
+
+
+def fatal_errors(state: State) -> str:
+    """Return the errors with which a vehicle is not in running condition, as text; "": none."""
+    return "; ".join(describe(each) for each in state.errors if each.error_level == "FATAL")
+
+
+def not_ready_reasons(state: State, map_id: str, paused_by_us: bool) -> tuple[str, ...]:
     """Return why the vehicle would not do what it is asked; nothing if it is ready."""
     reasons = []
     if state.operating_mode != "AUTOMATIC":
@@ -107,7 +125,7 @@ def not_ready_reasons(state: State, map_id: str) -> tuple[str, ...]:
     reasons += [describe(error) for error in state.errors if error.error_level != "WARNING"]
     if (lost := wrong_position(state, map_id)) != "":
         reasons.append(lost)
-    if is_paused(state) and not is_paused_by_us(state):
+    if is_paused(state) and not paused_by_us:
         reasons.append("it is paused, and not by m2pem")
     return tuple(reasons)
 

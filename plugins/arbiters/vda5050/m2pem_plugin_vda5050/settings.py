@@ -16,7 +16,7 @@ from m2pem_plugin_vda5050.messages import SPOKEN, Factsheet, MessageError, decod
 ARBITER = "vda5050"
 DOMAINS = ("ground",)
 PORTS = {"mqtt": 1883, "mqtts": 8883}
-VERSIONS = re.compile(r"2\.[01](\.\d+)?")
+VERSIONS = re.compile(r"(1\.1|2\.[01])(\.\d+)?")
 _LEVEL = re.compile(r"[^/+#$\s]+")
 _SERIAL = re.compile(r"[A-Za-z0-9_.:-]+")
 MOST_RELEASED = 10_000
@@ -73,16 +73,14 @@ class Settings:
     @property
     def prefix(self) -> str:
         """The topics of the vehicle, without the last level."""
-        return f"{self.interface}/v2/{self.manufacturer}/{self.serial_number}"
+        return f"{self.interface}/v{self.version[0]}/{self.manufacturer}/{self.serial_number}"
 
     @property
     def other_prefixes(self) -> tuple[str, ...]:
         """Where a vehicle is if it speaks another major version; 3.0 suggests `vda5050`."""
-        ends = [(self.interface, "v1"), (self.interface, "v3"), ("vda5050", "v3")]
-        return tuple(
-            f"{interface}/{major}/{self.manufacturer}/{self.serial_number}"
-            for interface, major in dict.fromkeys(ends)
-        )
+        ends = [*((self.interface, f"v{major}") for major in (1, 2, 3)), ("vda5050", "v3")]
+        prefixes = [f"{'/'.join(end)}/{self.manufacturer}/{self.serial_number}" for end in ends]
+        return tuple(each for each in dict.fromkeys(prefixes) if each != self.prefix)
 
     @property
     def address(self) -> str:
@@ -127,7 +125,7 @@ def _read(connection: Connection) -> Settings:
     reader.refuse_others(_KEYS)
     version = str(reader.values.get("version", "2.1.0"))
     if not VERSIONS.fullmatch(version):
-        raise reader.error("version", f"{version!r} is neither 2.0.0 nor 2.1.0: {SPOKEN}")
+        raise reader.error("version", f"{version!r} is none of 1.1.0, 2.0.0 and 2.1.0: {SPOKEN}")
     version = version if version.count(".") == 2 else f"{version}.0"
     factsheet = _factsheet(reader, connection.folder)
     return Settings(

@@ -21,7 +21,13 @@ from m2pem.api import (
     RemainingRoute,
     Value,
 )
-from m2pem_plugin_vda5050.commander import CancelControl, Commander, PauseControl, Repeater
+from m2pem_plugin_vda5050.commander import (
+    CancelControl,
+    Commander,
+    InstantActionCheck,
+    PauseControl,
+    Repeater,
+)
 from m2pem_plugin_vda5050.messages import Action, State
 from m2pem_plugin_vda5050.orders import OrderPlan, OrderProgress
 from m2pem_plugin_vda5050.reading import (
@@ -30,6 +36,7 @@ from m2pem_plugin_vda5050.reading import (
     action_state,
     base_end,
     describe,
+    fatal_errors,
     is_executing,
     is_paused,
     said_about,
@@ -46,6 +53,9 @@ CANCEL_SHARE = 0.8
 UNSENT_AFTER_S = 6.0
 """So long after a cancel, it has failed if the broker is not connected: operators must hear it."""
 
+FATAL_FOR_S = 5.0
+"""A vehicle that reports a FATAL error for so long has failed."""
+
 LEAST_PROGRESS_M = 1.0
 """What is left of a route that fails or is lost is reported if so much was driven since."""
 
@@ -57,7 +67,7 @@ class TaskSetup:
     """The arguments of a task. `id`: of the order or action. `left_behind`: is called with the id
     of an order that the vehicle may still execute when its behavior has ended, and whether it is to
     be cancelled at once. `position`: the place of the vehicle. `broker_problem`: why the
-    broker is not connected, or ""."""
+    broker is not connected, or "". `check`: whether the vehicle takes instant actions."""
 
     request: BehaviorRequest
     spec: BehaviorSpec
@@ -70,6 +80,7 @@ class TaskSetup:
     left_behind: Callable[[str, bool], None]
     position: Callable[[], GeoPosition | None]
     broker_problem: Callable[[], str]
+    check: InstantActionCheck
 
 
 class Task(ABC):
@@ -147,9 +158,11 @@ class OrderTask(Task):
         self._last: int | None = None
         self._actions: Sequence[Action] = ()
         self._repeater = Repeater(self._clock)
-        self._cancel = CancelControl(setup.commander, self._clock)
+        self.cancel_control = CancelControl(setup.commander, self._clock)
         self._cancelled_us: int | None = None
         self._sent_us: int | None = None
+        self._updated_us = self._since_us
+        self._fatal_us: int | None = None
         self._has_begun = False
         self._old_errors: set[str] = set()
         self._route = RemainingRoute.of(setup.request.parameters)
@@ -162,7 +175,7 @@ class OrderTask(Task):
             return
         if self._cancelled_us is None:
             self._cancelled_us = self._clock.now_us()
-            self._cancel.send()
+            self.cancel_control.send()
 
     def lost(self) -> None:
         self._report_left(LEAST_PROGRESS_M)
@@ -194,7 +207,10 @@ class OrderTask(Task):
                 reason = f"the vehicle does not end its order {other!r}"
                 self._end(BehaviorState.FAILED, "TIMEOUT", reason)
             return
-        if not self._setup.context.may_send():
+        if problem := self._setup.check.problem:
+            self._end(BehaviorState.FAILED, REFUSED, problem)
+            return
+        if not (self._setup.check.is_answered and self._setup.context.may_send()):
             return
         try:
             plan = self._plan_from(state)
@@ -220,7 +236,7 @@ class OrderTask(Task):
 
     def _step_cancelled_before(self, state: State, cancelled_us: int) -> None:
         """The order may still arrive, but before the cancel that was sent after it."""
-        status = self._cancel.step(state, may_send=self._setup.context.may_send())
+        status = self.cancel_control.step(state, may_send=self._setup.context.may_send())
         if status in ENDED or self._refusal(state):
             self._end(BehaviorState.CANCELLED)
         else:
@@ -254,19 +270,26 @@ class OrderTask(Task):
             self._report_left(LEAST_PROGRESS_M)
             self._taken_over(state)
         elif self._cancelled_us is not None:
-            self._cancel.step(state, may_send=self._setup.context.may_send())
+            self.cancel_control.step(state, may_send=self._setup.context.may_send())
+            if self.cancel_control.disobedience(state) and not self._setup.pause.wanted:
+                self._setup.pause.want(True)  # it may obey that
             self._fail_cancel_after_limit(self._cancelled_us)
+        elif fatal := fatal_errors(state):
+            self._step_fatal(fatal)
         else:
+            self._fatal_us = None
             self._step_updates(state)
 
     def _step_end(self, state: State) -> bool:
         """Whether the order has ended; that is reported."""
-        if state.node_states or state.edge_states or state.driving:
+        if state.node_states or state.edge_states or state.driving or self._awaits_update(state):
             return False
         own = [action_state(state, action.action_id) for action in self._actions]
         if any(each is not None and each.action_status not in ENDED for each in own):
             return False
         is_there = self._last is not None and traversed(state) >= self._last
+        if self._last is not None and self._order is not None:
+            is_there = is_there and state.last_node_id == self._order.plan.node_id(self._last)
         statuses = ["" if each is None else each.action_status for each in own]
         if is_there and all(status == "FINISHED" for status in statuses):
             outputs = self._outputs(state, self._actions[0].action_id) if self._actions else {}
@@ -283,9 +306,32 @@ class OrderTask(Task):
         else:
             self._report_left(LEAST_PROGRESS_M)
             mode = "" if state.operating_mode in COMMANDED else f" in mode {state.operating_mode}"
-            reason = f"the order was ended on the vehicle{mode}, not by m2pem"
+            node = f"{text_of(state.last_node_id, 60)!r}, {traversed(state)} of {self._last}"
+            where = "" if self._last is None else f" at node {node}"
+            reason = f"the order was ended on the vehicle{mode}{where}, not by m2pem"
             self._end(BehaviorState.FAILED, "TAKEN_OVER", reason)
         return True
+
+    def _step_fatal(self, errors: str) -> None:
+        """End the order of a vehicle that is not in running condition: it would go on later,
+        when people have mended it."""
+        if self._fatal_us is None:
+            self._fatal_us = self._clock.now_us()
+        elif self._waited_s(self._fatal_us) >= FATAL_FOR_S:
+            self._leave(cancel=True)
+            self._report_left(LEAST_PROGRESS_M)
+            self._end(BehaviorState.FAILED, reason=f"the vehicle has a fatal error: {errors}")
+
+    def _awaits_update(self, state: State) -> bool:
+        """Whether the vehicle has done what was released, and soon gets more: it has no node left
+        then, where m2pem has not sent what is not released."""
+        order = self._order
+        if order is None or not order.is_at_base_end(state.order_update_id, traversed(state)):
+            return False
+        if self._cancelled_us is not None and self.cancel_control.is_taken(state):
+            return False
+        has_all = state.order_update_id >= order.update_id
+        return has_all or self._waited_s(self._updated_us) <= ACCEPTED_WITHIN_S
 
     def _step_updates(self, state: State) -> None:
         """Release more nodes, and send again what the vehicle does not have yet."""
@@ -303,6 +349,7 @@ class OrderTask(Task):
                 self._repeat()
         elif order.is_update_due:
             order.extend()
+            self._updated_us = self._clock.now_us()
             self._send_update()
 
     def _fail_cancel_after_limit(self, cancelled_us: int) -> None:
@@ -314,7 +361,7 @@ class OrderTask(Task):
         self._leave(cancel=True)
         self._setup.pause.want(True)
         self._report_left(LEAST_PROGRESS_M)
-        did = "has refused the cancel" if self._cancel.refused else "did not stop"
+        did = "has refused the cancel" if self.cancel_control.refused else "did not stop"
         reason = f"the vehicle {did} within {limit_s:g} s, and may still execute its order"
         if problem:
             reason += f": the broker is not connected: {problem}"

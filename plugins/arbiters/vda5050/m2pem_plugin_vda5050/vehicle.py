@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
-from msgspec import UNSET
+from msgspec import UNSET, UnsetType
 
 from m2pem.api import (
     ArbiterContext,
@@ -40,8 +40,10 @@ from m2pem_plugin_vda5050.checkpoint import order_id
 from m2pem_plugin_vda5050.commander import (
     CancelControl,
     Commander,
+    InstantActionCheck,
     PauseControl,
     Publish,
+    StopControl,
     action_of,
 )
 from m2pem_plugin_vda5050.map_frame import MapFrame, MapPoint
@@ -63,7 +65,7 @@ from m2pem_plugin_vda5050.messages import (
 from m2pem_plugin_vda5050.orders import OrderPlan, OrderProgress
 from m2pem_plugin_vda5050.reading import (
     COMMANDED,
-    describe,
+    fatal_errors,
     is_executing,
     is_paused,
     is_paused_by_us,
@@ -71,7 +73,7 @@ from m2pem_plugin_vda5050.reading import (
     text_of,
     wrong_position,
 )
-from m2pem_plugin_vda5050.settings import Settings
+from m2pem_plugin_vda5050.settings import VERSIONS, Settings
 from m2pem_plugin_vda5050.tasks import InstantTask, OrderTask, StopTask, Task, TaskSetup
 
 BROKEN_AFTER_S = 5.0
@@ -88,6 +90,10 @@ RESTARTED_AFTER_S = 5.0
 RESTARTED_STATES = 3
 """So many older states in their order, and none else for so long, are those of a vehicle whose
 clock was set back."""
+
+OBEYED_WITHIN_S = 0.9
+"""In real time. A stop that no state shows by then is said not to be obeyed: the executive alerts
+operators after 1 s."""
 
 LOG_AGAIN_AFTER_S = 60.0
 OTHER_VERSION = "connection of another major version"
@@ -113,7 +119,7 @@ class Vehicle:
         self.resource = setup.connection.resource
         self.settings = settings = setup.settings
         self.link = LinkState.LOST
-        self.first_contact = asyncio.Event()
+        self.first_contact, self.first_answer = asyncio.Event(), asyncio.Event()
         self._context, self._tracker, self._limits = setup.context, setup.tracker, setup.limits
         self._clock = setup.context.clock
         self._logger: logging.Logger = setup.context.logger
@@ -123,11 +129,14 @@ class Vehicle:
         self._headers = Headers(settings.manufacturer, settings.serial_number, settings.version)
         self._commander = Commander(self._headers, self._clock, setup.publish)
         self._pause = PauseControl(self._commander, self._clock)
+        self._check = InstantActionCheck(self._commander, self._clock)
         self._own = {own.spec.name: own for own in settings.own_behaviors}
         self._fence = setup.connection.fence
         self._factsheet: Factsheet | None = None
         self._state: State | None = None
         self._state_us = 0
+        self._shown_s: float | None = None
+        self._shown_id: int | UnsetType = UNSET
         self._older: list[float] = []
         self._may_be_older = False
         self._place: AgvPosition | None = None
@@ -140,6 +149,8 @@ class Vehicle:
         self._left: dict[str, CancelControl | None] = {}
         self._left_us = 0
         self._resolved = asyncio.Event()
+        self._news = asyncio.Event()
+        self._disobedience = ""
         self._is_held = False
         self._logged_us: dict[str, int] = {}
         self._unlogged: Counter[str] = Counter()
@@ -162,18 +173,21 @@ class Vehicle:
                 case "factsheet":
                     self._factsheet = decode(payload, Factsheet)
                 case _:
-                    self._note_other_version(other_version(payload))
+                    self._note_other_version(payload)
         except MessageError as error:
-            self._note_other_version(other_version(payload))
+            self._note_other_version(payload)
             self._invalid = f"its last message on {topic} was invalid: {text_of(error)}"
             self._log(f"invalid message: {topic}", text_of(error))
         return None
 
     def _receive_state(self, payload: bytes) -> VehicleState | None:
         state = decode(payload, State)
-        if not state.version.startswith("2."):
-            raise MessageError(f"its version is {text_of(state.version, 20)}, not 2.x")
         expected = self.settings.version
+        if state.version[:2] != expected[:2]:
+            raise MessageError(f"its version is {text_of(state.version, 20)}, not {expected[0]}.x")
+        if expected[0] == "1":  # its text has small letters in one place, and capitals in another
+            for each in state.action_states:
+                each.action_status = each.action_status.upper()
         if self._state is None and state.version.split(".")[:2] != expected.split(".")[:2]:
             version = text_of(state.version, 20)
             self._logger.warning(
@@ -185,6 +199,7 @@ class Vehicle:
         if self._is_late(state):
             return None
         self._state, self._state_us = state, self._clock.now_us()
+        self._shown_s = seconds_of(state.timestamp)
         self._place = None if state.agv_position is UNSET else state.agv_position
         if state.velocity is not UNSET:
             self._velocity = state.velocity
@@ -220,29 +235,56 @@ class Vehicle:
         message = decode(payload, Visualization)
         if message.agv_position is UNSET or self._state is None:
             return None
+        if self._is_late_visualization(message):
+            return None
         self._place = message.agv_position
         if message.velocity is not UNSET:
             self._velocity = message.velocity
         self._note_contact()
         return self.state()
 
+    def _is_late_visualization(self, message: Visualization) -> bool:
+        """Whether a visualization was made before the position that is known, or counted before
+        the last one. One without a header is not."""
+        made_s = None if message.timestamp is UNSET else seconds_of(message.timestamp)
+        last_s, number, last = self._shown_s, message.header_id, self._shown_id
+        if made_s is not None and last_s is not None and made_s != last_s:
+            is_late = made_s < last_s
+        elif isinstance(number, int) and isinstance(last, int):
+            is_late = (number - last) % 2**32 >= 2**31
+        else:
+            is_late = False
+        if is_late:
+            self._log("late visualization", f"{number}, made at {text_of(message.timestamp, 40)}")
+        else:
+            self._shown_s, self._shown_id = made_s or last_s, number
+        return is_late
+
     def _receive_connection(self, message: ConnectionMessage) -> None:
         match message.connection_state:
             case "ONLINE":
                 self._broken_us, self._is_offline = None, False
-                self._may_be_older = True
+                self._may_be_older, self._shown_id = True, UNSET
             case "OFFLINE":
                 self._is_offline = True
             case _ if self._broken_us is None:
                 self._broken_us = self._clock.now_us()
 
-    def _note_other_version(self, version: str) -> None:
-        if version and self._state is None and not self._other_version:
-            self._other_version = (
-                f"it speaks VDA 5050 {text_of(version, 20)}: {SPOKEN}, reads no state and sends no "
-                "order, action, zone or response of other versions; let it speak 2.1"
+    def _note_other_version(self, payload: bytes) -> None:
+        expected = self.settings.version
+        version = text_of(other_version(payload, expected[:2]), 20)
+        if not version or self._state is not None or self._other_version:
+            return
+        self._other_version = f"it speaks VDA 5050 {version}"
+        if VERSIONS.fullmatch(version):
+            said = f", and the fleet's `version` is {expected}: write `version: {version}`"
+        else:
+            said = (
+                f": {SPOKEN}, reads no state and sends no order, action, zone or response of other "
+                "versions; let it speak 2.1"
             )
-            self._logger.warning("%s: %s", self.resource, self._other_version)
+        self._other_version += said
+        self._logger.warning("%s: %s", self.resource, self._other_version)
 
     def _note_contact(self) -> None:
         self._contact_us = self._clock.now_us()
@@ -268,8 +310,8 @@ class Vehicle:
 
     def listen(self) -> None:
         """The broker is connected: ask the vehicle for its state, which is not retained."""
-        self._commander.control("stateRequest")
-        if self._factsheet is None:
+        self._check.ask()
+        if self._factsheet is None and self.settings.version[0] != "1":
             self._commander.control("factsheetRequest")
 
     def listen_from_now(self) -> None:
@@ -282,6 +324,8 @@ class Vehicle:
         target = request.parameters.get("target")
         if target is not None and not isinstance(target, Point):
             return "target: a VDA 5050 vehicle drives to places, not after vehicles"
+        if request.behavior == "reverse" and self.settings.version[0] == "1":
+            return "VDA 5050 1.1 cannot say that a vehicle drives backwards"
         own = self._own.get(request.behavior)
         if own is not None and (reason := self._not_taken(own, request)):
             return reason
@@ -294,14 +338,15 @@ class Vehicle:
             return f"its operating mode is {text_of(state.operating_mode, 30)}"
         if request.behavior in STOPS:
             return ""
+        if self._check.problem:
+            return self._check.problem
         if state.safety_state.e_stop != "NONE":
             return "its emergency stop is active"
-        fatal = [describe(each) for each in state.errors if each.error_level == "FATAL"]
-        if fatal:
-            return f"it has a fatal error: {'; '.join(fatal)}"
+        if fatal := fatal_errors(state):
+            return f"it has a fatal error: {fatal}"
         if own is not None and own.scope is Scope.INSTANT:
             return ""
-        if is_paused(state) and not (is_paused_by_us(state) or self._pause.wanted):
+        if is_paused(state) and not self._is_paused_by_us():
             return "it is paused, and not by m2pem: let it go on where it was paused"
         known = {*self._left, self._id(request.id), *map(self._id, request.preempts)}
         if self._task is not None:
@@ -348,12 +393,34 @@ class Vehicle:
         """Whether the vehicle is paused, by whomever."""
         return self._state is not None and is_paused(self._state)
 
+    async def obeyed(self) -> str:
+        """Wait until a state shows that a pause or cancel was taken. Return "", or what is wrong,
+        for operators."""
+        try:
+            async with asyncio.timeout(OBEYED_WITHIN_S):
+                while late := [each for each in self._stops() if not each.is_taken(self._state)]:
+                    self._news.clear()
+                    await self._news.wait()
+        except TimeoutError:
+            why = "; ".join(each.refusal(self._state) for each in late)
+            if self._broker_problem:
+                why += f"; the broker is not connected: {self._broker_problem}"
+            return f"{self.resource} does NOT obey: {why}"
+        return ""
+
+    def _stops(self) -> list[StopControl]:
+        """Return the pause and the cancels of the vehicle."""
+        stops = [self._pause, *(each for each in self._left.values() if each is not None)]
+        if isinstance(self._task, OrderTask) and not self._task.over:
+            stops.append(self._task.cancel_control)
+        return stops
+
     def forget(self, behaviors: Collection[BehaviorId]) -> None:
         """Send nothing more for these behaviors: the vehicle goes on with what was released."""
         if self._task is not None and self._task.request.id in behaviors:
             self._task = None
             self._left.clear()
-            self._pause.wanted = None  # another executive says now whether it is to be paused
+            self._pause.forget()  # another executive says now whether it is to be paused
         for behavior in behaviors:
             self._left.pop(self._id(behavior), None)
 
@@ -403,13 +470,15 @@ class Vehicle:
         """
         silent_s = (self._clock.now_us() - self._contact_us) / 1e6
         before, self._broker_problem = self.link, problem
+        said = self._disobedience
         self.link = self._link_state(silent_s, may_lose=may_lose)
         if self.link is LinkState.LOST and may_lose and self._is_silent(silent_s):
             if self.doing is not None:
                 self._lose(silent_s, problem)
         elif self._state is not None:
             self.step()
-        return self.state() if self.link is not before else None
+        changed = self.link is not before or self._disobedience != said
+        return self.state() if changed else None
 
     def step(self) -> None:
         """Send what is due, and report what the state shows."""
@@ -417,8 +486,17 @@ class Vehicle:
         if state is None:
             return
         may_send = self._context.may_send()
+        self._check.step(state, may_send=may_send)
+        if self._check.is_answered:
+            self.first_answer.set()
         self._pause.step(state, may_send=may_send)
         self._step_left(state, may_send=may_send)
+        self._step_task(state)
+        said = filter(None, (each.disobedience(state) for each in self._stops()))
+        self._disobedience = next(said, "")
+        self._news.set()
+
+    def _step_task(self, state: State) -> None:
         task = self._task
         if task is None or task.over:
             return
@@ -439,7 +517,14 @@ class Vehicle:
             behavior = self._task.request.behavior
         if state is None:
             return VehicleState(self.resource, now_us, link=self.link, behavior=behavior)
-        reasons = not_ready_reasons(state, self.settings.map.id)
+        reasons = not_ready_reasons(state, self.settings.map.id, self._is_paused_by_us())
+        if self._disobedience:
+            reasons = (f"it does NOT obey: {self._disobedience}; use its own stop", *reasons)
+        if not self._check.is_answered:
+            waits = "it has not answered an instant action yet"
+            reasons = (*reasons, self._check.problem or waits)
+        if state.driving and not (is_executing(state) or behavior):
+            reasons = (*reasons, "it drives, and has no order")
         if is_executing(state) and state.order_id not in self._known_orders():
             order = text_of(state.order_id, 60)
             reasons = (*reasons, f"it executes the order {order!r} of another master control")
@@ -529,7 +614,8 @@ class Vehicle:
 
     def _is_paused_by_us(self) -> bool:
         state = self._state
-        return bool(self._pause.wanted) or (state is not None and is_paused_by_us(state))
+        ours = self._pause.wanted or self._pause.is_ours
+        return bool(ours) or (state is not None and is_paused_by_us(state))
 
     def _id(self, behavior: BehaviorId) -> str:
         return order_id(self._context.journal, behavior)
@@ -549,6 +635,7 @@ class Vehicle:
             self._leave_behind,
             self.position,
             lambda: self._broker_problem,
+            self._check,
         )
         if request.behavior in STOPS:
             return StopTask(setup, lambda: not self._is_held)
@@ -596,7 +683,7 @@ class Vehicle:
             settings.deviation_m if tolerance_m is None else tolerance_m,
             settings.start_deviation_m,
             actions,
-            self._headers.is_2_0,
+            self._headers.has_two_spellings,
         )
 
     def _points(

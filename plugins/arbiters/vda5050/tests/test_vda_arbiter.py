@@ -23,6 +23,7 @@ from m2pem.api import (
     SystemClock,
     VehicleState,
 )
+from m2pem.errors import OperatorError
 from m2pem.testing.contracts.arbiter_harness import JOURNAL, ArbiterHarness, context
 
 SPEED = 6.0
@@ -96,7 +97,8 @@ async def test_a_vehicle_that_refuses_a_cancel_is_not_said_to_have_stopped(world
         await harness.start("r1.b1", "goto", AGV1, target=FAR)
         await moving(harness)
         world.sim.fault("agv1: refuse cancel")
-        await harness.arbiter.cancel("r1.b1", 1)
+        with pytest.raises(OperatorError, match="does NOT obey: has refused cancelOrder: cancel"):
+            await harness.arbiter.cancel("r1.b1", 1)
         end = await harness.ended("r1.b1", 60)
         assert (end.state, end.code) == (BehaviorState.FAILED, "TIMEOUT")
         assert "has refused the cancel" in end.reason
@@ -110,7 +112,8 @@ async def test_a_cancel_without_a_broker_is_soon_said_not_to_have_arrived(world:
         await harness.start("r1.b1", "goto", AGV1, target=FAR)
         await moving(harness)
         world.broker.stop()
-        await harness.arbiter.cancel("r1.b1", 1)
+        with pytest.raises(OperatorError, match=r"does NOT obey: .* the broker is not connected"):
+            await harness.arbiter.cancel("r1.b1", 1)
         end = await harness.ended("r1.b1", 60)
         assert (end.state, end.code) == (BehaviorState.FAILED, "TIMEOUT")
         assert "may still execute its order: the broker is not connected: " in end.reason
@@ -127,7 +130,8 @@ async def test_a_vehicle_that_is_let_go_of_is_not_paused_later(world: World) -> 
         await harness.start("r1.b1", "goto", AGV1, target=NEAR, speed=0.5)
         await moving(harness)
         world.broker.stop()
-        await harness.arbiter.hold(AGV1)
+        with pytest.raises(OperatorError, match="no state shows startPause"):
+            await harness.arbiter.hold(AGV1)
         await harness.arbiter.disown("r1")
         world.broker.start()
         end = await world.heard(
@@ -304,6 +308,26 @@ async def test_a_state_that_comes_late_changes_nothing(world: World) -> None:
         assert (await harness.ended("r1.b1", 90)).state is BehaviorState.SUCCEEDED
 
 
+async def test_a_visualization_that_comes_late_moves_nothing(world: World) -> None:
+    settings = world.simulate()
+    topic = "uagv/v2/m2pem/agv1/visualization"
+    async with commanding(settings) as harness:
+        old = await world.heard("state", AGV1, bool)
+        await harness.start("r1.b1", "goto", AGV1, target=NEAR)
+        assert (await harness.ended("r1.b1", 90)).state is BehaviorState.SUCCEEDED
+        there, count = vehicle(harness).position, len(harness.states)
+        header = {key: old[key] for key in ("timestamp", "version", "manufacturer", "serialNumber")}
+        late = {**header, "headerId": 1, "agvPosition": old["agvPosition"]}
+        for _ in range(5):
+            world.judge.publish(topic, json.dumps(late))
+        assert await harness.until(lambda: len(harness.states) > count + 10, 60)
+        assert {state.position for state in harness.states[count:]} == {there}
+        newest = await world.heard("state", AGV1, lambda state: state["lastNodeSequenceId"])
+        new = {**late, "timestamp": "2100-01-01T00:00:00.000Z", "headerId": newest["headerId"]}
+        world.judge.publish(topic, json.dumps(new))
+        assert await harness.until(lambda: vehicle(harness).position != there, 60)
+
+
 async def test_a_vehicle_that_restarts_with_its_clock_set_back_is_received(world: World) -> None:
     settings = world.simulate()
     async with commanding(settings, lost_after_s=600.0) as harness:
@@ -395,7 +419,7 @@ async def test_a_vehicle_of_version_3_is_named_as_such(
         await harness.start("r1.b1", "goto", AGV1, target=NEAR)
         end = await harness.ended("r1.b1", 30)
     assert end.state is BehaviorState.REJECTED
-    said = "it speaks VDA 5050 3.0.0: m2pem speaks 2.0 and 2.1 alone"
+    said = "it speaks VDA 5050 3.0.0: m2pem speaks 1.1, 2.0 and 2.1 alone"
     assert said in end.reason
     assert f"agv1: {said}" in caplog.text
     assert judge.of("order", AGV1) == []
