@@ -241,6 +241,8 @@ class LoggedAlerts(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         """Any thread may log."""
         severity = AlertSeverity.ERROR if record.levelno >= logging.ERROR else AlertSeverity.WARNING
+        if record.levelno >= logging.CRITICAL:
+            severity = AlertSeverity.CRITICAL
         if getattr(record, "notice", False):
             severity = AlertSeverity.NOTICE
         about = getattr(record, "resource", "")

@@ -9,14 +9,21 @@ import logging
 import math
 from dataclasses import dataclass
 
-from m2pem.api import BehaviorId, BehaviorState, BehaviorTracker, LatestTask, Limits
+from m2pem.api import BehaviorId, BehaviorState, BehaviorTracker, LatestTask, LatLon, Limits
 from m2pem_plugin_mavlink.behaviors.arrival import (
     STANDS_BELOW_M_S,
     StillnessTimer,
     accepted_modes,
+    distance_to_m,
     on_the_ground,
+    position_of,
+    stays_at,
 )
-from m2pem_plugin_mavlink.behaviors.behavior import Behavior, BehaviorFailedError
+from m2pem_plugin_mavlink.behaviors.behavior import (
+    Behavior,
+    BehaviorFailedError,
+    TakenOverError,
+)
 from m2pem_plugin_mavlink.behaviors.takeoff_landing import Land, ReturnToLaunch, SetSpeed
 from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, NoAnswerError
 from m2pem_plugin_mavlink.vehicle.autopilot import ModeLeftError
@@ -36,6 +43,16 @@ LEAST_PROGRESS_M = 1.0
 """What is left of a behavior that fails or is lost is reported if so much was done since."""
 
 KNOWN_WITHIN_S = 5.0
+RESTS_BELOW_M_S = 1.0
+DRIFTS_BELOW_M_S = 2.0
+"""A vehicle that is slower, one on water that drifts, obeys a stop; gusts and waves move it."""
+
+OBEYS_WITHIN_S = 10.0
+"""From 15 m/s a copter brakes in 5 s."""
+
+PUSHED_M = 15.0
+"""A vehicle that another station has paused is moved by gusts, but not so far."""
+
 STOP_SHARE = 0.8
 """The share of the cancel timeout after which a stop has failed."""
 
@@ -61,7 +78,7 @@ class _NewSpeed:
 class _ActiveBehavior:
     """The behavior that is active. `begun`: the vehicle executes it; `reattached`: it was found on
     the vehicle after a restart, and nothing need be sent. `speed`: to be sent to the vehicle; None:
-    nothing is."""
+    nothing is. `waits`: why it waits for another station, and where the vehicle came to rest."""
 
     id: BehaviorId
     behavior: Behavior
@@ -69,6 +86,8 @@ class _ActiveBehavior:
     reattached: bool = False
     cancelled: bool = False
     speed: _NewSpeed | None = None
+    waits: str = ""
+    waits_at: LatLon | None = None
 
 
 class VehicleController:
@@ -238,7 +257,7 @@ class VehicleController:
                 active.begun = active.reattached = True
             await self._begin_or_resume(active)
             await self._wait_until_finished(active)
-        except _TakenOverError as error:
+        except TakenOverError as error:
             self._end(active, BehaviorState.FAILED, error.code, error.reason)
         except BehaviorFailedError as error:
             await self._fail(active, error.reason, error.code)
@@ -287,11 +306,14 @@ class VehicleController:
         )
         stillness = StillnessTimer(active.behavior.context)
         try:
-            # Check for a restart first: a vehicle that fell looks like one that has landed.
-            while not self._has_restarted() and not active.behavior.finished():
+            # Check for these first: a vehicle that fell looks like one that has landed.
+            while not self._has_restarted_or_fallen() and not active.behavior.finished():
                 if steps.done():
                     steps.result()
-                self._check_takeover(accepted_modes(active.behavior))
+                waits = self._check_takeover(accepted_modes(active.behavior), active.behavior.name)
+                self._note_waiting(active, waits or active.behavior.waits())
+                if active.waits:
+                    stillness.forget()
                 self._check_progress(active.behavior, stillness)
                 self._report_left(active)
                 await self.vehicle.sleep(LOOK_EVERY_S)
@@ -327,12 +349,39 @@ class VehicleController:
         if left is not None:
             self._tracker.remains(active.id, left)
 
-    def _check_takeover(self, modes: frozenset[FlightMode]) -> None:
-        if takeover := self._takeover_monitor.takeover(modes):
+    def _check_takeover(self, modes: frozenset[FlightMode], behavior: str = "") -> str:
+        """Return why the vehicle rightly waits for another station; "" if it does not.
+
+        Raises:
+            TakenOverError: it was taken over.
+        """
+        if takeover := self._takeover_monitor.takeover(modes, behavior):
+            if takeover.cause is Cause.PAUSE:
+                return takeover.reason
             code = "TAKEN_OVER"
             if takeover.cause is Cause.FAILSAFE:
                 code = "BATTERY_LOW" if "batt" in takeover.reason.lower() else "FAILED"
-            raise _TakenOverError(takeover.reason, code)
+            raise TakenOverError(takeover.reason, code)
+        return ""
+
+    def _note_waiting(self, active: _ActiveBehavior, waits: str) -> None:
+        """Tell operators when a behavior begins and ends to wait for another station.
+
+        Raises:
+            TakenOverError: that station moves the vehicle meanwhile.
+        """
+        vehicle = self.vehicle
+        if waits and not active.waits:
+            vehicle.warn(f"{waits}: {active.behavior.name} goes on when that station continues it")
+        elif active.waits and not waits:
+            vehicle.warn("goes on: it was continued")
+        active.waits = waits
+        if not waits:
+            active.waits_at = None
+        elif active.waits_at is None and self._rests(None):
+            active.waits_at = position_of(vehicle)
+        elif active.waits_at is not None and distance_to_m(vehicle, active.waits_at) > PUSHED_M:
+            raise TakenOverError("another ground station has paused it, and moves it")
 
     async def _end_taken_over(self, active: _ActiveBehavior, reason: str) -> None:
         """End a behavior that was taken over while it was prepared, with the cause once it is
@@ -343,18 +392,19 @@ class VehicleController:
             while self.vehicle.link.now_s() < end_s:
                 self._check_takeover(accepted_modes(active.behavior))
                 await self.vehicle.sleep(LOOK_EVERY_S)
-        except _TakenOverError as error:
+        except TakenOverError as error:
             code, reason = error.code, error.reason
         self._end(active, BehaviorState.FAILED, code, reason)
 
-    def _has_restarted(self) -> bool:
+    def _has_restarted_or_fallen(self) -> bool:
         """Return False.
 
         Raises:
-            _TakenOverError: it has.
+            TakenOverError: it has.
         """
-        if restart := self._takeover_monitor.restarted():
-            raise _TakenOverError(restart.reason, "FAILED")
+        monitor = self._takeover_monitor
+        if failure := monitor.restarted() or monitor.fallen():
+            raise TakenOverError(failure.reason, "FAILED")
         return False
 
     def _check_progress(self, behavior: Behavior, stillness: StillnessTimer) -> None:
@@ -372,12 +422,18 @@ class VehicleController:
     async def _hold_still(self, active: _ActiveBehavior | None) -> None:
         try:
             await self._stop_once_received()
-            while active is not None and not self._has_restarted():
+            at, end_s = position_of(self.vehicle), self.vehicle.link.now_s() + OBEYS_WITHIN_S
+            judged = self._is_in_failsafe
+            while not (active is None and judged) and not self._has_restarted_or_fallen():
+                if not judged and (late := self.vehicle.link.now_s() >= end_s) | self._rests(at):
+                    judged = True
+                    if late and not self._rests(at):
+                        self.vehicle.alarm(self._disobedience("hold"))
                 # A vehicle that is held before it has left the ground disarms itself after a while.
-                if not on_the_ground(self.vehicle):
+                if active is not None and not on_the_ground(self.vehicle):
                     self._check_takeover(_HELD)
                 await self.vehicle.sleep(LOOK_EVERY_S)
-        except _TakenOverError as error:
+        except TakenOverError as error:
             if active is not None:
                 self._end(active, BehaviorState.FAILED, error.code, error.reason)
         except ExchangeError as error:
@@ -404,13 +460,14 @@ class VehicleController:
                 return
 
     async def _cancel(self, active: _ActiveBehavior) -> None:
-        stop = asyncio.get_running_loop().create_task(self._stop())
+        stop = asyncio.get_running_loop().create_task(self._stop_until_at_rest())
         limit_s = STOP_SHARE * self._limits.cancel_timeout_s
         late = asyncio.get_running_loop().create_task(self.vehicle.sleep(limit_s))
         try:
             await asyncio.wait([stop, late], return_when=asyncio.FIRST_COMPLETED)
             if not stop.done():
-                reason = f"the vehicle did not stop within {limit_s:g} s of the cancel"
+                reason = f"the vehicle did not stop within {limit_s:g} s of the cancel: "
+                reason += self._disobedience("cancel")
                 self._end(active, BehaviorState.FAILED, "TIMEOUT", reason)
             elif (error := stop.exception()) is not None:
                 self._end(active, BehaviorState.FAILED, "", f"the vehicle did not stop: {error}")
@@ -423,6 +480,29 @@ class VehicleController:
             for task in (stop, late):
                 task.cancel()
             await asyncio.gather(stop, late, return_exceptions=True)
+
+    async def _stop_until_at_rest(self) -> None:
+        """Stop the vehicle; return when it is seen to obey."""
+        await self._stop()
+        at = position_of(self.vehicle)
+        if not self._is_in_failsafe:
+            await self.vehicle.until(lambda: self._rests(at))
+
+    def _rests(self, at: LatLon | None) -> bool:
+        """Return whether the vehicle is slow enough for a stopped one; what cannot stop circles
+        around `at`. One that reports no velocity is not judged."""
+        vehicle = self.vehicle
+        below_m_s = DRIFTS_BELOW_M_S if vehicle.domain == "surface" else RESTS_BELOW_M_S
+        known = vehicle.state.armed and vehicle.state.velocity_enu_m_s is not None
+        slow = vehicle.state.speed_m_s < below_m_s
+        return not known or slow or on_the_ground(vehicle) or stays_at(vehicle, at)
+
+    def _disobedience(self, command: str) -> str:
+        """Return what operators read of a vehicle that does not stop."""
+        state = self.vehicle.state
+        mode = self.vehicle.driver.mode_name(state.custom_mode or 0)
+        speed = "" if math.isinf(state.speed_m_s) else f" at {state.speed_m_s:.1f} m/s"
+        return f"it does NOT obey the {command}, in {mode}{speed}; take it over by remote control"
 
     @property
     def _is_in_failsafe(self) -> bool:
@@ -470,7 +550,3 @@ class VehicleController:
         if state is BehaviorState.FAILED:
             self._report_left(active, LEAST_PROGRESS_M)
         self._tracker.end(active.id, state, code, reason)
-
-
-class _TakenOverError(BehaviorFailedError):
-    """The vehicle was taken over: nothing more is sent to it."""

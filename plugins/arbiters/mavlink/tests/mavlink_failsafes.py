@@ -184,7 +184,8 @@ def play(
         with TemporaryDirectory() as name, relayed.run() as relay:
             folder = Path(name)
             with running(
-                [_launch(vehicle, failsafe, binary, instance, wire, relay, folder)], folder
+                [launch(vehicle, failsafe.parameters, binary, instance, wire, relay, folder)],
+                folder,
             ):
                 station = Station(wire, instance + 1 if px4 else 1)
                 return _played(vehicle, failsafe, phase, Play(station, relay), folder)
@@ -192,17 +193,18 @@ def play(
         wire.close()
 
 
-def _launch(
+def launch(
     vehicle: Vehicle,
-    failsafe: Failsafe,
+    more: Mapping[str, float],
     binary: Path,
     instance: int,
     wire: UdpWire,
     relay: Relay,
     folder: Path,
 ) -> Launch:
+    """The program of a vehicle, with `more` parameters."""
     start = Start(LATITUDE, LONGITUDE, ALTITUDE_M, speed=vehicle.speed)
-    parameters = {**vehicle.parameters, **failsafe.parameters}
+    parameters = {**vehicle.parameters, **more}
     if vehicle.firmware == "px4":
         return px4_launch(
             *(vehicle.model, find_px4(binary.parent.parent), vehicle.model, start),
@@ -232,7 +234,7 @@ def _played(
     if phase.before:
         failsafe.cause(cell)
         s.watch(3.0)
-    with _mission(vehicle, phase, s.system, cell.relay.to_port, folder) as (process, lines):
+    with mission(vehicle, phase.steps, s.system, cell.relay.to_port, folder) as (process, lines):
         s.until("begun", lambda: bool(lines) or process.poll() is not None, 120.0)
         if not phase.before:
             if not s.until("phase", lambda: phase.now(s), 200.0):
@@ -269,12 +271,19 @@ def _plain(line: str) -> str:
 
 
 @contextmanager
-def _mission(
-    vehicle: Vehicle, phase: Phase, system: int, port: int, folder: Path
+def mission(
+    vehicle: Vehicle,
+    steps: tuple[tuple[str, Mapping[str, object]], ...],
+    system: int,
+    port: int,
+    folder: Path,
+    more: str = "",
 ) -> Iterator[tuple["subprocess.Popen[str]", list[str]]]:
-    (folder / "mission.bpmn").write_bytes(one_after_another(vehicle.resource, *phase.steps))
+    """`m2pem run` with these behaviors, one after another, and the lines that it prints;
+    `more`: of the fleet."""
+    (folder / "mission.bpmn").write_bytes(one_after_another(vehicle.resource, *steps))
     (folder / "field.geojson").write_text(json.dumps(AREA), encoding="utf-8")
-    fleet = FLEET.format(vehicle=vehicle, system=system, port=port)
+    fleet = FLEET.format(vehicle=vehicle, system=system, port=port) + more
     (folder / "fleet.yaml").write_text(fleet, encoding="utf-8")
     words = ("run", "mission.bpmn", "--fleet", "fleet.yaml", "--speed", vehicle.speed)
     words += ("--journal", "journal.db", "--ocu", "none")

@@ -29,6 +29,13 @@ class BehaviorFailedError(Exception):
         self.code = code
 
 
+class TakenOverError(BehaviorFailedError):
+    """Another client, a pilot or a failsafe has the vehicle: nothing more is sent to it."""
+
+    def __init__(self, reason: str, code: str = "TAKEN_OVER") -> None:
+        super().__init__(reason, code)
+
+
 @dataclass(frozen=True, slots=True)
 class BehaviorContext:
     """The request and its surroundings: the vehicle, the parameters, the fleet's bus (telemetry of
@@ -102,6 +109,10 @@ class Behavior(ABC):
         Raises:
             BehaviorFailedError: it has failed.
         """
+
+    def waits(self) -> str:
+        """Return why the vehicle rightly stays where it is, in words; "" if it should go on."""
+        return ""
 
     def paused(self) -> None:  # noqa: B027  # most have no clock of their own
         """The vehicle is being held: stop measuring time."""

@@ -28,6 +28,7 @@ from m2pem_plugin_mavlink.behaviors.behavior import (
     CheckpointState,
 )
 from m2pem_plugin_mavlink.behaviors.parameters import VehicleParameters
+from m2pem_plugin_mavlink.behaviors.target_check import TargetCheck
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode, TargetPosition
 
 TOLERANCES_M = {"air": 2.0, "ground": 2.5, "surface": 5.0, "subsurface": 3.0}
@@ -62,6 +63,7 @@ class Goto(Behavior):
         self.parameters = VehicleParameters(context)
         self._place: TargetPosition | None = None
         self._stillness = StillnessTimer(context)
+        self._target_check = TargetCheck(self.vehicle)
         tolerance = self.parameters.tolerance_m
         self._said = tolerance is not None
         usual_m = TOLERANCES_M.get(self.vehicle.domain, 2.5)
@@ -85,8 +87,13 @@ class Goto(Behavior):
             await self.parameters.wait_for_target()
             if reason := self.breach(self.target().latlon, "the target"):
                 raise BehaviorFailedError(reason)
-        self._place = self.target()
-        await self.vehicle.driver.go_to(self._place, self.parameters.speed_m_s)
+        await self._go_to(self.target())
+
+    async def _go_to(self, place: TargetPosition) -> None:
+        self._place = place
+        self._target_check.sent(None)
+        await self.vehicle.driver.go_to(place, self.parameters.speed_m_s)
+        self._target_check.sent(place.latlon)
 
     def adjust(self, speed_m_s: float) -> bool:
         self.parameters.adjusted_m_s = speed_m_s
@@ -104,8 +111,7 @@ class Goto(Behavior):
                     raise BehaviorFailedError(
                         f"{self.parameters.target_vehicle} has left the fleet's fence"
                     )
-                self._place = new
-                await self.vehicle.driver.go_to(new, self.parameters.speed_m_s)
+                await self._go_to(new)
 
     def finished(self) -> bool:
         """Return whether the vehicle is within the tolerance and has turned, or has stopped as near
@@ -113,7 +119,9 @@ class Goto(Behavior):
 
         Raises:
             BehaviorFailedError: it has stopped outside of a requested tolerance.
+            TakenOverError: another station has sent it somewhere else.
         """
+        self._target_check.check()
         place = self._place or self.target()
         away = distance_to_m(self.vehicle, place.latlon)
         height_m = height_tolerance_m(self.vehicle, max(self._tolerance_m, HEIGHT_TOLERANCE_M))

@@ -4,7 +4,7 @@ import math
 import zlib
 from abc import abstractmethod
 from bisect import bisect_left, bisect_right
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
 
@@ -37,12 +37,15 @@ from m2pem_plugin_mavlink.behaviors.behavior import (
     BehaviorContext,
     BehaviorFailedError,
     CheckpointState,
+    TakenOverError,
 )
 from m2pem_plugin_mavlink.behaviors.goto import TOLERANCES_M
+from m2pem_plugin_mavlink.behaviors.mission_progress import JUMPS, MissionProgress
 from m2pem_plugin_mavlink.behaviors.parameters import VehicleParameters
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem, same_frame
 from m2pem_plugin_mavlink.vehicle.driver import FRAMES, RELATIVE, FlightMode
 from m2pem_plugin_mavlink.vehicle.fixed_wing import remove_landing
+from m2pem_plugin_mavlink.vehicle.takeover_monitor import PAUSED
 
 _LAST_NAVIGATION_COMMAND: int = dialect.MAV_CMD_NAV_LAST
 _HEIGHT_STEP_M = 0.02
@@ -104,11 +107,37 @@ def speed_item(speed_m_s: float) -> MissionItem:
     return MissionItem(dialect.MAV_CMD_DO_CHANGE_SPEED, dialect.MAV_FRAME_MISSION, params)
 
 
-class MissionFlight(Behavior):
-    """Uploads waypoints as a mission and has the vehicle execute it; `loop`: again and again."""
+class StoredMission(Behavior):
+    """Executes a stored mission, which another ground station may pause, or change the item of."""
 
     modes = frozenset({FlightMode.MISSION})
     max_still_s = MOVES_WITHIN_S
+
+    def __init__(self, context: BehaviorContext) -> None:
+        super().__init__(context)
+        self._progress: MissionProgress | None = None
+
+    def waits(self) -> str:
+        """Return that another station has paused the mission; ArduCopter stays in AUTO then."""
+        state = self.vehicle.state
+        paused = state.mission_state == dialect.MISSION_STATE_PAUSED
+        return PAUSED if paused and state.mode is FlightMode.MISSION else ""
+
+    def check_order(self, names: Callable[[], Mapping[int, str]] = dict) -> None:
+        """Check that no waypoint was left out; `names`: of items.
+
+        Raises:
+            TakenOverError: another station has set the current item.
+        """
+        if self._progress is None:
+            return
+        self._progress.look()
+        if problem := self._progress.problem(names()):
+            raise TakenOverError(problem)
+
+
+class MissionFlight(StoredMission):
+    """Uploads waypoints as a mission and has the vehicle execute it; `loop`: again and again."""
 
     def __init__(self, context: BehaviorContext) -> None:
         super().__init__(context)
@@ -204,15 +233,27 @@ class MissionFlight(Behavior):
 
     async def begin(self) -> None:
         self._stillness.forget()
+        self._progress = None
         await self.vehicle.driver.upload(self.items)
-        await self.vehicle.driver.start_mission(0)
+        await self._start()
+
+    async def _start(self, first: int = 0) -> None:
+        await self.vehicle.driver.start_mission(first)
+        self._follow(self.items, first)
+
+    def _follow(self, items: Sequence[MissionItem], first: int) -> None:
+        self._progress = MissionProgress(self.vehicle, items, self._moves, first)
+
+    def _names(self) -> Mapping[int, str]:
+        return {index: self.named(number) for number, index in enumerate(self._moves)}
 
     async def resume(self) -> None:
         """Restart the mission at the current item."""
         self._stillness.forget()
         last = self._end[0] if self._end else 0
         current = min(self.vehicle.driver.current_item or 0, last)
-        await self.vehicle.driver.start_mission(current)
+        self._progress = None
+        await self._start(current)
         if (speed := self._speed_towards(current)) is not None:
             await self.vehicle.driver.set_speed(speed)
 
@@ -235,6 +276,8 @@ class MissionFlight(Behavior):
             # At first the item of the mission before may still be reported.
             self._counts = self._counts or reached is not None or towards <= 1
             heading = max(heading, towards) if self._counts else heading
+        if self._progress is not None and self._progress.skipped:
+            heading = min(heading, bisect_left(self._moves, self._progress.skipped[0]))
         last = len(work.line.points) - 1
         if heading > 0:
             work.reached(min(heading - 1, last))
@@ -249,7 +292,8 @@ class MissionFlight(Behavior):
         while self.loop:
             await self.vehicle.until(self.at_the_end)
             self._stillness.forget()
-            await self.vehicle.driver.start_mission(0)
+            self._progress = None
+            await self._start()
             if (speed := self._speed_of_way_back) is not None:
                 await self.vehicle.driver.set_speed(speed)
             await self.vehicle.until(lambda: not self.at_the_end())
@@ -284,7 +328,12 @@ class MissionFlight(Behavior):
         return over or self._stillness.seconds(place) >= STANDS_AT_END_S
 
     def finished(self) -> bool:
-        """Return whether the last waypoint was reached; in a loop always False."""
+        """Return whether the last waypoint was reached; in a loop always False.
+
+        Raises:
+            TakenOverError: another station has set the current item.
+        """
+        self.check_order(self._names)
         return not self.loop and self.at_the_end()
 
     async def reattach(self) -> BehaviorState:
@@ -308,6 +357,8 @@ class MissionFlight(Behavior):
             if driver.current_item is None or driver.current_item >= before:
                 return BehaviorState.UNKNOWN
         flies = self.vehicle.state.mode is FlightMode.MISSION and self.vehicle.state.armed
+        if flies and driver.current_item is not None:
+            self._follow(stored, driver.current_item)
         return BehaviorState.RUNNING if flies else BehaviorState.UNKNOWN
 
     def _item_before(self) -> int | None:
@@ -470,17 +521,18 @@ class Survey(MissionFlight):
         return super().named(index)
 
 
-class RunOnboardMission(Behavior):
+class RunOnboardMission(StoredMission):
     """Execute the stored mission from an item on; complete at its last waypoint, or after
     landing."""
 
     name = "run_onboard_mission"
-    modes = frozenset({FlightMode.MISSION})
+    max_still_s = None  # it may have waits of any length
 
     def __init__(self, context: BehaviorContext) -> None:
         super().__init__(context)
         self._first = int(VehicleParameters(context).number("first") or 0)
         self._last: int | None = None
+        self._items: tuple[MissionItem, ...] = ()
         self._flew = False
 
     async def begin(self) -> None:
@@ -492,14 +544,30 @@ class RunOnboardMission(Behavior):
                 f"parameter 'first': there is no item {self._first}; the mission has {len(items)}"
             )
         self._see(items)
-        await self.vehicle.driver.start_mission(self._first)
+        await self._start(self._first)
 
     async def resume(self) -> None:
-        await self.vehicle.driver.start_mission(self.vehicle.driver.current_item or self._first)
+        await self._start(self.vehicle.driver.current_item or self._first)
+
+    async def _start(self, first: int) -> None:
+        self._progress = None
+        await self.vehicle.driver.start_mission(first)
+        self._follow(first)
+
+    def _follow(self, first: int) -> None:
+        """Follow the order of the items, unless the mission has jumps of its own."""
+        if not any(item.command in JUMPS for item in self._items):
+            moves = [index for index, item in enumerate(self._items) if is_navigation(item)]
+            self._progress = MissionProgress(self.vehicle, self._items, moves, first)
 
     def finished(self) -> bool:
         """Return whether the last waypoint was reached, or the vehicle has landed and disarmed
-        after the flight."""
+        after the flight.
+
+        Raises:
+            TakenOverError: another station has set the current item.
+        """
+        self.check_order()
         state = self.vehicle.state
         self._flew = self._flew or state.landed is False
         reached = self.vehicle.driver.reached_item
@@ -511,7 +579,7 @@ class RunOnboardMission(Behavior):
         moves = [index for index, item in enumerate(items) if is_navigation(item)]
         if not moves:
             raise BehaviorFailedError("the stored mission has no waypoint")
-        self._last = moves[-1]
+        self._last, self._items = moves[-1], items
         if self.context.fence is not None:
             placed = [items[i] for i in moves if items[i].latitude_deg or items[i].longitude_deg]
             way = [item.latlon for item in placed]
@@ -526,4 +594,5 @@ class RunOnboardMission(Behavior):
         if not items:
             return BehaviorState.UNKNOWN
         self._see(items)
+        self._follow(self.vehicle.driver.current_item or 0)
         return BehaviorState.SUCCEEDED if self.finished() else BehaviorState.RUNNING

@@ -32,6 +32,7 @@ from m2pem_plugin_mavlink.behaviors.behavior import (
 )
 from m2pem_plugin_mavlink.behaviors.goto import TOLERANCES_M
 from m2pem_plugin_mavlink.behaviors.parameters import VehicleParameters
+from m2pem_plugin_mavlink.behaviors.target_check import TargetCheck
 from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, RefusedError
 from m2pem_plugin_mavlink.vehicle.driver import AMSL, FlightMode, TargetPosition
 from m2pem_plugin_mavlink.vehicle.fixed_wing import landing_start
@@ -65,6 +66,7 @@ class ChangeAltitude(Behavior):
         parameters = VehicleParameters(context)
         altitude, self._frame = parameters.altitude()
         self._altitude_m = altitude or 0.0
+        self._target_check = TargetCheck(self.vehicle)
 
     def refusal(self) -> str:
         """Check that the vehicle flies, and that its position is known."""
@@ -77,9 +79,15 @@ class ChangeAltitude(Behavior):
         if here is None:
             raise BehaviorFailedError("its position is not known")
         await self.vehicle.driver.go_to(TargetPosition(*here, self._altitude_m, self._frame))
+        self._target_check.sent(here)
 
     def finished(self) -> bool:
-        """Return whether the vehicle is at the height and neither climbs nor descends."""
+        """Return whether the vehicle is at the height and neither climbs nor descends.
+
+        Raises:
+            TakenOverError: another station has sent it somewhere else.
+        """
+        self._target_check.check()
         height = height_m(self.vehicle.state, self._frame)
         if height is None:
             raise BehaviorFailedError(f"its height above {self._frame} is not known")

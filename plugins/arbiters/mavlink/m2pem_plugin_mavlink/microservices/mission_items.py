@@ -120,6 +120,14 @@ class MissionItem:
             and math.isclose(self.altitude_m, other.altitude_m, rel_tol=1e-6, abs_tol=0.01)
         )
 
+    def is_stored_as(self, other: "MissionItem") -> bool:
+        """Return whether an item that was read is one that was uploaded. Autopilots return items
+        without a place in different ways; of those, the second parameter (a speed) counts."""
+        if other.latitude_deg == 0.0 and other.longitude_deg == 0.0:
+            same = math.isclose(self.params[1], other.params[1], rel_tol=1e-3, abs_tol=0.01)
+            return self.command == other.command and (same or math.isnan(other.params[1]))
+        return self.same_as(other)
+
     def problem(self) -> str:
         """Return why the item cannot be uploaded; "" if it can."""
         if not 0 <= self.command <= 0xFFFF:

@@ -4,7 +4,7 @@ services/mission.html, "Upload a Mission to the Vehicle").
 The vehicle requests the items, and requests a lost one again. If it falls silent before it has
 acknowledged all of them, its stored items are not known; the upload then starts again, which stores
 the same items again. It succeeds only by an acknowledgement after all items. After a failure, the
-stored items must be checked before they are used.
+stored items must be read before they are used.
 """
 
 from collections.abc import Sequence
@@ -80,6 +80,11 @@ class UploadMission(MissionExchange[None]):
         self._sent_s = [-inf] * len(self.items)
         self._never_sent = set(range(len(self.items)))
         self._oddity = ""
+
+    @property
+    def all_sent(self) -> bool:
+        """Whether each item was sent, so that the vehicle may have stored all of them."""
+        return not self._never_sent
 
     def begin(self, now_s: float) -> None:
         """Send the number of items, if all are valid."""

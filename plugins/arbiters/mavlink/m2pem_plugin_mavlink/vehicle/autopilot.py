@@ -418,14 +418,32 @@ class Autopilot(ABC):
         self.commanded.exchanging += 1
         try:
             if items:
-                stored = self._as_stored(tuple(items))
-                await self.link.perform(UploadMission(self.link.address, stored))
+                await self._store(self._as_stored(tuple(items)))
             else:
                 await self.link.perform(ClearMission(self.link.address))
         finally:
             self.commanded.exchanging -= 1
         self.commanded.mission = tuple(items)
         self.state.reached_sequence = None
+
+    async def _store(self, items: tuple[MissionItem, ...]) -> None:
+        """Upload items. An autopilot that has all of them, and whose acknowledgement was lost,
+        refuses an item that it gets again: so what it has stored is read before this fails."""
+        upload = UploadMission(self.link.address, items)
+        try:
+            await self.link.perform(upload)
+        except ExchangeError:
+            if not upload.all_sent:
+                raise
+            try:
+                stored = await self.link.perform(DownloadMission(self.link.address))
+            except ExchangeError:
+                stored = ()
+            if len(stored) != len(items):
+                raise
+            pairs = zip(stored[self.home_items :], items[self.home_items :], strict=True)
+            if not all(one.is_stored_as(other) for one, other in pairs):
+                raise
 
     def _as_stored(self, items: tuple[MissionItem, ...]) -> tuple[MissionItem, ...]:
         return items

@@ -15,7 +15,8 @@ class AutopilotState:
     `changes` counts the messages that were taken in. By the link's clock: `at_s` and `heartbeat_s`
     are when the last message and the last heartbeat came, `boot_s` when the first message since the
     last boot came; `boots` counts the boots. `landed`: it is on the ground
-    (EXTENDED_SYS_STATE, or where that is not sent, what the heights and speeds say).
+    (EXTENDED_SYS_STATE, or where that is not sent, what the heights and speeds say), and has come
+    to rest there since it was disarmed. `fell_from_m`: see `Touchdown`.
     """
 
     # The vehicle
@@ -27,7 +28,10 @@ class AutopilotState:
     pitch_rad: float | None = None
     yaw_rad: float | None = None
     home: GeoPosition | None = None
+    target: GeoPosition | None = None
+    """Of POSITION_TARGET_GLOBAL_INT; None: its target is no position."""
     landed: bool | None = None
+    fell_from_m: float | None = None
     battery_fraction: float | None = None
     # Its activity
     custom_mode: int | None = None
@@ -71,9 +75,9 @@ class AutopilotState:
     def forget_the_last_boot(self) -> None:
         """Clear the values that a restart of the autopilot changes."""
         self.gps_fix = self.estimator_flags = self.prearm_passed = None
-        self.position = self.home = self.velocity_enu_m_s = self.yaw_rad = None
+        self.position = self.home = self.target = self.velocity_enu_m_s = self.yaw_rad = None
         self.altitude_above_home_m = self.altitude_above_terrain_m = None
-        self.landed = self.reached_sequence = None
+        self.landed = self.fell_from_m = self.reached_sequence = None
         self.fence_breach, self.fence_breached_s = "", None
         self.messages_s.clear()
 

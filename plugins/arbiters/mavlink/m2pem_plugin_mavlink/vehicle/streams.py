@@ -22,7 +22,10 @@ _COMMON = {
     "BATTERY_STATUS": 2.0,
     "HOME_POSITION": 2.0,
     "EXTENDED_SYS_STATE": 0.5,
+    "POSITION_TARGET_GLOBAL_INT": 1.0,
 }
+_SOMETIMES = frozenset({message_type("POSITION_TARGET_GLOBAL_INT").id})
+"""Come only while there is a target: their silence does not mean that a request was lost."""
 _OWN = {
     Firmware.ARDUPILOT: {"EKF_STATUS_REPORT": 1.0, "TERRAIN_REPORT": 1.0, "FENCE_STATUS": 1.0},
     Firmware.PX4: {"ESTIMATOR_STATUS": 1.0, "ALTITUDE": 1.0},
@@ -68,11 +71,12 @@ class RequestedStreams:
             if requested_s is None:
                 due.append(id_)
                 continue
-            came = came_s.get(id_)
+            came = None if id_ in _SOMETIMES else came_s.get(id_)
             silent_s = max(SILENT_INTERVALS * interval_s, SILENT_AT_LEAST_S)
             if came is not None and now_s - max(came, requested_s) > max(silent_s, ASK_AGAIN_S):
                 due.append(id_)
-        return due
+        # What has lost other requests has lost these, too.
+        return [*due, *((_SOMETIMES & set(self.wanted)) - set(due) - self.refused)] if due else due
 
     def requested(self, id_: int, now_s: float) -> None:
         """Note that the vehicle has accepted a request."""

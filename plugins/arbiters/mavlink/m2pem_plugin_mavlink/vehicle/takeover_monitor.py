@@ -20,6 +20,8 @@ from m2pem_plugin_mavlink.protocol.transaction import ExchangeError
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode
 from m2pem_plugin_mavlink.vehicle.fixed_wing import landing_start
 from m2pem_plugin_mavlink.vehicle.identity import Firmware
+from m2pem_plugin_mavlink.vehicle.other_stations import Act, Meaning, meaning
+from m2pem_plugin_mavlink.vehicle.settings_monitor import SettingsMonitor
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 
 SETTLES_S = 1.5
@@ -39,7 +41,8 @@ _FAILSAFE = re.compile(
     re.IGNORECASE,
 )
 _PILOT = re.compile(r"pilot took over|manual control|sticks|RC override|taking over", re.IGNORECASE)
-_STANDS_AFTER = frozenset({FlightMode.LAND, FlightMode.RETURN, FlightMode.MISSION})
+_STANDS_AFTER = frozenset({FlightMode.LAND, FlightMode.RETURN})
+"""Modes in which an aircraft that has landed is disarmed: its behavior sees that by itself."""
 _FOLLOWS = {
     FlightMode.TAKEOFF: frozenset({FlightMode.HOLD}),
     FlightMode.RETURN: frozenset({FlightMode.LAND, FlightMode.HOLD}),
@@ -59,11 +62,17 @@ class Cause(StrEnum):
     PILOT = "pilot"
     STATION = "station"
     RESTART = "restart"
+    FALL = "fall"
+    PAUSE = "pause"
+
+
+PAUSED = "paused by another station"
 
 
 @dataclass(frozen=True, slots=True)
 class Takeover:
-    """A vehicle does something that m2pem did not command. `reason`: for operators."""
+    """A vehicle does something that m2pem did not command. `reason`: for operators. In a pause the
+    behavior waits until the other station continues it."""
 
     cause: Cause
     reason: str
@@ -79,12 +88,14 @@ class TakeoverMonitor:
     def __init__(self, vehicle: Vehicle, own_system: int | None = None) -> None:
         self.vehicle = vehicle
         self.own_system = own_system
+        self._settings = SettingsMonitor(vehicle)
         self._unsubscribe: list[Callable[[], None]] = []
         self._mode: int | None = None
         self._mode_s = 0.0
         self._before: int | None = None
         self._armed: bool | None = None
         self._disarmed: tuple[float, FlightMode] | None = None
+        self._said_fallen = False
         self._boots = vehicle.state.boots
         self._settled: tuple[int | None, int | None] = (None, None)
         self._mission: tuple[MissionItem, ...] | None = None
@@ -95,6 +106,7 @@ class TakeoverMonitor:
         self._check: asyncio.Task[None] | None = None
 
     def open(self) -> None:
+        self._settings.open()
         self._unsubscribe.append(self.vehicle.watch(self._update))
         ids = (_COUNT, _ACK, *_REQUESTS)
         self._unsubscribe.append(self.vehicle.link.listen(ids, self._receive_from_mission_protocol))
@@ -103,6 +115,7 @@ class TakeoverMonitor:
         for end in self._unsubscribe:
             end()
         self._unsubscribe.clear()
+        await self._settings.close()
         if self._check is not None:
             self._check.cancel()
             await asyncio.wait([self._check])
@@ -124,15 +137,27 @@ class TakeoverMonitor:
             return None
         return Takeover(Cause.RESTART, "its autopilot has restarted, and its motors have stopped")
 
-    def takeover(self, modes: Collection[FlightMode]) -> Takeover | None:
-        """Return a takeover of a vehicle that should be in one of these modes; None: there is none.
+    def fallen(self) -> Takeover | None:
+        """Return whether the vehicle was disarmed in the air since `begin`."""
+        height_m = self.vehicle.state.fell_from_m
+        if height_m is None or self._disarmed is None:
+            return None
+        at_s, mode = self._disarmed
+        said = [text for text in self._texts_around(at_s) if _FAILSAFE.search(text)]
+        by = "; ".join(said) or "by another ground station or by its autopilot"
+        height = f"disarmed {height_m:.0f} m above its home, in {mode}"
+        return Takeover(Cause.FALL, f"{height}, and falls: {by}")
+
+    def takeover(self, modes: Collection[FlightMode], behavior: str = "") -> Takeover | None:
+        """Return a takeover of a vehicle that should be in one of these modes for a behavior of
+        this name; None: there is none.
 
         A change that was just seen is judged `SETTLES_S` later, or once a text explains it. The
         mode of a vehicle that is not armed does not matter.
         """
         return (
             self._disarmed_by(modes)
-            or self._mode_by(modes)
+            or self._mode_by(modes, behavior)
             or self._mission_by(modes)
             or self._landing_by(modes)
         )
@@ -147,7 +172,7 @@ class TakeoverMonitor:
         follows = state.mode in modes and state.mode in _FOLLOWS.get(purpose, ())
         return follows and (purpose is not FlightMode.MISSION or self._mission_is_over())
 
-    def _mode_by(self, modes: Collection[FlightMode]) -> Takeover | None:
+    def _mode_by(self, modes: Collection[FlightMode], behavior: str) -> Takeover | None:
         state, commanded = self.vehicle.state, self.vehicle.commanded
         number = state.custom_mode
         if number is None or not state.armed or commanded.changing:
@@ -157,6 +182,8 @@ class TakeoverMonitor:
         name = self.vehicle.driver.mode_name(number)
         before = "" if self._before is None else self.vehicle.driver.mode_name(self._before)
         changed = f"the mode changed from {before} to {name}" if before else f"the mode is {name}"
+        if self._is_paused() and meaning(Act.HOLD, behavior) is Meaning.WAITS:
+            return self._explained(self._mode_s, changed, Takeover(Cause.PAUSE, PAUSED))
         return self._explained(
             self._mode_s,
             changed,
@@ -171,11 +198,19 @@ class TakeoverMonitor:
             ),
         )
 
+    def _is_paused(self) -> bool:
+        """Return whether the vehicle holds in place of its mission: stations pause a PX4 so."""
+        vehicle, commanded = self.vehicle, self.vehicle.commanded.custom_mode
+        if commanded is None or vehicle.state.mode is not FlightMode.HOLD:
+            return False
+        px4 = vehicle.identity is not None and vehicle.identity.firmware is Firmware.PX4
+        return px4 and vehicle.driver.flight_mode(commanded) is FlightMode.MISSION
+
     def _disarmed_by(self, modes: Collection[FlightMode]) -> Takeover | None:
         if self._disarmed is None or not modes:
             return None
         at_s, mode = self._disarmed
-        if self.vehicle.state.landed and mode in _STANDS_AFTER:
+        if self.vehicle.state.landed and mode in _STANDS_AFTER and self.vehicle.domain == "air":
             return None
         clock_s = self.vehicle.state.clock_s
         waits = self.vehicle.link.now_s() - at_s < RESTART_SHOWS_WITHIN_S
@@ -208,7 +243,7 @@ class TakeoverMonitor:
         """Return the takeover that the texts explain; without a text `otherwise`, after
         `SETTLES_S`."""
         now_s = self.vehicle.link.now_s()
-        texts = self.vehicle.recent_texts(now_s - since_s + TEXTS_BEFORE_S)
+        texts = self._texts_around(since_s)
         for cause, pattern in ((Cause.FAILSAFE, _FAILSAFE), (Cause.PILOT, _PILOT)):
             said = [text for text in texts if pattern.search(text)]
             if cause is Cause.FAILSAFE and not said:
@@ -217,6 +252,10 @@ class TakeoverMonitor:
                 who = "a failsafe of its own" if cause is Cause.FAILSAFE else "a person"
                 return Takeover(cause, f"{who} has taken over: {changed}: {'; '.join(said)}")
         return otherwise if now_s - since_s >= SETTLES_S else None
+
+    def _texts_around(self, since_s: float) -> tuple[str, ...]:
+        now_s = self.vehicle.link.now_s()
+        return self.vehicle.recent_texts(now_s - since_s + TEXTS_BEFORE_S)
 
     def _fence_breached(self, since_s: float) -> list[str]:
         """Return a breach from FENCE_STATUS: ArduRover sends no text."""
@@ -251,6 +290,12 @@ class TakeoverMonitor:
             elif state.armed:
                 self._disarmed = None
             self._armed = state.armed
+        self._settings.look_at_home()
+        if (fell := self.fallen()) is None:
+            self._said_fallen = False
+        elif not self._said_fallen:
+            self._said_fallen = True
+            self.vehicle.alarm(fell.reason)
         if commanded.mission is not self._mission:
             self._mission, self._replaced, self._checked = commanded.mission, "", None
             self._mission_s = now_s
@@ -308,7 +353,7 @@ class TakeoverMonitor:
                 found = await link.perform(ReadMissionItem(link.address, item + 1))
             except ExchangeError:
                 return  # a missing answer proves nothing
-            if self.vehicle.commanded.mission is not mission or _same(found, mission[item]):
+            if self.vehicle.commanded.mission is not mission or found.is_stored_as(mission[item]):
                 return
         self._replaced = f"replaced the mission: its item {item + 1} was not uploaded here"
 
@@ -335,11 +380,3 @@ class TakeoverMonitor:
             home = self.vehicle.driver.home_items
             if message.count != len(commanded.mission) + home:
                 self._replaced = f"replaced the mission: it has {message.count - home} items"
-
-
-def _same(found: MissionItem, commanded: MissionItem) -> bool:
-    """Return whether an item is the one that was uploaded. Autopilots return items without a place
-    in different ways."""
-    if commanded.latitude_deg == 0.0 and commanded.longitude_deg == 0.0:
-        return found.command == commanded.command
-    return found.same_as(commanded)

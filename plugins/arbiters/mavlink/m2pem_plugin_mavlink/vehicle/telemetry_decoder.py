@@ -10,6 +10,7 @@ from m2pem.api import GeoPosition
 from m2pem_plugin_mavlink.protocol.messages import Message, message_type
 from m2pem_plugin_mavlink.vehicle.modes import Modes
 from m2pem_plugin_mavlink.vehicle.state import AutopilotState
+from m2pem_plugin_mavlink.vehicle.touchdown import Touchdown
 
 BOOT_TIME_BACK_MS = 10_000
 """Messages overtake each other by less than this, also in simulated time that passes ten times as
@@ -22,6 +23,8 @@ its last message, and `BOOT_TIME_BACK_MS`: that message is late."""
 STANDS_BELOW_M, STANDS_BELOW_M_S = 0.5, 0.3
 
 _UNKNOWN_UINT16 = 0xFFFF
+_IGNORES_POSITION = 0b111
+"""POSITION_TARGET_TYPEMASK."""
 _PREARM = dialect.MAV_SYS_STATUS_PREARM_CHECK
 _ARMED = dialect.MAV_MODE_FLAG_SAFETY_ARMED
 _LANDED = {
@@ -55,7 +58,8 @@ class TelemetryDecoder:
         self.modes = modes
         self.flies = flies
         self._boot_ms = 0
-        self._landed_is_said = False
+        self._landed_is_said: bool | None = None
+        self._touchdown = Touchdown()
         if not flies:
             state.landed = True
         named: Mapping[str, Callable[[Any], None]] = {
@@ -75,6 +79,7 @@ class TelemetryDecoder:
             "TERRAIN_REPORT": self._terrain,
             "ALTITUDE": self._altitude,
             "FENCE_STATUS": self._fence,
+            "POSITION_TARGET_GLOBAL_INT": self._target,
         }
         self._takers = {message_type(name).id: take for name, take in named.items()}
 
@@ -103,7 +108,8 @@ class TelemetryDecoder:
     def _booted(self, now_s: float) -> None:
         """The vehicle sends for the first time, or its clock has gone back."""
         self.state.forget_the_last_boot()
-        self._landed_is_said = False
+        self._landed_is_said = None
+        self._touchdown = Touchdown()
         if not self.flies:
             self.state.landed = True
         self.state.boot_s = now_s
@@ -125,7 +131,9 @@ class TelemetryDecoder:
         self.state.custom_mode = message.custom_mode
         self.state.mode = self.modes.purpose(message.custom_mode)
         self.state.armed = bool(message.base_mode & _ARMED)
-        self._guess_landed()
+        if self.state.at_s is not None:
+            self._touchdown.take_heartbeat(self.state.armed, self.state.at_s)
+        self._judge_landed()
 
     def _sys_status(self, message: Any) -> None:
         state = self.state
@@ -167,7 +175,10 @@ class TelemetryDecoder:
         state.velocity_enu_m_s = (message.vy / 100.0, message.vx / 100.0, -message.vz / 100.0)
         if state.yaw_rad is None and message.hdg != _UNKNOWN_UINT16:
             state.yaw_rad = enu_yaw(math.radians(message.hdg / 100.0))
-        self._guess_landed()
+        if self.flies and state.at_s is not None and state.altitude_above_home_m is not None:
+            height_m, velocity = state.altitude_above_home_m, state.velocity_enu_m_s
+            self._touchdown.take_position(state.at_s, height_m, position.altitude_m, velocity)
+        self._judge_landed()
 
     def _mission_current(self, message: Any) -> None:
         state = self.state
@@ -185,11 +196,17 @@ class TelemetryDecoder:
     def _home(self, message: Any) -> None:
         self.state.home = _place(message.latitude, message.longitude, message.altitude)
 
+    def _target(self, message: Any) -> None:
+        """Read the target; autopilots report its height above mean sea level."""
+        ignored = message.type_mask & _IGNORES_POSITION
+        place = _place(message.lat_int, message.lon_int, message.alt * 1e3)
+        self.state.target = None if ignored else place
+
     def _extended_sys_state(self, message: Any) -> None:
         landed = _LANDED.get(message.landed_state)
         if landed is not None and self.flies:
-            self._landed_is_said = True
-            self.state.landed = landed
+            self._landed_is_said = landed
+            self._judge_landed()
 
     def _terrain(self, message: Any) -> None:
         if message.loaded and math.isfinite(message.current_height):
@@ -207,18 +224,23 @@ class TelemetryDecoder:
             state.fence_breached_s = state.at_s
         state.fence_breach = _BREACHES.get(message.breach_type, "fence") if breached else ""
 
-    def _guess_landed(self) -> None:
-        state = self.state
-        if self._landed_is_said or not self.flies:
+    def _judge_landed(self) -> None:
+        """Judge whether an aircraft is on the ground, by its report or, without one, by its
+        motors, height and speed; of one that was disarmed both are true only once it rests."""
+        state, landed = self.state, self._landed_is_said
+        if not self.flies:
             return
-        if state.armed is False:
-            state.landed = True
-        elif state.altitude_above_home_m is not None:
+        if landed is None and state.armed is False:
+            landed = True
+        elif landed is None and state.altitude_above_home_m is not None:
             low = state.altitude_above_home_m < STANDS_BELOW_M
-            state.landed = low and state.speed_m_s < STANDS_BELOW_M_S
+            landed = low and state.speed_m_s < STANDS_BELOW_M_S
+        state.fell_from_m = self._touchdown.fell_from_m
+        if landed is not None:
+            state.landed = landed and self._touchdown.has_landed(state.at_s or 0.0)
 
 
-def _place(latitude_e7: int, longitude_e7: int, altitude_mm: int) -> GeoPosition | None:
+def _place(latitude_e7: int, longitude_e7: int, altitude_mm: float) -> GeoPosition | None:
     """Return the position; None for values that autopilots send while they know none, or that are
     impossible."""
     latitude, longitude = latitude_e7 / 1e7, longitude_e7 / 1e7

@@ -105,7 +105,8 @@ class Vehicle:
     """A vehicle of the fleet behind its link, between `open` and `close`.
 
     Nothing is sent before its heartbeat has identified it; then the messages for `state` are
-    requested, and again when they stop. All times are of the arbiter's clock.
+    requested, and again when they stop. All times are of the arbiter's clock. `avoids_obstacles`:
+    the autopilot plans ways around obstacles by itself.
     """
 
     def __init__(
@@ -127,6 +128,7 @@ class Vehicle:
         self._warned_s: dict[str, float] = {}
         self._refused_s: dict[tuple[str, Refusal], float] = {}
         self.identity: Identity | None = None
+        self.avoids_obstacles = False
         self.lost_after_s = lost_after_s
         self._clock = clock
         self._logger = logger or logging.getLogger(__name__)
@@ -343,6 +345,10 @@ class Vehicle:
         }
         self._warned_s[text.text] = now_s
         self.warn(f"says: {text.text}")
+
+    def alarm(self, text: str) -> None:
+        """Show operators at once what they must act on."""
+        self._logger.critical("%s %s", self.resource, text)
 
     def warn(self, text: str) -> None:
         """Show operators a text about the vehicle."""
