@@ -364,6 +364,8 @@ def _behavior_ended(view: RunView, record: r.BehaviorEnded) -> _Sentence:
     how = record.state.value.lower()
     if record.state is not BehaviorState.CANCELLED and record.code:
         how = f"{how}, {record.code}{_in_brackets(record.reason)}"
+    elif record.state is BehaviorState.SUCCEEDED:
+        how = f"{how}{_in_brackets(record.reason)}"
     behavior = view.behavior(record.behavior)
     name = behavior.name if behavior is not None else record.behavior
     resources = f"{', '.join(behavior.resources)} ends " if behavior is not None else ""

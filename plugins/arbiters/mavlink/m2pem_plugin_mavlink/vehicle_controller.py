@@ -273,7 +273,7 @@ class VehicleController:
         else:
             if isinstance(active.behavior, SetSpeed):
                 self.cruise_m_s = active.behavior.speed_m_s
-            self._end(active, BehaviorState.SUCCEEDED)
+            self._end(active, BehaviorState.SUCCEEDED, reason=active.behavior.result())
 
     async def _wait_until_received(self) -> None:
         """Wait for the first messages of the vehicle; one that never sends any is LOST. A vehicle

@@ -114,6 +114,10 @@ class Behavior(ABC):
         """Return why the vehicle rightly stays where it is, in words; "" if it should go on."""
         return ""
 
+    def result(self) -> str:
+        """Return what operators read of a behavior that has succeeded; "" if nothing more."""
+        return ""
+
     def paused(self) -> None:  # noqa: B027  # most have no clock of their own
         """The vehicle is being held: stop measuring time."""
 

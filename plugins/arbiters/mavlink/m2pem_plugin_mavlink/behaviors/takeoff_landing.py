@@ -327,6 +327,13 @@ class ReturnToLaunch(Behavior):
             return 0.0
         return distance_to_m(self.vehicle, home.latlon)
 
+    def result(self) -> str:
+        """Return its home, which others may have moved."""
+        home = self.vehicle.state.home
+        if home is None:
+            return ""
+        return f"its home is {home.latitude_deg:.6f}, {home.longitude_deg:.6f}"
+
     def _is_there_already(self) -> bool:
         state = self.vehicle.state
         if self.vehicle.domain == "air":

@@ -135,7 +135,9 @@ class CopterDynamics:
         component = min(1.0, self.acceleration_mps2 * dt_s / change) if change else 0.0
         body.north_mps += d_north * component
         body.east_mps += d_east * component
-        body.up_mps = towards(body.up_mps, up, self.climb_mps2 * dt_s)
+        falls = isinstance(setpoint, NoThrust) and not body.on_ground
+        climb_mps2 = GRAVITY_MPS2 if falls else self.climb_mps2
+        body.up_mps = towards(body.up_mps, up, climb_mps2 * dt_s)
         body.north_m += body.north_mps * dt_s
         body.east_m += body.east_mps * dt_s
         body.up_m += body.up_mps * dt_s

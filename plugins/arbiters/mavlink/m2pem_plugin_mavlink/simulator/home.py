@@ -4,12 +4,14 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from m2pem_plugin_mavlink.simulator.geometry import Point
+from m2pem_plugin_mavlink.simulator.geometry import Location, Point
 from m2pem_plugin_mavlink.simulator.interfaces import (
     AutopilotInterface,
     Component,
     makes,
+    on_command,
 )
+from m2pem_plugin_mavlink.simulator.messages import Command, Result
 
 
 class Home(Component):
@@ -30,6 +32,18 @@ class Home(Component):
         """Set home at arming."""
         if self.known:
             self.set(self.autopilot.position)
+
+    @on_command(dialect.MAV_CMD_DO_SET_HOME)
+    def _command(self, command: Command) -> Result:
+        """Here, or at a place with its altitude above mean sea level."""
+        if command.param1 == 1:
+            self.set(self.autopilot.position)
+        elif not command.has_position:
+            return Result.FAILED
+        else:
+            place = Location(command.latitude_deg, command.longitude_deg, command.z)
+            self.set(self.autopilot.frame.to_point(place))
+        return Result.ACCEPTED
 
     def step(self, dt_s: float) -> None:
         """Set home when the position is first known."""

@@ -80,6 +80,21 @@ class MotionCommands(Component):
             rate = None if mask & IGNORE_YAW_RATE else message.yaw_rate
             guided.move(VelocitySetpoint(message.vx, message.vy, -message.vz, yaw, rate))
 
+    @on_message("SET_POSITION_TARGET_GLOBAL_INT")
+    def _take_global(self, message: Any, sender: Sender) -> None:
+        """A position alone, of copters and of what drives; ArduPilot takes frames 0, 3, 5 and 6."""
+        guided, frame = self._guided(), message.coordinate_frame
+        plane = self.autopilot.spec.kind is Kind.PLANE
+        known = frame in GLOBAL_FRAMES and frame not in TERRAIN_FRAMES
+        ignored = message.type_mask & IGNORE_POSITION
+        if guided is None or plane or ignored or not known or not self.autopilot.arming.armed:
+            return
+        place = Location(message.lat_int / 1e7, message.lon_int / 1e7, 0.0)
+        up_m = self.up_m(message.alt, frame)
+        point = self._on_surface(self.autopilot.frame.to_point(place).at_height(up_m))
+        if not self.forbidden(point):
+            guided.go_to(point)
+
     def commands(self) -> Mapping[int, CommandHandler]:
         """By MAV_CMD; what a kind of vehicle cannot do, it does not know."""
         roles, kind = self.autopilot.firmware.roles, self.autopilot.spec.kind

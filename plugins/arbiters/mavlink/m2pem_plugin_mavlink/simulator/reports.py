@@ -207,7 +207,9 @@ class Reports(Component):
         state: int = dialect.MAV_LANDED_STATE_IN_AIR
         if not autopilot.firmware.tells_landed:
             state = dialect.MAV_LANDED_STATE_UNDEFINED
-        elif autopilot.body.on_ground or autopilot.spec.kind in SURFACE:
+        elif (
+            autopilot.body.on_ground or autopilot.spec.kind in SURFACE or not autopilot.arming.armed
+        ):
             state = dialect.MAV_LANDED_STATE_ON_GROUND
         elif autopilot.modes.maneuver.taking_off:
             state = dialect.MAV_LANDED_STATE_TAKEOFF

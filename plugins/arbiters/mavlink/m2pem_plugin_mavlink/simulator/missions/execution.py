@@ -84,6 +84,7 @@ class AutoMission(Maneuver):
     _leg: Leg | None = None
     _index: int | None = None
     _ahead: tuple[Item, ...] = ()
+    _paused_at: HoldPosition | None = None
 
     @property
     def takes_speed(self) -> bool:
@@ -139,13 +140,19 @@ class AutoMission(Maneuver):
 
     def end(self) -> None:
         """Another mode has been entered."""
-        self.autopilot.mission.running = False
+        self.autopilot.mission.running = self.autopilot.mission.paused = False
 
     def step(self, dt_s: float) -> MotionSetpoint:
         """Fly the present leg, and go on to the next when it is done."""
         autopilot, progress = self.autopilot, self.autopilot.mission
         progress.released |= not autopilot.body.on_ground
         waiting = autopilot.spec.kind is Kind.COPTER and not progress.released
+        if not progress.paused:
+            self._paused_at = None
+        elif self._paused_at is None:
+            self._paused_at = HoldPosition(autopilot)
+        if self._paused_at is not None:
+            return self._paused_at.step(dt_s)
         if waiting or not progress.running:
             return self._stay.step(dt_s)
         self._notice_a_change()

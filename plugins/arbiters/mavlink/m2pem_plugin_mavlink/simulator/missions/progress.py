@@ -34,13 +34,14 @@ class MissionProgress(Component):
     before it; `begun`: the mission was started since it was last at its beginning; `complete`: it
     was flown to its end; `released`: a ground station said MISSION_START, or it is in the air, so
     that it need not wait on the ground; `running`: the mode that flies it is on, and it is not
-    complete.
+    complete; `paused`: a ground station has paused it, and the mode goes on (ArduCopter).
     """
 
     def __init__(self, autopilot: AutopilotInterface) -> None:
         super().__init__(autopilot)
         self.current = self.resume_at = 0
         self.begun = self.complete = self.released = self.running = False
+        self.paused = False
         self._jumps: dict[int, int] = {}
         self._reached: list[tuple[float, int]] = []  # when, and which item
 
@@ -61,10 +62,12 @@ class MissionProgress(Component):
 
     @property
     def state(self) -> int:
-        """MISSION_STATE; ArduPilot has no pause, PX4 goes by its mode."""
+        """MISSION_STATE; of ArduPilot only copters have a pause, PX4 goes by its mode."""
         ardupilot = self.autopilot.firmware.is_ardupilot
         if self.empty:
             return NO_MISSION
+        if self.paused:
+            return PAUSED
         if self.complete:
             return COMPLETE
         if self.running if ardupilot else self._mode == MISSION_MODE_ACTIVE:
@@ -197,6 +200,17 @@ class MissionProgress(Component):
         if index >= 0 and not self.set_current(index):
             return Result.FAILED
         self.autopilot.send(self._current())
+        return Result.ACCEPTED
+
+    @on_command(dialect.MAV_CMD_DO_PAUSE_CONTINUE)
+    def _pause(self, command: Command) -> Result:
+        """Stop on the way, or go on: copters of ArduPilot in AUTO (ModeAuto::pause)."""
+        autopilot = self.autopilot
+        if not (autopilot.firmware.is_ardupilot and autopilot.spec.kind is Kind.COPTER):
+            return Result.UNSUPPORTED
+        if not (self.running and isinstance(autopilot.modes.maneuver, AutoMission)):
+            return Result.FAILED
+        self.paused = command.param1 == 0
         return Result.ACCEPTED
 
     @makes(dialect.MAVLINK_MSG_ID_MISSION_CURRENT)
