@@ -5,6 +5,7 @@ import logging
 import re
 from collections.abc import Awaitable, Callable
 from contextlib import AsyncExitStack
+from pathlib import Path
 
 import pytest
 from m2pem_plugin_mavlink import VehicleLink
@@ -14,6 +15,7 @@ from m2pem_plugin_mavlink.protocol.messages import Address, message_type
 from m2pem_plugin_mavlink.simulator.geometry import Location
 from m2pem_plugin_mavlink.simulator.simulator import Simulator
 from m2pem_plugin_mavlink.simulator.specification import Kind
+from m2pem_plugin_mavlink.vehicle.other_stations import Act, meaning
 from mavlink_simulated import AMPLE_S, HOME_ALTITUDE_M, Bench, at, connections, ground_station
 from mavlink_simulated import specs as of_kinds
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -22,6 +24,14 @@ from m2pem.api import BehaviorState, Clock, Point, Route
 from m2pem.testing.contracts.arbiter_harness import context
 from m2pem.testing.loopback import run_on_loopback
 
+PAGE = Path(__file__).parents[4] / "docs/mavlink.md"
+COLUMNS = {
+    "goto": ("change_altitude",),
+    "area_survey": ("single_vehicle_routing",),
+    "run_onboard_mission": (),
+    "land": ("takeoff", "return_to_launch", "orbit", "hold", "reverse"),
+}
+"""A behavior of each column of the page's table, and others that it is for."""
 TARGET = Address(1, 1)
 FORCE = 21196
 SPEED = 20.0
@@ -387,3 +397,93 @@ def test_operators_read_that_a_parameter_was_set(
         await w.reads(rf"v1 parameter {name} was set from [\d.]+ to {value:g}", WITHIN_S)
 
     world(main, firmware=firmware)
+
+
+# --- uploads and stops ----------------------------------------------------------------------------
+
+
+@COPTERS
+@pytest.mark.parametrize("answer", ["none", "an error"])
+def test_a_mission_whose_acknowledgement_is_lost_is_read_back_and_flown(
+    world, monkeypatch: pytest.MonkeyPatch, firmware: str, answer: str
+) -> None:
+    async def main(w: World) -> None:
+        await w.up()
+        autopilot = w.bench.truth().autopilot
+        send, lost = autopilot.send, []
+
+        def lose(message, *to) -> None:
+            """The acknowledgement; ArduPilot refuses an item that comes after it."""
+            if message.get_type() != "MISSION_ACK":
+                send(message, *to)
+                return
+            lost.append(message)
+            if answer == "an error":
+                error = dialect.MAV_MISSION_ERROR
+                make = dialect.MAVLink_mission_ack_message
+                send(make(message.target_system, message.target_component, error), *to)
+
+        monkeypatch.setattr(autopilot, "send", lose)
+        await w.bench.do("r1.b2", "single_vehicle_routing", route=ROUTE, speed=12.0)
+        assert lost
+
+    world(main, firmware=firmware)
+
+
+@pytest.mark.parametrize("kind", [Kind.COPTER, Kind.ROVER, Kind.BOAT, Kind.PLANE])
+def test_a_cancel_ends_when_the_vehicle_is_seen_at_rest_or_on_its_circle(world, kind: Kind) -> None:
+    async def main(w: World) -> None:
+        if kind in (Kind.COPTER, Kind.PLANE):
+            await w.up(60.0)
+        east_m = w.bench.level()[0]
+        await w.bench.start("r1.b2", "goto", "v1", target=Point((*at(east_m + 900.0, 0.0), 60.0)))
+        await w.on_the_way(east_m + 60.0)
+        await w.bench.arbiter.cancel("r1.b2", 1)
+        await w.ends("r1.b2", BehaviorState.CANCELLED, "", 10.0)
+        body = w.bench.truth().autopilot.body
+        assert kind is Kind.PLANE or body.ground_speed_mps < (2.1 if kind is Kind.BOAT else 1.1)
+
+    world(main, kind)
+
+
+def test_operators_read_of_a_vehicle_that_does_not_stop(
+    world, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def main(w: World) -> None:
+        await w.up()
+        await w.bench.start("r1.b2", "goto", "v1", target=Point((*at(900.0, 0.0), 20.0)))
+        await w.on_the_way(60.0)
+        drift(w, monkeypatch)
+        await w.bench.arbiter.cancel("r1.b2", 1)
+        end = await w.ends("r1.b2", BehaviorState.FAILED, "TIMEOUT", 9.0)
+        assert re.search(
+            r"8 s of the cancel: it does NOT obey the cancel, in BRAKE at 6", end.reason
+        )
+        await w.bench.arbiter.hold("v1")
+        await w.reads(r"v1 it does NOT obey the hold, in BRAKE at 6.* by remote control", 12.0)
+
+    world(main)
+
+
+def drift(w: World, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the vehicle move to the east at 6 m/s, whatever its autopilot does."""
+
+    class Drift:
+        def step(self, body, setpoint, dt_s: float) -> None:
+            body.east_mps, body.north_mps, body.up_mps = 6.0, 0.0, 0.0
+            body.east_m += 6.0 * dt_s
+
+    monkeypatch.setattr(w.bench.truth().autopilot, "dynamics", Drift())
+
+
+# --- the page -------------------------------------------------------------------------------------
+
+
+def test_the_page_has_the_rules() -> None:
+    page = PAGE.read_text(encoding="utf-8")
+    for act in Act:
+        for behavior, alike in COLUMNS.items():
+            assert {meaning(act, each) for each in alike} <= {meaning(act, behavior)}
+        what, _, shown = act.value.partition(": ")
+        cells = [what, shown, *(meaning(act, behavior).value for behavior in COLUMNS)]
+        assert f"| {' | '.join(cells)} |\n" in page

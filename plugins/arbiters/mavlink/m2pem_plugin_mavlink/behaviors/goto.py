@@ -63,7 +63,7 @@ class Goto(Behavior):
         self.parameters = VehicleParameters(context)
         self._place: TargetPosition | None = None
         self._stillness = StillnessTimer(context)
-        self._target_check = TargetCheck(self.vehicle)
+        self._target_check = TargetCheck(self.vehicle, self.name)
         tolerance = self.parameters.tolerance_m
         self._said = tolerance is not None
         usual_m = TOLERANCES_M.get(self.vehicle.domain, 2.5)

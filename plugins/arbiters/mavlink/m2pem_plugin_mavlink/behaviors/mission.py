@@ -45,6 +45,7 @@ from m2pem_plugin_mavlink.behaviors.parameters import VehicleParameters
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem, same_frame
 from m2pem_plugin_mavlink.vehicle.driver import FRAMES, RELATIVE, FlightMode
 from m2pem_plugin_mavlink.vehicle.fixed_wing import remove_landing
+from m2pem_plugin_mavlink.vehicle.other_stations import Act, Meaning, meaning
 from m2pem_plugin_mavlink.vehicle.takeover_monitor import PAUSED
 
 _LAST_NAVIGATION_COMMAND: int = dialect.MAV_CMD_NAV_LAST
@@ -121,6 +122,7 @@ class StoredMission(Behavior):
         """Return that another station has paused the mission; ArduCopter stays in AUTO then."""
         state = self.vehicle.state
         paused = state.mission_state == dialect.MISSION_STATE_PAUSED
+        paused = paused and meaning(Act.PAUSED, self.name) is Meaning.WAITS
         return PAUSED if paused and state.mode is FlightMode.MISSION else ""
 
     def check_order(self, names: Callable[[], Mapping[int, str]] = dict) -> None:
@@ -129,7 +131,7 @@ class StoredMission(Behavior):
         Raises:
             TakenOverError: another station has set the current item.
         """
-        if self._progress is None:
+        if self._progress is None or meaning(Act.ITEM, self.name) is not Meaning.TAKEN_OVER:
             return
         self._progress.look()
         if problem := self._progress.problem(names()):

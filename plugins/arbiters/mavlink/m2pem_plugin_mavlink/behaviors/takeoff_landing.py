@@ -66,7 +66,7 @@ class ChangeAltitude(Behavior):
         parameters = VehicleParameters(context)
         altitude, self._frame = parameters.altitude()
         self._altitude_m = altitude or 0.0
-        self._target_check = TargetCheck(self.vehicle)
+        self._target_check = TargetCheck(self.vehicle, self.name)
 
     def refusal(self) -> str:
         """Check that the vehicle flies, and that its position is known."""

@@ -3,6 +3,7 @@
 from m2pem.api import LatLon, distance_m
 from m2pem_plugin_mavlink.behaviors.behavior import TakenOverError
 from m2pem_plugin_mavlink.protocol.messages import message_type
+from m2pem_plugin_mavlink.vehicle.other_stations import Act, Meaning, meaning
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 
 SHOWS_WITHIN_S = 1.0
@@ -21,15 +22,16 @@ class TargetCheck:
     plans its way around obstacles reports the next place on that way, and is not judged.
     """
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: Vehicle, behavior: str) -> None:
         self._vehicle = vehicle
+        self._applies = meaning(Act.TARGET, behavior) is Meaning.TAKEN_OVER
         self._sent_s: float | None = None
         self._place: LatLon = (0.0, 0.0)
         self._altitude_m: float | None = None
 
     def sent(self, place: LatLon | None) -> None:
         """Note a target that the vehicle has accepted; None: another one is on its way to it."""
-        self._sent_s = None if place is None else self._vehicle.link.now_s()
+        self._sent_s = None if place is None or not self._applies else self._vehicle.link.now_s()
         self._place, self._altitude_m = place or (0.0, 0.0), None
 
     def check(self) -> None:
