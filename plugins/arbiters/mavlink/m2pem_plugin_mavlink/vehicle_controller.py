@@ -425,10 +425,10 @@ class VehicleController:
             at, end_s = position_of(self.vehicle), self.vehicle.link.now_s() + OBEYS_WITHIN_S
             judged = self._is_in_failsafe
             while not (active is None and judged) and not self._has_restarted_or_fallen():
-                if not judged and (late := self.vehicle.link.now_s() >= end_s) | self._rests(at):
+                judged = judged or self._rests(at)
+                if not judged and self.vehicle.link.now_s() >= end_s:
                     judged = True
-                    if late and not self._rests(at):
-                        self.vehicle.alarm(self._disobedience("hold"))
+                    self.vehicle.alarm(self._disobedience("hold"))
                 # A vehicle that is held before it has left the ground disarms itself after a while.
                 if active is not None and not on_the_ground(self.vehicle):
                     self._check_takeover(_HELD)

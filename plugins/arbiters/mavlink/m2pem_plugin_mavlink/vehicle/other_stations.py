@@ -5,7 +5,6 @@ docs/mavlink.md is made of `RULES`.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from enum import StrEnum
 from types import MappingProxyType
 
@@ -35,40 +34,28 @@ class Meaning(StrEnum):
     NOTHING = "-"
 
 
-@dataclass(frozen=True, slots=True)
-class Rule:
-    """The meaning of an act for behaviors by their names, and for all the others."""
-
-    of: Mapping[str, Meaning]
-    otherwise: Meaning
-
-
 GUIDED = ("goto", "change_altitude")
 MISSIONS = ("single_vehicle_routing", "area_survey", "run_onboard_mission")
 UPLOADED = MISSIONS[:2]
 
-
-def _rule(otherwise: Meaning, names: tuple[str, ...] = (), of: Meaning = Meaning.NOTHING) -> Rule:
-    return Rule(MappingProxyType(dict.fromkeys(names, of)), otherwise)
-
-
-RULES: Mapping[Act, Rule] = MappingProxyType(
+RULES: Mapping[Act, tuple[Meaning, tuple[str, ...], Meaning]] = MappingProxyType(
     {
-        Act.FALLS: _rule(Meaning.FAILED),
-        Act.DISARMED: _rule(Meaning.TAKEN_OVER),
-        Act.MODE: _rule(Meaning.TAKEN_OVER),
-        Act.HOLD: _rule(Meaning.TAKEN_OVER, MISSIONS, Meaning.WAITS),
-        Act.PAUSED: _rule(Meaning.NOTHING, MISSIONS, Meaning.WAITS),
-        Act.MISSION: _rule(Meaning.NOTHING, UPLOADED, Meaning.TAKEN_OVER),
-        Act.ITEM: _rule(Meaning.NOTHING, MISSIONS, Meaning.TAKEN_OVER),
-        Act.TARGET: _rule(Meaning.NOTHING, GUIDED, Meaning.TAKEN_OVER),
-        Act.HOME: _rule(Meaning.SAID),
-        Act.PARAMETER: _rule(Meaning.SAID),
+        Act.FALLS: (Meaning.FAILED, (), Meaning.FAILED),
+        Act.DISARMED: (Meaning.TAKEN_OVER, (), Meaning.TAKEN_OVER),
+        Act.MODE: (Meaning.TAKEN_OVER, (), Meaning.TAKEN_OVER),
+        Act.HOLD: (Meaning.WAITS, MISSIONS, Meaning.TAKEN_OVER),
+        Act.PAUSED: (Meaning.WAITS, MISSIONS, Meaning.NOTHING),
+        Act.MISSION: (Meaning.TAKEN_OVER, UPLOADED, Meaning.NOTHING),
+        Act.ITEM: (Meaning.TAKEN_OVER, MISSIONS, Meaning.NOTHING),
+        Act.TARGET: (Meaning.TAKEN_OVER, GUIDED, Meaning.NOTHING),
+        Act.HOME: (Meaning.SAID, (), Meaning.SAID),
+        Act.PARAMETER: (Meaning.SAID, (), Meaning.SAID),
     }
 )
+"""What an act means for these behaviors, and what for all others."""
 
 
 def meaning(act: Act, behavior: str) -> Meaning:
     """Return what an act means for a behavior."""
-    rule = RULES[act]
-    return rule.of.get(behavior, rule.otherwise)
+    here, behaviors, otherwise = RULES[act]
+    return here if behavior in behaviors else otherwise

@@ -145,7 +145,7 @@ class TakeoverMonitor:
         at_s, mode = self._disarmed
         said = [text for text in self._texts_around(at_s) if _FAILSAFE.search(text)]
         by = "; ".join(said) or "by another ground station or by its autopilot"
-        height = f"disarmed {height_m:.0f} m above its home, in {mode}"
+        height = f"was disarmed {height_m:.0f} m above its home, in {mode}"
         return Takeover(Cause.FALL, f"{height}, and falls: {by}")
 
     def takeover(self, modes: Collection[FlightMode], behavior: str = "") -> Takeover | None:
@@ -202,6 +202,8 @@ class TakeoverMonitor:
         """Return whether the vehicle holds in place of its mission: stations pause a PX4 so."""
         vehicle, commanded = self.vehicle, self.vehicle.commanded.custom_mode
         if commanded is None or vehicle.state.mode is not FlightMode.HOLD:
+            return False
+        if vehicle.state.mission_state == dialect.MISSION_STATE_COMPLETE:
             return False
         px4 = vehicle.identity is not None and vehicle.identity.firmware is Firmware.PX4
         return px4 and vehicle.driver.flight_mode(commanded) is FlightMode.MISSION
