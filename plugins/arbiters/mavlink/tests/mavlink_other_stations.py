@@ -318,6 +318,7 @@ def _played(vehicle: Vehicle, act: Act, cell: Play, folder: Path, watch_s: float
     with mission(vehicle, act.steps, s.system, port, folder, ROUTES) as (process, lines):
         if not s.until("phase", lambda: act.now(s) or process.poll() is not None, 300.0):
             process.kill()
+            process.wait()
         if process.poll() is not None:
             raise RuntimeError(f"the phase did not come: {s.mode}, {s.trace[-2:]}, {lines}")
         s.watch(2.0)  # m2pem has then seen the mode that it commanded

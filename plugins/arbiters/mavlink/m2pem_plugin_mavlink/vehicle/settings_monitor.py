@@ -105,17 +105,16 @@ class SettingsMonitor:
             self._armed_s = None
         elif self._armed_s is None:
             self._armed_s = now_s
-        home, before = state.home, self._home
-        if home is None or home == before:
+        home, before = state.home, self._home or state.home
+        if home is None or before is None:
             return
-        self._home = home
-        if before is None:
-            return
+        self._home = before
         moved_m = distance_m(before.latlon, home.latlon)
         raised_m = home.altitude_m - before.altitude_m
         if moved_m < MOVED_M and abs(raised_m) < MOVED_M:
-            return
-        here, settled = state.position, self._armed_s is not None
+            return  # small steps add up to a move
+        self._home = home
+        settled, here = self._armed_s is not None, state.position
         if self._armed_s is None or now_s - self._armed_s < ARMING_S:
             settled = here is not None and distance_m(here.latlon, home.latlon) > FAR_M
         if settled:
