@@ -1,12 +1,11 @@
 """The bounds of what a vehicle may do otherwise than commanded, in one table.
 
-They were chosen so that no mission of the repository comes near them on simulated vehicles and on
-simulated autopilots: `bench/conformance.py` prints the largest values. A fleet sets others by key
-`conformance` (docs/evidence.md).
+They were chosen so that the missions of the repository do not come near them on simulated vehicles.
+A fleet sets others by key `conformance` (docs/evidence.md).
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Self
 
 G_M_S2 = 9.81
@@ -54,9 +53,6 @@ class Bounds:
         """Return the bounds with those of a fleet, then of a vehicle, in their place."""
         merged = {name: value for each in settings for name, value in each.items()}
         return replace(cls(), **merged)
-
-
-NAMES = tuple(field.name for field in fields(Bounds))
 
 
 def turn_m(speed_m_s: float) -> float:

@@ -34,8 +34,8 @@ def state(
     at_s: float, east_m: float, north_m: float, up_m: float = 25.0, **more: Any
 ) -> VehicleState:
     position = GeoPosition(*place(east_m, north_m), HOME_M + up_m)
-    more = {"armed": True, "velocity_enu_m_s": (5.0, 0.0, 0.0)} | more
-    return VehicleState(UAV, round(at_s * 1e6), position, up_m, **more)
+    given: dict[str, Any] = {"armed": True, "velocity_enu_m_s": (5.0, 0.0, 0.0), **more}
+    return VehicleState(UAV, round(at_s * 1e6), position, up_m, **given)
 
 
 def flight(
@@ -257,7 +257,7 @@ def test_a_vehicle_that_is_to_stay_and_goes_on_drifts() -> None:
 
 
 def test_a_vehicle_that_makes_no_progress_is_said_only() -> None:
-    still = {"velocity_enu_m_s": (0.0, 0.0, 0.0)}
+    still: dict[str, Any] = {"velocity_enu_m_s": (0.0, 0.0, 0.0)}
     watch = Watch(route(SQUARE), Bounds(), flies=True)
     found = seen_by(watch, [state(at, 0.0, 50.0, **still) for at in range(200)])
     assert found is not None
