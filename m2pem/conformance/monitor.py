@@ -39,7 +39,7 @@ SETTLES_WITHIN_S = 3.0
 SETTLES_WITHIN_REAL_S = 0.5
 """The same of the clock on the wall, for executives with a faster one."""
 
-_DOWN = "it is on its way to the ground, and goes on"
+_DOWN = "it comes home or down, and goes on"
 
 
 @dataclass(slots=True)

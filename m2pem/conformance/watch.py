@@ -93,7 +93,7 @@ class Watch:
         self._state: VehicleState | None = None
         self._here: EastNorth | None = None
         self._speed_m_s = 0.0
-        self._armed = self._aloft = False
+        self._armed = self._aloft = self._was_fast = False
         self._highest_m = -math.inf
         self._sink_m_s = 0.0
         self._height_error_m = 0.0
@@ -304,8 +304,9 @@ class Watch:
             return None
         bound_m_s = self._bounds.over_speed * self.commanded.speed_m_s + self._bounds.rest_m_s
         fast = self._speed_m_s > bound_m_s
-        if not self._lasts("speed", fast, state, self._bounds.over_speed_s):
+        if not self._lasts("speed", fast, state, self._bounds.over_speed_s) or self._was_fast:
             return None
+        self._was_fast = True  # which is said once
         text = f"moves at {self._speed_m_s:.1f} m/s (bound: {bound_m_s:.1f} m/s)"
         return self._deviation("speed", text, self._speed_m_s, bound_m_s, ends=False)
 

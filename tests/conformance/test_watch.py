@@ -262,3 +262,10 @@ def test_a_vehicle_that_makes_no_progress_is_said_only() -> None:
     found = seen_by(watch, [state(at, 0.0, 50.0, **still) for at in range(200)])
     assert found is not None
     assert (found.what, found.ends) == ("stuck", False)
+
+
+def test_a_speed_far_above_the_commanded_one_is_said_once() -> None:
+    watch = Watch(route(SQUARE, speed=2.0), Bounds(), flies=True)
+    found = [each for each in map(watch.observe, flight(SQUARE, 8.0)) if each is not None]
+    assert [(each.what, each.ends) for each in found] == [("speed", False)]
+    assert found[0].text == "moves at 8.0 m/s (bound: 5.0 m/s)"

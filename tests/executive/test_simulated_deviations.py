@@ -120,7 +120,7 @@ def test_a_vehicle_on_its_way_down_is_not_stopped(play: Any) -> None:
         (text,) = said
         assert re.fullmatch(
             r"uav1: its position has jumped by 5\d m in 0\.\d s\. return_to_launch: "
-            r"it is on its way to the ground, and goes on",
+            r"it comes home or down, and goes on",
             text,
         ), text
         assert (end.state, end.code) == (BehaviorState.FAILED, "FAILED")
