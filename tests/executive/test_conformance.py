@@ -31,8 +31,8 @@ def state(world: World, north_m: float, up_m: float = 25.0, **more: Any) -> Vehi
     """uav1 so far north of its target."""
     position = GeoPosition(TARGET[0] + north_m / 111_190, TARGET[1], 400.0 + up_m)
     now_us = world.clock.now_us()
-    more = {"armed": True, "velocity_enu_m_s": (0.0, 0.0, 0.0)} | more
-    return VehicleState(ResourceId("uav1"), now_us, position, up_m, **more)
+    given: dict[str, Any] = {"armed": True, "velocity_enu_m_s": (0.0, 0.0, 0.0), **more}
+    return VehicleState(ResourceId("uav1"), now_us, position, up_m, **given)
 
 
 async def says(world: World, *states: VehicleState) -> None:
