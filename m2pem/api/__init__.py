@@ -224,6 +224,7 @@ if TYPE_CHECKING:
     from m2pem.geo.geometry_files.mission_tasks import MissionTasks as MissionTasks
     from m2pem.geo.geometry_files.mission_tasks import read_fence_items as read_fence_items
     from m2pem.geo.geometry_files.mission_tasks import read_mission_tasks as read_mission_tasks
+    from m2pem.geo.geometry_files.mission_tasks import read_rally_items as read_rally_items
     from m2pem.geo.local_frame import EastNorth as EastNorth
     from m2pem.geo.local_frame import LatLon as LatLon
     from m2pem.geo.local_frame import LocalFrame as LocalFrame

@@ -14,6 +14,7 @@ from m2pem.geo.geojson import GeometryError, coordinate
 from m2pem.geo.geometry_files.contents import Contents, FileProblem
 from m2pem.geo.geometry_files.mission_commands import (
     LANDING_SECTION,
+    RALLY_POINT,
     Treatment,
     command_of,
 )
@@ -93,6 +94,21 @@ def read_fence_items(items: Iterable[MissionItem]) -> tuple[dict[str, Area], lis
     areas = {each.name: each.geometry for each in read.geometries}
     problems = [each for each in read.problems if each.feature]
     return {name: each for name, each in areas.items() if isinstance(each, Area)}, problems
+
+
+def read_rally_items(items: Iterable[MissionItem]) -> tuple[list[Point], list[FileProblem]]:
+    """Return the rally points of items, and what is wrong with them."""
+    contents = Contents("rally points")
+    points: list[Point] = []
+    for item in items:
+        with contents.feature(f"item {item.number}"):
+            if item.command != RALLY_POINT:
+                raise GeometryError("is no rally point")
+            called = _called(item)
+            latitude, longitude, altitude = item.params[4:]
+            place = coordinate(latitude, longitude, altitude, called.where)
+            points.append(Point(place, frame_of(called)))
+    return points, [each for each in contents.whole().problems if each.feature]
 
 
 def _called(item: MissionItem) -> MissionItem:

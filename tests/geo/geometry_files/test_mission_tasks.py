@@ -5,7 +5,11 @@ import pytest
 from m2pem.findings import Severity
 from m2pem.geo.geometry_files.contents import FileProblem
 from m2pem.geo.geometry_files.mission_items import MissionItem
-from m2pem.geo.geometry_files.mission_tasks import read_fence_items, read_mission_tasks
+from m2pem.geo.geometry_files.mission_tasks import (
+    read_fence_items,
+    read_mission_tasks,
+    read_rally_items,
+)
 from m2pem.mission.geometry import Point, Route
 
 A, B, C = (38.1, -77.0, 20.0), (38.11, -77.0, 25.0), (38.12, -77.0, None)
@@ -122,3 +126,18 @@ def test_fence_items_are_areas_and_mavsdks_circle_of_nothing_is_none() -> None:
     assert "a fence of 3 corners" in str(problems[0])
     _, problems = read_fence_items([item(0, 16, A)])
     assert str(problems[0]) == "item 0: is no part of a fence"
+
+
+def test_rally_points_are_read_and_other_items_refused() -> None:
+    points, problems = read_rally_items([item(0, 5100, A), item(1, 5100, B, frame=0)])
+    assert not problems
+    assert [each.position for each in points] == [A, B]
+    assert [each.altitude_frame for each in points] == ["relative", "amsl"]
+    bad = [item(0, 16, A), item(1, 5100, (98.0, 1.0, 2.0)), item(2, 5100, A, frame=1)]
+    points, problems = read_rally_items(bad)
+    assert not points
+    assert [str(each) for each in problems] == [
+        "item 0: is no rally point",
+        "item 1: MAV_CMD_NAV_RALLY_POINT: latitude 98 is not within -90..90",
+        "item 2: MAV_CMD_NAV_RALLY_POINT: MAV_FRAME 1 is not global, relative or terrain",
+    ]

@@ -119,6 +119,12 @@ def test_a_plan_with_takeoff_waits_and_return_is_flown_paused_and_continued(tmp_
             "item 0: rover1 has no take",
         ),
         (ROVER1, [Item(206)], "DENIED", "no item of the plan moves it"),
+        (
+            UAV1,
+            [Item(WAYPOINT, A), Item(WAYPOINT, (*B[:2], 0.0))],
+            "UNSUPPORTED",
+            "item 1: 0 m above home is on the ground",
+        ),
     ],
 )
 def test_a_plan_that_a_vehicle_cannot_do_is_refused_with_its_item(

@@ -74,7 +74,10 @@ class Events(Listener):
                         vehicle.behavior, vehicle.behavior_id = record.name, record.behavior
                         self._plans.requested(vehicle, stamped.run, record.element)
                         find = partial(self._geometry, stamped.run)
-                        vehicle.plan.replace(plan_of(record.name, record.parameters, find))
+                        items = plan_of(record.name, record.parameters, find)
+                        # Before its run is taken up, its geometries are not known.
+                        items = items or self._plans.way_of(vehicle, stamped.run)
+                        vehicle.plan.replace(items, is_under_way=not is_new)
             case BehaviorProgressed() if is_new:
                 self._orders.progressed(stamped.run, record.state)
             case BehaviorUnsettled():
@@ -88,7 +91,7 @@ class Events(Listener):
                     if record.state is BehaviorState.SUCCEEDED:
                         known = view.behavior(record.behavior)
                         element = known.element if known is not None else ""
-                        self._plans.task_ended(vehicle, stamped.run, element)
+                        self._plans.task_ended(vehicle, stamped.run, element, is_new=is_new)
                 if is_new:
                     reason = record.reason or record.code or record.state.value.lower()
                     self._orders.ended(stamped.run, record.state, reason)
@@ -106,6 +109,10 @@ class Events(Listener):
                 severity = TextSeverity.WARNING
             for vehicle in concerned:
                 self._say(vehicle, severity, f"{stamped.run} {sentence.text}")
+
+    def run_added(self, view: RunView) -> None:
+        """See `Listener`."""
+        self.status_changed(view)
 
     def status_changed(self, view: RunView) -> None:
         """See `Listener`."""

@@ -13,6 +13,7 @@ from m2pem.api import (
     LocalFrame,
     MissionTask,
     Point,
+    Polyline,
     Route,
     RunId,
     RunStatus,
@@ -29,6 +30,7 @@ from m2pem_plugin_mavlink.protocol.messages import Message
 
 MOST_ITEMS = 1_000
 REACHED_M = 5.0
+ON_LEG_M = 10.0
 
 Geometries: TypeAlias = Callable[[str], object]
 """Returns the geometry of a name; None: there is none."""
@@ -45,20 +47,44 @@ class Item(NamedTuple):
     altitude_m: float
     frame: int
 
+    @classmethod
+    def of(cls, place: tuple[float, float, float | None], frame: str) -> "Item":
+        """Return the waypoint at a place in an altitude frame."""
+        return cls(*place[:2], place[2] or 0.0, _FRAMES.get(frame, 6))
+
 
 @dataclass(slots=True)
 class Plan:
-    """`current`: the number of the waypoint that the vehicle is on the way to."""
+    """`current`: the number of the waypoint that the vehicle is on the way to. `is_under_way`: it
+    began before m2pem did, so that the vehicle may be anywhere on its way."""
 
     items: Sequence[Item] = ()
     current: int = 0
+    is_under_way: bool = False
 
-    def replace(self, items: Sequence[Item]) -> None:
+    def replace(self, items: Sequence[Item], *, is_under_way: bool = False) -> None:
         """Another plan; none if there are no items."""
-        self.items, self.current = items[:MOST_ITEMS], 0
+        self.items, self.current, self.is_under_way = items[:MOST_ITEMS], 0, is_under_way
+
+    @property
+    def is_found(self) -> bool:
+        """Whether `current` is known of a plan."""
+        return bool(self.items) and not self.is_under_way
+
+    def _find(self, position: LatLon) -> None:
+        """Have a vehicle that is on a leg be on the way to the end of that leg."""
+        frame = LocalFrame(position)
+        line = Polyline([frame.to_local(each[:2]) for each in self.items])
+        feet = [(away_m, line.segments.index(leg)) for _, away_m, leg in line.feet((0.0, 0.0))]
+        away_m, index = min(feet, default=(math.inf, 0))
+        if away_m <= ON_LEG_M:
+            self.current = index + 1
 
     def advance(self, position: LatLon) -> None:
         """The vehicle is at a position: waypoints that it has reached are past."""
+        if self.is_under_way and self.items:
+            self.is_under_way = False
+            self._find(position)
         while self.current < len(self.items) - 1:
             here, after = self.items[self.current : self.current + 2]
             reached = distance_m(position, here[:2]) <= REACHED_M
@@ -83,7 +109,8 @@ class UploadedPlan:
 @dataclass(slots=True)
 class PlanRun:
     """A run of a plan. `tasks`: by the ids of the mission's elements. `element`: the task under
-    way. `done`: items that are behind the vehicle, in their order."""
+    way. `done`: items that are behind the vehicle, in their order. `is_taken_up`: it began before
+    m2pem did, and where the vehicle is on its way is not known yet."""
 
     run: RunId
     by: str
@@ -92,6 +119,7 @@ class PlanRun:
     element: str = ""
     done: list[int] = field(default_factory=list)
     status: RunStatus = RunStatus.RUNNING
+    is_taken_up: bool = False
 
     @property
     def current(self) -> int:

@@ -5,7 +5,8 @@ stopped and kept apart from others as every mission is. It begins in the name of
 starts it.
 """
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+import logging
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -26,20 +27,23 @@ from m2pem.api import (
     Severity,
     TaskOf,
     Value,
-    as_geojson,
     own_areas,
     own_fences,
     read_fence_items,
     read_mission_tasks,
+    read_rally_items,
     shown_geometries,
     tasks_in_a_row,
 )
+from m2pem.api.records import RunStarted
 from m2pem.errors import M2pemError
 from m2pem_plugin_mavlink.face.commands import RefusedCommandError
-from m2pem_plugin_mavlink.face.plan import PlanRun, UploadedPlan
+from m2pem_plugin_mavlink.face.kept_plans import as_feature, items_of
+from m2pem_plugin_mavlink.face.plan import Item, PlanRun, UploadedPlan
+from m2pem_plugin_mavlink.face.plan_messages import plan_id
 from m2pem_plugin_mavlink.face.requests import FENCE, MISSION, Request, Say, acknowledge_plan
 from m2pem_plugin_mavlink.face.uploads import ALL_PLANS, PLAN_TYPES, mission_items
-from m2pem_plugin_mavlink.face.vehicle import ShownVehicle
+from m2pem_plugin_mavlink.face.vehicle import AIRBORNE_M, ShownVehicle
 from m2pem_plugin_mavlink.protocol.messages import Message, message_type
 
 ACCEPTED: int = dialect.MAV_MISSION_ACCEPTED
@@ -48,6 +52,11 @@ UNSUPPORTED: int = dialect.MAV_MISSION_UNSUPPORTED
 
 TAKEOFF_M = 10.0
 """The height of a take-off that a plan does not say: of one whose altitudes are above sea level."""
+
+PLAN, RALLY = "plan", "rally"
+"""`VEHICLE.plan` and `VEHICLE.rally`: the geometries that keep them."""
+
+_logger = logging.getLogger(__name__)
 
 _HEIGHTS = ("air", "subsurface")
 WARNINGS_SAID = 4
@@ -78,27 +87,26 @@ class PlanRuns:
         if type_ == MISSION:
             # To ArduPilot, item 0 is the home position.
             first = int(request.station.ardupilot_modes)
-            return await self._store_mission(vehicle, items, first)
+            return await self._store_mission(vehicle, items, first, request.by)
         if type_ == FENCE:
             return await self._store_fence(vehicle, items, request.by)
-        vehicle.rally_points = UploadedPlan(items)
-        unused = "the rally points are kept, and not used: it returns to its home"
-        return ACCEPTED, unused if items else ""
+        return await self._store_rally(vehicle, items, request.by)
 
     async def _store_mission(
-        self, vehicle: ShownVehicle, items: Sequence[Message], first: int
+        self, vehicle: ShownVehicle, items: Sequence[Message], first: int, by: str
     ) -> tuple[int, str]:
         read = read_mission_tasks(mission_items(items[first:]))
         for problem in read.problems:
             if problem.severity is Severity.ERROR:
                 return UNSUPPORTED, str(problem)
-        tasks = [_for_domain(each, vehicle.domain) for each in read.tasks]
+        tasks = _tasks_for(vehicle, read.tasks)
         warnings = [str(each) for each in read.problems]
-        for task in [each for each in tasks if each.of_payload and not _camera(vehicle)]:
-            warnings.append(f"{_where(task.items)}: it has no camera: the pictures are left out")
-            tasks.remove(task)
+        if _camera(vehicle) is None:
+            for task in [each for each in read.tasks if each.of_payload]:
+                where = _where(task.items)
+                warnings.append(f"{where}: it has no camera: the pictures are left out")
         plan = UploadedPlan(items, tasks)
-        self.restore_fence(vehicle)  # operators may have changed it
+        self.restore(vehicle)  # operators may have changed its fence
         if tasks:
             try:
                 reason = self._misfit(vehicle, tasks) or await self._findings(vehicle, plan)
@@ -111,7 +119,14 @@ class PlanRuns:
         run = vehicle.plan_run
         if run is not None and not run.status.ended:
             warnings.insert(0, f"{run.run} goes on with the plan that it began with")
-        vehicle.uploaded = plan
+        route = _way_of(tasks) or self._somewhere(vehicle)
+        feature = as_feature(route, items, first) if items else None
+        problem = await self._keep(vehicle, PLAN, feature, by)
+        self.restore(vehicle)
+        if vehicle.uploaded.id != plan.id:
+            return DENIED, problem
+        if problem:
+            warnings.insert(0, problem)
         if (more := len(warnings) - WARNINGS_SAID) > 0:
             warnings[WARNINGS_SAID:] = [f"and {more} more"]
         return ACCEPTED, "; ".join(warnings)
@@ -124,7 +139,14 @@ class PlanRuns:
         way: list[LatLon] = []
         names: list[str] = []
         for task in tasks:
-            for number, (place, _) in zip(task.items, task.places, strict=False):
+            for number, (place, frame) in zip(task.items, task.places, strict=False):
+                height_m = place[2] if vehicle.domain == "air" and frame != "amsl" else None
+                if height_m is not None and height_m < AIRBORNE_M:
+                    above = "the ground" if frame == "terrain" else "home"
+                    return (
+                        f"item {number}: {height_m:g} m above {above} is on the ground; give lower "
+                        "places altitudes above sea level, and land by NAV_LAND"
+                    )
                 way.append(place[:2])
                 names.append(f"item {number}")
         for fence in vehicle.fences if way else ():
@@ -151,20 +173,100 @@ class PlanRuns:
         try:
             # The old ones go last: a fault between leaves the vehicle less room, not more.
             for name, area in new.items():
-                await self._control.set_geometry(name, as_geojson(area), by=by)
+                await self._control.set_geometry(name, as_feature(area, items, len(new)), by=by)
             for name in own_areas(vehicle.resource, shown_geometries(self._control)):
                 if name not in new:
                     await self._control.delete_geometry(name, by=by)
         except M2pemError as error:
             return DENIED, str(error)
         finally:
-            self.restore_fence(vehicle)
-        vehicle.uploaded_fence = UploadedPlan(items)
+            self.restore(vehicle)
         return ACCEPTED, ""
 
-    def restore_fence(self, vehicle: ShownVehicle) -> None:
-        """Take the fence of a vehicle from what was handed over, before a restart, too."""
-        vehicle.own_fences = own_fences(vehicle.resource, shown_geometries(self._control))
+    async def _store_rally(
+        self, vehicle: ShownVehicle, items: Sequence[Message], by: str
+    ) -> tuple[int, str]:
+        points, problems = read_rally_items(mission_items(items))
+        if problems:
+            return UNSUPPORTED, str(problems[0])
+        feature = None
+        if items:
+            places, frames = [each.position for each in points], [p.altitude_frame for p in points]
+            feature = as_feature(Route.of(places, frames), items)
+        problem = await self._keep(vehicle, RALLY, feature, by)
+        self.restore(vehicle)
+        if vehicle.rally_points.id != plan_id(items):
+            return DENIED, problem
+        unused = "the rally points are kept, and not used: it returns to its home"
+        return ACCEPTED, problem or (unused if items else "")
+
+    # --- what is kept -----------------------------------------------------------------------------
+
+    async def _keep(
+        self, vehicle: ShownVehicle, kind: str, feature: Mapping[str, Value] | None, by: str
+    ) -> str:
+        """Have the journal keep a plan in place of the one before, None: none; return why it does
+        not."""
+        name = f"{vehicle.resource}.{kind}"
+        try:
+            if feature is not None:
+                await self._control.set_geometry(name, feature, by=by)
+            elif name in self._control.geometries():
+                await self._control.delete_geometry(name, by=by)
+        except M2pemError as error:
+            return str(error)
+        return ""
+
+    def restore(self, vehicle: ShownVehicle) -> None:
+        """Take the plans of a vehicle from what was handed over, before a restart, too."""
+        given, name = self._control.geometries(), vehicle.resource
+        shown = shown_geometries(self._control)
+        vehicle.own_fences = own_fences(name, shown)
+        of_fence = [each for each in own_areas(name, shown) if each in given]
+        kept = [items_of(given[each].geometry) for each in of_fence]
+        # Each area of a fence has its items, and how many areas there are.
+        is_whole = all(items and areas == len(kept) for items, areas in kept)
+        vehicle.uploaded_fence = UploadedPlan(kept[0][0] if kept and is_whole else ())
+        rally, plan = given.get(f"{name}.{RALLY}"), given.get(f"{name}.{PLAN}")
+        vehicle.rally_points = UploadedPlan(items_of(rally.geometry)[0] if rally else ())
+        vehicle.uploaded = _plan_of(vehicle, plan.geometry if plan else {})
+
+    async def take_up(self, vehicles: Iterable[ShownVehicle]) -> None:
+        """Restore the plans of vehicles, and know the runs of them that go on after a restart."""
+        missions = {f"plan of {each.resource}": each for each in vehicles}
+        for vehicle in missions.values():
+            self.restore(vehicle)
+        for run in await self._control.runs():
+            if run.status.ended or (found := missions.get(run.mission)) is None:
+                continue
+            try:
+                found.plan_run = await self._run_of(found, run)
+            except M2pemError as error:
+                _logger.warning("%s: its plan is not known: %s", run.run, error)
+
+    async def _run_of(self, vehicle: ShownVehicle, run: RunSummary) -> PlanRun | None:
+        """Return the run of a plan that a station began; None: of another mission."""
+        first = await self._control.records(run.run, 0, 1)
+        by = next((each.record.by for each in first if isinstance(each.record, RunStarted)), "")
+        elements = (await self._control.mission(run.run)).elements
+        labels = {id_: each.label for id_, each in elements.items() if id_.startswith("Task")}
+        for version in reversed(
+            await self._control.geometry_versions(f"{vehicle.resource}.{PLAN}")
+        ):
+            plan = _plan_of(vehicle, version.geometry or {})
+            tasks = {_numbers(each.items): each for each in plan.tasks}
+            tasks[""] = MissionTask("takeoff", ())
+            of_run = {id_: tasks.get(each.partition(" ")[2]) for id_, each in labels.items()}
+            known = {id_: each for id_, each in of_run.items() if each is not None}
+            if plan.tasks and len(known) == len(of_run):
+                return PlanRun(run.run, by, plan, known, status=run.status, is_taken_up=True)
+        return None
+
+    def _somewhere(self, vehicle: ShownVehicle) -> Route:
+        """Return where the plan of a vehicle is shown that leads to no place."""
+        position = vehicle.state.position if vehicle.state is not None else None
+        place = self._control.fleet().origin[:2] if position is None else position.latlon
+        return Route(((*place, None),))
 
     async def clear(self, request: Request) -> None:
         """MISSION_CLEAR_ALL: forget the plan. A run of it goes on."""
@@ -193,6 +295,7 @@ class PlanRuns:
             if run.status is RunStatus.PAUSED:
                 await self._control.resume(run.run, by=by)
             return
+        self.restore(vehicle)  # operators may have deleted it
         plan = vehicle.uploaded
         if not plan.tasks:
             raise RefusedCommandError("it has no plan: upload one")
@@ -217,11 +320,17 @@ class PlanRuns:
         if own is not None and own.run == run:
             own.element = element
 
-    def task_ended(self, vehicle: ShownVehicle, run: RunId, element: str) -> None:
-        """A behavior of a run has succeeded."""
+    def way_of(self, vehicle: ShownVehicle, run: RunId) -> Sequence[Item]:
+        """Return the waypoints of the task of a plan that is under way; none: it has none."""
+        own = vehicle.plan_run
+        task = own.tasks.get(own.element) if own is not None and own.run == run else None
+        return [Item.of(*each) for each in task.places] if task is not None else []
+
+    def task_ended(self, vehicle: ShownVehicle, run: RunId, element: str, *, is_new: bool) -> None:
+        """A behavior of a run has succeeded. `is_new`: not before a restart."""
         own = vehicle.plan_run
         if own is not None and own.run == run and element in own.tasks:
-            self._reached(vehicle, own, own.tasks[element].items)
+            self._reached(vehicle, own, own.tasks[element].items, is_new=is_new)
 
     def status_changed(
         self, vehicles: Collection[ShownVehicle], run: RunId, status: RunStatus
@@ -240,12 +349,16 @@ class PlanRuns:
         own = vehicle.plan_run if vehicle.runs_plan else None
         task = own.tasks.get(own.element) if own is not None else None
         if own is not None and task is not None:
-            self._reached(vehicle, own, task.items[: vehicle.plan.current])
+            passed = task.items[: vehicle.plan.current]
+            self._reached(vehicle, own, passed, is_new=not own.is_taken_up)
+            own.is_taken_up &= not vehicle.plan.is_found
 
-    def _reached(self, vehicle: ShownVehicle, own: PlanRun, items: Sequence[int]) -> None:
-        for number in items:
-            if number not in own.done:
-                own.done.append(number)
+    def _reached(
+        self, vehicle: ShownVehicle, own: PlanRun, items: Sequence[int], *, is_new: bool = True
+    ) -> None:
+        for number in [each for each in items if each not in own.done]:
+            own.done.append(number)
+            if is_new:
                 self._send(vehicle, message_type("MISSION_ITEM_REACHED").make(seq=number))
 
 
@@ -259,6 +372,36 @@ def _camera(vehicle: ShownVehicle) -> ResourceId | None:
 
 def _where(items: Sequence[int]) -> str:
     return f"item {items[0]}" if items else "the take-off before item 0"
+
+
+def _numbers(items: Sequence[int]) -> str:
+    """Return the items of a task as the name of its element has them."""
+    if not items:
+        return ""
+    first, last = items[0], items[-1]
+    return f"(item {first})" if first == last else f"(items {first} to {last})"
+
+
+def _tasks_for(vehicle: ShownVehicle, tasks: Iterable[MissionTask]) -> list[MissionTask]:
+    """Return the tasks of a plan as far as a vehicle may have to do with them."""
+    camera = _camera(vehicle)
+    kept = [each for each in tasks if not each.of_payload or camera is not None]
+    return [_for_domain(each, vehicle.domain) for each in kept]
+
+
+def _plan_of(vehicle: ShownVehicle, geometry: Mapping[str, Value]) -> UploadedPlan:
+    """Return the plan that a geometry has; one without items, if it has none."""
+    items, first = items_of(geometry)
+    read = read_mission_tasks(mission_items(items[first:]))
+    return UploadedPlan(items, _tasks_for(vehicle, read.tasks))
+
+
+def _way_of(tasks: Iterable[MissionTask]) -> Route | None:
+    """Return the places to which tasks lead; None: to none."""
+    places = [place for each in tasks for place in each.places]
+    return (
+        Route.of([each for each, _ in places], [frame for _, frame in places]) if places else None
+    )
 
 
 def _for_domain(task: MissionTask, domain: str) -> MissionTask:
@@ -315,9 +458,7 @@ def _mission_of(
                 parameters[name] = value
         resource = (_camera(vehicle) if task.of_payload else None) or vehicle.resource
         kind = BehaviorType.PAYLOAD if task.of_payload else BehaviorType.VEHICLE
-        first, last = (task.items[0], task.items[-1]) if task.items else (None, None)
-        numbers = f"item {first}" if first == last else f"items {first} to {last}"
-        label = task.behavior if first is None else f"{task.behavior} ({numbers})"
+        label = f"{task.behavior} {_numbers(task.items)}".strip()
         made.append(TaskOf(label, kind, resource, task.behavior, parameters))
     name = f"plan of {vehicle.resource}"
     source, data = tasks_in_a_row(name, made, geometries)

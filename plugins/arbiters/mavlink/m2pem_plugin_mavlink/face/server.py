@@ -178,8 +178,7 @@ class FaceServer:
             for name, vehicle in in_fleet.items()
             if (own := own_system(vehicle.settings)) is not None
         }
-        for vehicle in self._vehicles.values():
-            self._plans.restore_fence(vehicle)
+        await self._plans.take_up(self._vehicles.values())
         thrower = EventThrower(self._control)
         vehicles = {address: name for name, address in autopilots.items()}
         self._receiver = MessageReceiver(shared_hub(), self._rules.received, vehicles, thrower)

@@ -237,7 +237,7 @@ def _mission_current(vehicle: ShownVehicle) -> Message:
     if vehicle.shows_upload:
         items, current = len(vehicle.uploaded.items), 0
         state = dialect.MISSION_STATE_NOT_STARTED
-        if run is not None and (vehicle.runs_plan or run.plan is vehicle.uploaded):
+        if run is not None and (vehicle.runs_plan or run.plan.id == vehicle.uploaded.id):
             items, current = len(run.plan.items), run.current
             state = _PLAN_STATES.get(run.status, dialect.MISSION_STATE_NOT_STARTED)
     return plan_message("MISSION_CURRENT").make(
