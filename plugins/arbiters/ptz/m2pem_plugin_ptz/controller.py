@@ -6,18 +6,24 @@ cancel, or another behavior, ends the current one before anything else begins.
 
 import asyncio
 import logging
+import math
 from dataclasses import dataclass
 
 from m2pem.api import BehaviorId, BehaviorState, BehaviorTracker, LatestTask, Limits
 from m2pem.api.latest_task import cancel_and_wait
 from m2pem_plugin_ptz.behaviors.behavior import LEAST_SHARE, REPORTED_SHARE, TICK_S, Behavior
+from m2pem_plugin_ptz.camera_model.frames import angle_between
 from m2pem_plugin_ptz.camera_model.model import CameraModel
 from m2pem_plugin_ptz.drivers.driver import FOUND_WITHIN_S, CameraError, Discovering
+from m2pem_plugin_ptz.settings import DriverName
 
 STOP_SHARE = 0.8
 """A stop that takes more than this part of the cancel timeout has failed."""
 
 _POLL_S = 0.1
+REST_S = 0.3
+REST_RAD = math.radians(0.3)
+"""A camera that reports directions within this angle for that time rests."""
 
 
 @dataclass(slots=True)
@@ -188,6 +194,21 @@ class CameraController:
     async def _leave(self, behavior: Behavior) -> None:
         await self._end_replaced()
         await behavior.leave()
+        # A gimbal that keeps its heading turns with its vehicle.
+        if behavior.turns and self.model.settings.driver is not DriverName.MAVLINK:
+            await self._rest()
+
+    async def _rest(self) -> None:
+        """Wait until the camera reports that it does not turn."""
+        at, since_us = self.driver.ptz, self.model.now_us
+        heard_us = self.last_contact_us
+        while self.model.now_us - since_us < REST_S * 1e6 or self.last_contact_us == heard_us:
+            await self._clock.sleep(_POLL_S)
+            now = self.driver.ptz
+            if at is None or now is None:
+                return
+            if angle_between((at.pan_rad, at.tilt_rad), (now.pan_rad, now.tilt_rad)) > REST_RAD:
+                at, since_us, heard_us = now, self.model.now_us, self.last_contact_us
 
     async def _cancel(self, task: _Task) -> None:
         if task.behavior.turns:

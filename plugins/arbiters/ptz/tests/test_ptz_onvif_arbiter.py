@@ -174,6 +174,26 @@ async def test_a_camera_that_reports_where_it_will_be_is_there_when_it_rests(tmp
         assert math.degrees(server.camera.ptz[0]) == pytest.approx(60, abs=0.5)
 
 
+@pytest.mark.parametrize("obeys", [True, False])
+@on_loopback
+async def test_a_cancel_is_done_when_the_camera_rests(tmp_path, monkeypatch, obeys):
+    if not obeys:
+        monkeypatch.setitem(ptz_service.OPERATIONS, "Stop", lambda *_: "")
+    slow = camera(rate_deg_s=5.0, drives=False)
+    async with slow as server, bench(server, tmp_path) as (found, _):
+        await found.until(lambda: getattr(found.latest(PTZ), "pan_rad", None) is not None, 60)
+        await found.start("r1.b1", "ptz_point_at", PTZ, bearing=rad(160), elevation=0.0)
+        await found.until(lambda: math.degrees(server.camera.ptz[0]) > 10, 60)
+        await found.arbiter.cancel("r1.b1", 1)
+        end = await found.ended("r1.b1", 60)
+        assert server.camera.gimbal.pan.moving is not obeys
+        if obeys:
+            assert end.state is BehaviorState.CANCELLED
+        else:
+            assert (end.state, end.code) == (BehaviorState.FAILED, "TIMEOUT")
+            assert end.reason == "the camera did not stop within 8 s of the cancel"
+
+
 @on_loopback
 async def test_two_seconds_of_server_errors_are_no_lost_link(tmp_path, monkeypatch):
     """The answer is a text: for it, zeep 4.3.3 raises AttributeError, not TransportError."""
