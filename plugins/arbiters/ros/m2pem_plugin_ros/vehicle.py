@@ -41,6 +41,7 @@ from m2pem_plugin_ros.drivers.driver import (
     Order,
     Outcome,
 )
+from m2pem_plugin_ros.evidence import SETTLE_S, contradiction
 from m2pem_plugin_ros.log_throttle import LogThrottle
 from m2pem_plugin_ros.settings import DriverName, Settings
 
@@ -103,6 +104,7 @@ class Vehicle:
         self._tracker = setup.tracker
         self._limits = setup.limits
         self._ros_connection = ros_connection
+        self._domain = setup.connection.domain
         self._sensors, self.endpoints = ros_connection.sensors, ros_connection.endpoints
         self._fence = setup.connection.fence
         self._log_throttle = LogThrottle(setup.context.logger, self.resource)
@@ -114,6 +116,7 @@ class Vehicle:
         self._left_us = 0
         self._adopted = False
         self._cancelled: BehaviorId = ""
+        self._settling: UUID | None = None
         self._waiting: BehaviorId = ""
         self._found_by_s = 0.0
         self._is_held = False
@@ -385,6 +388,18 @@ class Vehicle:
         self._report_left(behavior)
 
     def ended(self, goal: UUID, outcome: Outcome) -> None:
+        is_settling = self._settling == goal and self._is_current(goal)
+        if is_settling and outcome.state is not BehaviorState.FAILED:
+            return  # a driver may report it again
+        if self._contradiction(goal, outcome):
+            self._settling = goal
+            self._work.add(self._settle(goal, outcome))
+        else:
+            self._report_end(goal, outcome)
+
+    def _report_end(self, goal: UUID, outcome: Outcome) -> None:
+        if self._settling == goal:
+            self._settling = None
         was_left = self._unresolved.pop(goal, None) is not None
         self._resolved.set()
         behavior = self._behaviors.get(goal) if was_left else self._behavior(goal)
@@ -458,6 +473,33 @@ class Vehicle:
         return replace(state, ready=False, not_ready_reasons=tuple(reasons))
 
     # --- inside ---------------------------------------------------------------------------------
+
+    def _is_current(self, goal: UUID) -> bool:
+        return self._order is not None and self._order.goal == goal
+
+    def _contradiction(self, goal: UUID, outcome: Outcome) -> str:
+        """Return what odometry shows against the end of the current order; "" for any other."""
+        if self._order is None or self._order.goal != goal or self._ros_connection.payload_status:
+            return ""
+        request, where = self._order.request, self._sensors.localization
+        return contradiction(request, outcome.state, self._domain, where, self._context.origin)
+
+    async def _settle(self, goal: UUID, outcome: Outcome) -> None:
+        """Report an end as soon as odometry agrees with it; as failed if it does not in time."""
+        clock, limit_s = self._context.clock, SETTLE_S[outcome.state]
+        until_us = clock.now_us() + limit_s * 1e6
+        while (wrong := self._contradiction(goal, outcome)) and clock.now_us() < until_us:
+            await clock.sleep(LOOK_EVERY_S)
+        if self._settling != goal or not self._is_current(goal):
+            return  # it has failed meanwhile, or the vehicle is lost or has another order
+        if wrong:
+            code = "FAILED" if outcome.state is BehaviorState.SUCCEEDED else "TIMEOUT"
+            reason = f"reported as {outcome.state}, but {limit_s:g} s later odometry shows: {wrong}"
+            self._context.logger.error("%s: %s", self.resource, reason)
+            if outcome.state is BehaviorState.CANCELLED:
+                self._call_driver("hold", self.driver.hold)
+            outcome = Outcome(BehaviorState.FAILED, code, reason)
+        self._report_end(goal, outcome)
 
     def _note_fix(self) -> None:
         """Before odometry has come, a satellite fix shows that a vehicle without a node of m2pem is

@@ -1,13 +1,15 @@
 """A vehicle in plain rclpy, with nothing of m2pem but its interfaces.
 
-    ros_plain_peer.py NAMESPACE node|base|nav2 FRAME [TYPE]
+    ros_plain_peer.py NAMESPACE node|base|nav2 FRAME [TYPE [FAULT]]
 
 `node` keeps to docs/ros-nodes.md; `base` takes `cmd_vel`, and goes on with the last command that it
 got; `nav2` drives as long as it has a goal of `navigate_to_pose`. FRAME: of its odometry; TYPE: of
 `cmd_vel`, Twist or TwistStamped, `latched`, which subscribes to a latched Twist only, or `pose`,
 which publishes odometry as a PoseStamped. On /link, NAMESPACE makes it deaf and dumb, and "" lets
-it speak again: it drives on meanwhile. On /truth it says what it does, whatever its link: name,
-speed, behaviors begun, and the epochs of the CANCELs that it has heard.
+it speak again: it drives on meanwhile. FAULT `early`: it says after a metre that a goal succeeded;
+`runaway`: it confirms a cancel, and drives on; `jump`: its odometry jumps 50 m once; `backwards`:
+it drives the other way. On /truth it says what it does, whatever its link: name, speed, behaviors
+begun, and the epochs of the CANCELs that it has heard.
 """
 
 import contextlib
@@ -35,10 +37,13 @@ LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 class Plain:
     """One vehicle."""
 
-    def __init__(self, namespace: str, kind: str, frame: str, type_: str) -> None:
+    def __init__(
+        self, namespace: str, kind: str, frame: str, type_: str = "Twist", fault: str = ""
+    ) -> None:
         self.node = node = rclpy.create_node("vehicle", namespace=namespace)
         self.namespace, self.kind, self.frame, self.type = namespace, kind, frame, type_
-        self.east, self.speed, self.steps = 0.0, 0.0, 0
+        self.fault = fault
+        self.east, self.jumped, self.speed, self.steps = 0.0, 0.0, 0.0, 0
         self.doing, self.begun, self.cancels = "", 0, []
         self.known: dict[str, tuple[int, int]] = {}
         self.epochs: dict[str, int] = {}
@@ -83,8 +88,9 @@ class Plain:
             over = self.over = rclpy.Future()
             self.handle = handle
             await over
-            self.speed = 0.0
-            handle.canceled()
+            if self.fault != "runaway":
+                self.speed = 0.0
+            handle.succeed() if self.fault == "early" else handle.canceled()
             return NavigateToPose.Result()
 
         reentrant = ReentrantCallbackGroup()
@@ -103,7 +109,7 @@ class Plain:
     def hear_velocity(self, twist: Any) -> None:
         if self.linked:
             self.begun += self.speed == 0.0 and twist.linear.x != 0.0
-            self.speed = twist.linear.x
+            self.speed = -twist.linear.x if self.fault == "backwards" else twist.linear.x
 
     def hear_command(self, command: Any) -> None:
         if not self.linked:
@@ -117,7 +123,9 @@ class Plain:
         elif command.verb == BehaviorCommand.CANCEL:
             self.cancels.append(f"{command.epoch}{'refused' if is_past else ''}")
             if command.id == self.doing and not is_past:
-                self.doing, self.speed = "", 0.0
+                self.doing = ""
+                if self.fault != "runaway":
+                    self.speed = 0.0
                 self.say(command.id, 3, BehaviorStatus.CANCELLED)
         elif command.verb == BehaviorCommand.QUERY:
             self.say(command.id, *self.known.get(command.id, (0, BehaviorStatus.UNKNOWN)))
@@ -129,9 +137,16 @@ class Plain:
 
     def step(self) -> None:
         self.steps += 1
-        if self.handle is not None and self.handle.is_cancel_requested and not self.over.done():
+        early = self.fault == "early" and self.east > 1.0
+        cancelled = self.handle is not None and self.handle.is_cancel_requested
+        if self.handle is not None and (cancelled or early) and not self.over.done():
             self.over.set_result(None)
+        if self.doing and early:
+            self.say(self.doing, 3, BehaviorStatus.SUCCEEDED)
+            self.doing, self.speed = "", 0.0
         self.east += self.speed * PERIOD_S
+        if self.fault == "jump" and self.east > 1.0:
+            self.jumped = 50.0
         words = [self.namespace, f"{self.speed:.2f}", str(self.begun), ",".join(self.cancels)]
         self.truth.publish(String(data=" ".join(words)))
         if not self.linked:
@@ -142,7 +157,7 @@ class Plain:
             message = Odometry()
             message.header.frame_id = self.frame
             message.header.stamp = self.node.get_clock().now().to_msg()
-            message.pose.pose.position.x = self.east
+            message.pose.pose.position.x = self.east + self.jumped
             message.pose.pose.orientation.w = 1.0
             message.twist.twist.linear.x = self.speed
             self.odom.publish(message)
@@ -153,8 +168,7 @@ class Plain:
 
 def main() -> None:
     rclpy.init()
-    namespace, kind, frame, *type_ = sys.argv[1:]
-    plain = Plain(namespace, kind, frame, type_[0] if type_ else "Twist")
+    plain = Plain(*sys.argv[1:])
     print("ready", flush=True)
     with contextlib.suppress(ExternalShutdownException, KeyboardInterrupt):
         rclpy.spin(plain.node)

@@ -306,7 +306,7 @@ def test_an_end_that_is_none_is_ignored_and_a_second_one_changes_nothing() -> No
 def test_a_vehicle_that_is_done_at_once_was_running_all_the_same() -> None:
     async def main(world) -> None:
         async with world.connected() as bench:
-            await bench.start("r1.b1", "goto", A, target=FAR)
+            await bench.start("r1.b1", "goto", A, target=at(0.0, 0.0))
             goal = goal_id(JOURNAL, "r1.b1")
             world.bodies[A].driver.setup.events.ended(goal, Outcome(SUCCEEDED))
             await bench.ended("r1.b1", 1)

@@ -87,14 +87,15 @@ class FenceMonitor:
 
 STUCK_S = 15.0
 MOVED_M = 0.3
+ASTRAY_M = 2.0
 TURNED_RAD = 0.3
 SHARE = 0.5
 """A base that is commanded slowly has moved if it covered this part of the commanded distance."""
 
 
 class StuckMonitor:
-    """Detects a base that is commanded to move and does not. Time without a command does not
-    count."""
+    """Detects a base that is commanded to move and does not, or that moves backwards or sideways
+    instead. Time without a command does not count."""
 
     def __init__(self) -> None:
         self._from: Pose | None = None
@@ -106,22 +107,30 @@ class StuckMonitor:
         """Start again."""
         self._from = None
 
-    def stuck(self, pose: Pose, twist: Twist, dt_s: float) -> bool:
-        """Return whether the base has not moved for `STUCK_S`. `twist` is the last command."""
-        if self._from is None or self._moved(self._from, pose):
+    def stuck(self, pose: Pose, twist: Twist, dt_s: float) -> str:
+        """Return how the base does not move as commanded: not for `STUCK_S`, or elsewhere by
+        `ASTRAY_M`; "" if it does. `twist` is the last command."""
+        if self._from is None or self._moved(self._from, pose, twist):
             self._from = pose
             self._commanded_s = self._commanded_m = self._commanded_rad = 0.0
         if twist.forward_m_s != 0.0 or twist.yaw_rad_s != 0.0:
             self._commanded_s += dt_s
             self._commanded_m += abs(twist.forward_m_s) * dt_s
             self._commanded_rad += abs(twist.yaw_rad_s) * dt_s
-        return self._commanded_s >= STUCK_S
+        if self._commanded_m and math.dist(position_of(self._from), position_of(pose)) > ASTRAY_M:
+            way = "ahead" if twist.forward_m_s >= 0.0 else "back"
+            return f"it was commanded {way}, and has moved {ASTRAY_M:g} m elsewhere"
+        late = self._commanded_s >= STUCK_S
+        return f"it was commanded to move for {STUCK_S:g} s, and has not moved" if late else ""
 
-    def _moved(self, before: Pose, pose: Pose) -> bool:
-        """Whether the base moved as far as commanded, or by MOVED_M. Turning counts if it only
-        turns."""
-        far = math.dist(position_of(before), position_of(pose))
-        if self._commanded_m > 0.0 and far >= min(MOVED_M, SHARE * self._commanded_m):
+    def _moved(self, before: Pose, pose: Pose, twist: Twist) -> bool:
+        """Whether the base moved as far as commanded, or by MOVED_M, in the commanded direction.
+        Turning counts if it only turns."""
+        course_rad = before.yaw_rad + angle_between(before.yaw_rad, pose.yaw_rad) / 2
+        east_m, north_m = pose.east_m - before.east_m, pose.north_m - before.north_m
+        along_m = east_m * math.cos(course_rad) + north_m * math.sin(course_rad)
+        along_m *= math.copysign(1.0, twist.forward_m_s)
+        if self._commanded_m > 0.0 and along_m >= min(MOVED_M, SHARE * self._commanded_m):
             return True
         turns = self._commanded_rad > 0.0 and self._commanded_m < MOVED_M
         aside = abs(angle_between(before.yaw_rad, pose.yaw_rad))

@@ -11,7 +11,6 @@ from uuid import UUID
 from m2pem.api import BehaviorState
 from m2pem_plugin_ros.behaviors.monitors import (
     MARGIN,
-    STUCK_S,
     FenceMonitor,
     PoseFilter,
     StuckMonitor,
@@ -203,13 +202,13 @@ class Pilot:
         moved = math.dist(position_of(before), position_of(pose))
         if moved > FOUND_M + MARGIN * self._bounds.speed_m_s * dt_s:
             motion.found_at(position_of(pose), moved)
+            self._stuck.reset()
 
     def _check_stuck(self, pose: Pose, command: Twist, desired: DesiredMotion, dt_s: float) -> None:
         steered = self.motion is not None and self.motion.steered
         if not steered or self.held or self._ending is not None or not desired.moves:
             self._stuck.reset()
-        elif self._stuck.stuck(pose, command, dt_s):
-            reason = f"it was commanded to move for {STUCK_S:g} s, and has not moved"
+        elif reason := self._stuck.stuck(pose, command, dt_s):
             self._end_with(Ending(BehaviorState.FAILED, "ROUTE_BLOCKED", reason))
 
     def _step_result(self, command: Twist, stands: bool, dt_s: float) -> Step:

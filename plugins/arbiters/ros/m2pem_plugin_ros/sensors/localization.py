@@ -8,6 +8,7 @@ from m2pem.api import ArbiterContext, Clock, GeoPosition, ResourceId, mean_sea_l
 from m2pem_plugin_ros.frames import Origin, to_geodetic, to_local, yaw_of_quaternion
 from m2pem_plugin_ros.log_throttle import LogThrottle
 from m2pem_plugin_ros.pose import Pose, Twist
+from m2pem_plugin_ros.sensors.jumps import JumpMonitor
 from m2pem_plugin_ros.sensors.tf_buffer import Transform, TransformError, transform_of
 from m2pem_plugin_ros.sensors.tf_topics import MAP, TfTopics
 from m2pem_plugin_ros.settings import FixAltitude, OdomFrame, Settings
@@ -82,6 +83,8 @@ class TopicLocalization:
         self._frame = settings.odom_frame
         self._fix_altitude = settings.fix_altitude
         self._where = PoseEstimator(settings.odom_frame, context.origin)
+        self._origin, self._fastest_m_s = context.origin, settings.bounds.speed_m_s
+        self._jumps = JumpMonitor()
         self._resource = resource
         self._odom = settings.topic(topics.odom)
         self._tf = tf or TfTopics(
@@ -144,6 +147,8 @@ class TopicLocalization:
                 problems.append("no satellite fix yet")
             elif (self._clock.now_us() - self._fixed_us) / 1e6 > FIX_IS_OLD_S:
                 problems.append("the last satellite fix is old")
+        if jump := self._jumps.problem(self._clock.now_us() / 1e6):
+            problems.append(jump)
         return tuple(problems)
 
     def _on_odometry(self, message: Any) -> None:
@@ -189,6 +194,7 @@ class TopicLocalization:
         self._posed_us = self._clock.now_us()
         self._changes += 1
         self._where.odometry(pose, twist)
+        self._check_jump()
 
     def _in_declared(self, frame: str, stamp: tuple[int, int], in_frame: Transform) -> Pose:
         """Return the pose of odometry in the declared frame. Each of several robots may have its
@@ -247,6 +253,20 @@ class TopicLocalization:
         self._posed_us = self._clock.now_us() - round(found.age_s * 1e6)
         if _within(FARTHEST_M, pose.east_m, pose.north_m, pose.up_m):
             self._where.pose_in_map(pose)
+            self._check_jump()
+
+    def _check_jump(self) -> None:
+        pose, twist, fix = self._where.pose, self._where.twist, self._where.position
+        if pose is not None:
+            place = pose.east_m, pose.north_m
+        elif fix is not None:
+            place = to_local(fix, self._origin)[:2]
+        else:
+            return
+        speed_m_s = math.hypot(twist.forward_m_s, twist.left_m_s) if twist else 0.0
+        fastest_m_s = max(speed_m_s, self._fastest_m_s)
+        if jump := self._jumps.jump(*place, fastest_m_s, self._clock.now_us() / 1e6):
+            self.log_throttle.log("a position to which it cannot have moved", jump)
 
     def _on_fix(self, message: Any) -> None:
         status = message.status.status
@@ -263,6 +283,7 @@ class TopicLocalization:
         self._fixed_us = self._clock.now_us()
         self._changes += 1
         self._where.fix(GeoPosition(latitude, longitude, altitude))
+        self._check_jump()
 
 
 def _pose(transform: Transform) -> Pose:
