@@ -56,7 +56,7 @@ IN_GUIDED = frozenset({"goto", "takeoff", "orbit", "set_speed", "change_altitude
 """Orders after which a vehicle is in GUIDED still, as those of ArduPilot are."""
 
 DEPARTURE_EVERY_S = 0.5
-PROGRESS_EVERY_S = 1.5
+PROGRESS_EVERY_S = 1.0
 """MAVROS, simple programs and missions of MAVSDK take the first acknowledgement for the last one;
 MAVSDK waits 2 s for it, QGroundControl 3 s."""
 
