@@ -112,7 +112,6 @@ class StoredMission(Behavior):
     """Executes a stored mission, which another ground station may pause, or change the item of."""
 
     modes = frozenset({FlightMode.MISSION})
-    max_still_s = MOVES_WITHIN_S
 
     def __init__(self, context: BehaviorContext) -> None:
         super().__init__(context)
@@ -140,6 +139,8 @@ class StoredMission(Behavior):
 
 class MissionFlight(StoredMission):
     """Uploads waypoints as a mission and has the vehicle execute it; `loop`: again and again."""
+
+    max_still_s = MOVES_WITHIN_S
 
     def __init__(self, context: BehaviorContext) -> None:
         super().__init__(context)
@@ -528,7 +529,6 @@ class RunOnboardMission(StoredMission):
     landing."""
 
     name = "run_onboard_mission"
-    max_still_s = None  # it may have waits of any length
 
     def __init__(self, context: BehaviorContext) -> None:
         super().__init__(context)

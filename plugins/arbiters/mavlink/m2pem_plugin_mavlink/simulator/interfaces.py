@@ -501,6 +501,7 @@ class SetpointsInterface(Protocol):
 class MissionInterface(Protocol):
     current: int
     resume_at: int
+    paused: bool
     running: bool
     complete: bool
     begun: bool
