@@ -50,7 +50,7 @@ async def main(broker: str, serial_number: str, version: str, speed: str = "1") 
         serial_number=serial_number,
         broker_url=broker,
         protocol_version=version,
-        state_interval=1.0,
+        state_interval=0.2,
         validate_messages=version == "2.1.0",  # it has the schemas of 2.1
     )
     async with VehicleClient(config) as client:
