@@ -75,11 +75,11 @@ class RunTakeover:
                     refused[run] = error
             looked = [self._look(each) for each in claimed.values()]
             found = await asyncio.gather(*looked, return_exceptions=True)
-            for run, error in zip(claimed, found, strict=True):
-                if isinstance(error, M2pemError):
-                    refused[run] = error
-                elif error is not None:
-                    raise error
+            for run, raised in zip(claimed, found, strict=True):
+                if isinstance(raised, M2pemError):
+                    refused[run] = raised
+                elif raised is not None:
+                    raise raised
         finally:
             supervisor.interrupted.taken_up()
             for each in claimed.values():

@@ -74,9 +74,10 @@ class Events(Listener):
                         vehicle.behavior, vehicle.behavior_id = record.name, record.behavior
                         self._plans.requested(vehicle, stamped.run, record.element)
                         find = partial(self._geometry, stamped.run)
-                        items = plan_of(record.name, record.parameters, find)
                         # Before its run is taken up, its geometries are not known.
-                        items = items or self._plans.way_of(vehicle, stamped.run)
+                        items = plan_of(record.name, record.parameters, find) or list(
+                            self._plans.way_of(vehicle, stamped.run)
+                        )
                         vehicle.plan.replace(items, is_under_way=not is_new)
             case BehaviorProgressed() if is_new:
                 self._orders.progressed(stamped.run, record.state)

@@ -96,9 +96,9 @@ class PlanRuns:
         self, vehicle: ShownVehicle, items: Sequence[Message], first: int, by: str
     ) -> tuple[int, str]:
         read = read_mission_tasks(mission_items(items[first:]))
-        for problem in read.problems:
-            if problem.severity is Severity.ERROR:
-                return UNSUPPORTED, str(problem)
+        for found in read.problems:
+            if found.severity is Severity.ERROR:
+                return UNSUPPORTED, str(found)
         tasks = _tasks_for(vehicle, read.tasks)
         warnings = [str(each) for each in read.problems]
         if _camera(vehicle) is None:

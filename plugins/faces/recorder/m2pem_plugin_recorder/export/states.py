@@ -54,8 +54,9 @@ def _folders(run: ExportedRun, folder: Path | None) -> list[Path]:
     fleet, journal = run.fleet, run.journal
     if folder is not None:
         return [folder]
-    of_file = fleet and folder_named(fleet, fleet.faces.get("recorder", {}).get("folder"))
-    beside = journal and folder_beside(journal)
+    settings = {} if fleet is None else fleet.faces.get("recorder", {})
+    of_file = None if fleet is None else folder_named(fleet, settings.get("folder"))
+    beside = None if journal is None else folder_beside(journal)
     return [each for each in (of_file, beside) if each is not None]
 
 
