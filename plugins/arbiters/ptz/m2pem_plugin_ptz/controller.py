@@ -201,14 +201,14 @@ class CameraController:
     async def _rest(self) -> None:
         """Wait until the camera reports that it does not turn."""
         at, since_us = self.driver.ptz, self.model.now_us
-        heard_us = self.last_contact_us
-        while self.model.now_us - since_us < REST_S * 1e6 or self.last_contact_us == heard_us:
+        contact_us = self.last_contact_us
+        while self.model.now_us - since_us < REST_S * 1e6 or self.last_contact_us == contact_us:
             await self._clock.sleep(_POLL_S)
             now = self.driver.ptz
             if at is None or now is None:
                 return
             if angle_between((at.pan_rad, at.tilt_rad), (now.pan_rad, now.tilt_rad)) > REST_RAD:
-                at, since_us, heard_us = now, self.model.now_us, self.last_contact_us
+                at, since_us, contact_us = now, self.model.now_us, self.last_contact_us
 
     async def _cancel(self, task: _Task) -> None:
         if task.behavior.turns:

@@ -215,7 +215,7 @@ class PauseControl(StopControl):
         super().__init__(commander, clock)
         self.wanted: bool | None = None
         """Whether the vehicle should be paused; None: nothing is asked of it."""
-        self.is_ours = False
+        self.is_own = False
         """Whether it was paused so. Some vehicles do not report the action for long."""
 
     def want(self, paused: bool) -> None:
@@ -235,7 +235,7 @@ class PauseControl(StopControl):
     def step(self, state: State, *, may_send: bool) -> None:
         """Look at a state. `may_send`: whether to send again."""
         paused = is_paused(state)
-        self.is_ours = paused and (self.is_ours or self.wanted is True)
+        self.is_own = paused and (self.is_own or self.wanted is True)
         if self.wanted is None:
             return
         status = self._status(state)

@@ -614,8 +614,8 @@ class Vehicle:
 
     def _is_paused_by_us(self) -> bool:
         state = self._state
-        ours = self._pause.wanted or self._pause.is_ours
-        return bool(ours) or (state is not None and is_paused_by_us(state))
+        own = self._pause.wanted or self._pause.is_own
+        return bool(own) or (state is not None and is_paused_by_us(state))
 
     def _id(self, behavior: BehaviorId) -> str:
         return order_id(self._context.journal, behavior)
