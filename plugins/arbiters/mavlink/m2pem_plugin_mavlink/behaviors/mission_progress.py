@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem.api import LatLon, distance_m
-from m2pem_plugin_mavlink.behaviors.arrival import arrival_radius_m, position_of
+from m2pem_plugin_mavlink.behaviors.arrival import arrival_radius_m, cannot_stop, position_of
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 
@@ -48,6 +48,7 @@ class MissionProgress:
         }
         self._first = first
         self._begins = next(iter(self._ahead), 0)
+        self._last = max(moves, default=0)
         self._began_s = vehicle.link.now_s()
         self._current: int | None = None
         self._was: tuple[float, LatLon] | None = None
@@ -71,7 +72,14 @@ class MissionProgress:
         elif current < self._current and current >= self._first:
             self.set_back = self.set_back or (self._current, current)
         self._current = current
-        self.skipped = tuple(index for index in self._ahead if index < current)
+        skipped = tuple(index for index in self._ahead if index < current)
+        if cannot_stop(self._vehicle):
+            if current > self._last + 1:
+                return  # behind its circle: the takeover monitor judges the landing there
+            if len(skipped) == 1:  # its turn has cut a corner
+                del self._ahead[skipped[0]]
+                return
+        self.skipped = skipped
 
     def _pass(self) -> None:
         """Remove the waypoints that the vehicle can have passed since it was seen last: messages

@@ -46,6 +46,8 @@ class TargetCheck:
             return
         if at_s < self._sent_s + SHOWS_WITHIN_S or vehicle.avoids_obstacles:
             return
+        if vehicle.state.custom_mode != vehicle.commanded.custom_mode:
+            return  # a mode that was not commanded has targets of its own, and is judged as a mode
         if self._altitude_m is None:
             self._altitude_m = target.altitude_m
         off_m, up_m = distance_m(self._place, target.latlon), target.altitude_m - self._altitude_m

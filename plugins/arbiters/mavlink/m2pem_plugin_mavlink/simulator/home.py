@@ -13,6 +13,9 @@ from m2pem_plugin_mavlink.simulator.interfaces import (
 )
 from m2pem_plugin_mavlink.simulator.messages import Command, Result
 
+HIGHEST_M = 100_000.0
+"""Messages have the height of home in millimetres, in 32 bits."""
+
 
 class Home(Component):
     """The home position, and the origin of local coordinates."""
@@ -38,7 +41,7 @@ class Home(Component):
         """Here, or at a place with its altitude above mean sea level."""
         if command.param1 == 1:
             self.set(self.autopilot.position)
-        elif not command.has_position:
+        elif not (command.has_position and abs(command.z) < HIGHEST_M):
             return Result.FAILED
         else:
             place = Location(command.latitude_deg, command.longitude_deg, command.z)
