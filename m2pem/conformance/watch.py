@@ -236,7 +236,11 @@ class Watch:
                     f"{self._for_s('cross-track', state):.0f} s (bound: {bound_m:.0f} m)"
                 )
                 found = self._deviation("cross-track", text, off_m, bound_m)
-        return found or self._too_low(state) or self._stuck(state, done)
+        return (
+            found
+            or self._too_low(state)
+            or self._stuck(state, done, was_seen=seen_from is not None)
+        )
 
     def _reach_m(self) -> float:
         own_m = self.commanded.tolerance_m
@@ -285,11 +289,15 @@ class Watch:
             heights.append(self._start_height_m + up_m - state.altitude_above_home_m)
         return up_m, min(heights), max(heights)
 
-    def _stuck(self, state: VehicleState, done: float | None) -> Deviation | None:
+    def _stuck(
+        self, state: VehicleState, done: float | None, *, was_seen: bool
+    ) -> Deviation | None:
+        """Whether it rests on its way; unless `was_seen`, it may have moved meanwhile."""
         if done is None or self.commanded.end in (ExpectedEnd.NONE, ExpectedEnd.REST):
             return None
         reached, since_us = self._progress or (done, state.time_us)
-        if self._progress is None or done > reached or self._speed_m_s > self._bounds.rest_m_s:
+        rests = was_seen and done <= reached and self._speed_m_s <= self._bounds.rest_m_s
+        if self._progress is None or not rests:
             self._progress = max(done, reached), state.time_us
             return None
         still_s = (state.time_us - since_us) / US_PER_S

@@ -13,7 +13,9 @@ from m2pem.fleet.fleet_schema import fleet_schema
 from m2pem.mission.catalogue import ParameterKind
 from m2pem.units import UNITS
 
-TEXT = (Path(__file__).parents[2] / "docs" / "fleets.md").read_text(encoding="utf-8")
+DOCS = Path(__file__).parents[2] / "docs"
+TEXT = (DOCS / "fleets.md").read_text(encoding="utf-8")
+BOUNDS = (DOCS / "evidence.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("example", re.findall(r"```yaml\n(.*?)```", TEXT, re.DOTALL))
@@ -27,7 +29,7 @@ def test_every_key_and_unit_is_explained() -> None:
     schema = fleet_schema()
     keys = {key for model in (schema, *schema["$defs"].values()) for key in model["properties"]}
     units = {unit for of_dimension in UNITS.values() for unit in of_dimension}
-    assert {name for name in keys | units if f"`{name}`" not in TEXT} == set()
+    assert {name for name in keys | units if f"`{name}`" not in TEXT + BOUNDS} == set()
 
 
 def test_the_table_of_behaviors_is_the_catalogue() -> None:
