@@ -34,7 +34,7 @@ async def show_fleet(desk: Desk, _: str) -> None:
 
 async def show_alerts(desk: Desk, _: str) -> None:
     await desk.page.goto(f"{desk.executive.origin}/alerts")
-    await expect(desk.page.get_by_role("region", name="Ended")).to_be_visible()
+    await expect(desk.page.get_by_role("row").filter(has_text="asks").first).to_be_visible()
 
 
 PAGES = {"run": show_run, "home": show_home, "fleet": show_fleet, "alerts": show_alerts}
