@@ -9,7 +9,7 @@ which publishes odometry as a PoseStamped. On /link, NAMESPACE makes it deaf and
 it speak again: it drives on meanwhile. FAULT `early`: it says after a metre that a goal succeeded;
 `runaway`: it confirms a cancel, and drives on; `jump`: its odometry jumps 50 m once; `backwards`:
 it drives the other way. On /truth it says what it does, whatever its link: name, speed, behaviors
-begun, and the epochs of the CANCELs that it has heard.
+begun, and the epochs of the CANCELs that it has received.
 """
 
 import contextlib

@@ -17,7 +17,7 @@ STEP_S = 0.05
 
 
 class Driver(OrderExecutor):
-    """Drives straight to each node. It stands while the vehicle is paused."""
+    """Drives straight to each node. It is at rest while the vehicle is paused."""
 
     speed_m_s = 1.0
 

@@ -262,7 +262,7 @@ async def test_a_vehicle_that_reports_a_stop_and_drives_on_is_said_not_to_obey(
         assert await harness.until(
             lambda: any(each.startswith(said) for each in state(harness).not_ready_reasons), 10
         ), state(harness)
-        if what == "cancel":  # it is paused then, and stands
+        if what == "cancel":  # it is paused then, and at rest
             end = await harness.ended("r1.b1", 30)
             assert end.state is BehaviorState.CANCELLED
             await at_rest(harness)
